@@ -1,0 +1,29 @@
+# SPDX-License-Identifier: BSD-3-Clause
+
+# The flags of all our targets.
+function(adasfm_target_options target)
+  target_compile_features(${target} PUBLIC cxx_std_17)
+  set_target_properties(${target} PROPERTIES CXX_EXTENSIONS OFF)
+  target_compile_options(${target} PRIVATE -Wall -Wextra -Wno-sign-compare)
+  if(ADASFM_WERROR)
+    target_compile_options(${target} PRIVATE -Werror)
+  endif()
+  if(ADASFM_SANITIZE)
+    target_compile_options(${target} PUBLIC -fsanitize=address,undefined
+                           -fno-sanitize-recover=undefined
+                           -fno-omit-frame-pointer)
+    target_link_options(${target} PUBLIC -fsanitize=address,undefined)
+  endif()
+endfunction()
+
+# adasfm_layer(name libraries...): the library adasfm_<name> of all sources in
+# the folder of that name.
+function(adasfm_layer name)
+  file(GLOB_RECURSE sources CONFIGURE_DEPENDS
+       ${PROJECT_SOURCE_DIR}/${name}/*.cc ${PROJECT_SOURCE_DIR}/${name}/*.h)
+  add_library(adasfm_${name} STATIC ${sources})
+  set_target_properties(adasfm_${name} PROPERTIES LINKER_LANGUAGE CXX)
+  target_include_directories(adasfm_${name} PUBLIC ${PROJECT_SOURCE_DIR})
+  target_link_libraries(adasfm_${name} PUBLIC ${ARGN})
+  adasfm_target_options(adasfm_${name})
+endfunction()

@@ -1,0 +1,69 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <base/camera.h>
+
+#include <Eigen/Core>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/relative_pose_prior.h"
+#include "core/status.h"
+#include "core/types.h"
+
+namespace adasfm {
+
+struct SceneImage {
+  image_t image_id = kInvalidImageId;
+  camera_t camera_id = 0;
+  std::string name;
+  // Pixels, COLMAP's convention: (0.5, 0.5) is the centre of the first pixel.
+  std::vector<Eigen::Vector2d> keypoints;
+  std::optional<timestamp_t> timestamp_ns;
+  // Unit vector towards the ground, in the camera frame.
+  std::optional<Eigen::Vector3d> gravity_in_cam;
+};
+
+struct ScenePair {
+  // image_id1 < image_id2, and so are the indices of the matches.
+  image_t image_id1 = kInvalidImageId;
+  image_t image_id2 = kInvalidImageId;
+  // COLMAP's TwoViewGeometry::ConfigurationType.
+  int config = 0;
+  std::vector<FeatureMatch> inlier_matches;
+  // As stored: unit translation, or none when the row has no pose (COLMAP
+  // stores identity and zero then).
+  std::optional<Rigid3d> cam2_from_cam1;
+  // All matches before verification; filled only with read_raw_matches, and
+  // empty when the database has none for the pair.
+  std::vector<FeatureMatch> raw_matches;
+};
+
+// Everything that the stages need from a database, read once.
+struct SceneData {
+  std::map<camera_t, colmap::Camera> cameras;
+  std::map<image_t, SceneImage> images;
+  // Sorted by (image_id1, image_id2).
+  std::vector<ScenePair> pairs;
+  // Consecutive images, sorted by time. Empty without sensors.
+  std::vector<RelativePosePrior> priors;
+};
+
+struct SceneDataOptions {
+  bool read_raw_matches = false;
+  // Start from the two-view geometries as they were before adasfm_global
+  // rewrote them, where it did.
+  bool use_original_two_view_geometries = false;
+  // Pairs with fewer inlier matches are left out.
+  int min_num_matches = 15;
+};
+
+// Reads a COLMAP database and its adasfm_ tables. An error for a missing file,
+// one that is not COLMAP's database, or rows that contradict each other. The
+// database is not changed.
+StatusOr<SceneData> ReadSceneData(const std::string& database_path,
+                                  const SceneDataOptions& options);
+
+}  // namespace adasfm

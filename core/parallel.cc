@@ -1,0 +1,56 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "core/parallel.h"
+
+#include <algorithm>
+#include <atomic>
+#include <exception>
+#include <mutex>
+#include <thread>
+#include <vector>
+
+namespace adasfm {
+
+int EffectiveNumThreads(int num_threads) {
+  if (num_threads > 0) return num_threads;
+  return std::max(1u, std::thread::hardware_concurrency());
+}
+
+void ParallelFor(int num_threads, size_t count,
+                 const std::function<void(size_t)>& function) {
+  const size_t num_workers =
+      std::min<size_t>(EffectiveNumThreads(num_threads), count);
+  if (num_workers <= 1) {
+    for (size_t i = 0; i < count; ++i) function(i);
+    return;
+  }
+  // Blocks keep the counter cheap; small enough to balance the load.
+  const size_t block = std::max<size_t>(1, count / (num_workers * 16));
+  std::atomic<size_t> next{0};
+  std::mutex mutex;
+  std::exception_ptr exception;
+  size_t exception_index = count;
+  const auto work = [&] {
+    for (size_t begin = next.fetch_add(block); begin < count;
+         begin = next.fetch_add(block)) {
+      for (size_t i = begin; i < std::min(count, begin + block); ++i) {
+        try {
+          function(i);
+        } catch (...) {
+          const std::lock_guard<std::mutex> lock(mutex);
+          if (i < exception_index) {
+            exception_index = i;
+            exception = std::current_exception();
+          }
+          return;
+        }
+      }
+    }
+  };
+  std::vector<std::thread> workers;
+  for (size_t i = 1; i < num_workers; ++i) workers.emplace_back(work);
+  work();
+  for (std::thread& worker : workers) worker.join();
+  if (exception) std::rethrow_exception(exception);
+}
+
+}  // namespace adasfm

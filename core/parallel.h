@@ -1,0 +1,19 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstddef>
+#include <functional>
+
+namespace adasfm {
+
+// The number of threads to use: the request, or all of the machine's for -1.
+int EffectiveNumThreads(int num_threads);
+
+// Calls function(i) once for every i in [0, count), on num_threads threads
+// (-1: all). The calls must not depend on each other; results written to slot i
+// do not depend on the number of threads. The first exception (by index among
+// those thrown) is rethrown when all threads have ended.
+void ParallelFor(int num_threads, size_t count,
+                 const std::function<void(size_t)>& function);
+
+}  // namespace adasfm

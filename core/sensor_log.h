@@ -1,0 +1,55 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <Eigen/Core>
+#include <string>
+#include <vector>
+
+#include "core/rigid3d.h"
+#include "core/types.h"
+
+namespace adasfm {
+
+// One IMU reading in the body (IMU) frame: angular velocity in rad/s, specific
+// force in m/s^2 (+9.81 upwards at rest).
+struct ImuSample {
+  timestamp_t timestamp_ns = 0;
+  Eigen::Vector3d angular_velocity = Eigen::Vector3d::Zero();
+  Eigen::Vector3d specific_force = Eigen::Vector3d::Zero();
+};
+
+// What the two columns of a wheel log mean (design, section 5).
+enum class WheelType {
+  kDifferential,  // left speed, right speed [m/s]
+  kVelocity,      // forward speed [m/s], yaw rate [rad/s]
+  kSpeed,         // forward speed [m/s], unused
+  kTicks,         // left counter, right counter
+  kOdometry,      // a trajectory of poses instead of samples
+};
+
+struct WheelSample {
+  timestamp_t timestamp_ns = 0;
+  double first = 0.0;
+  double second = 0.0;
+};
+
+// One pose of a TUM odometry trajectory.
+struct OdometryPose {
+  timestamp_t timestamp_ns = 0;
+  Rigid3d world_from_body;
+};
+
+struct ImageTime {
+  timestamp_t timestamp_ns = 0;
+  std::string name;
+};
+
+// White noise densities and bias random walks, continuous time.
+struct ImuNoise {
+  double gyroscope_noise_density = 1e-3;      // rad/s/sqrt(Hz)
+  double gyroscope_random_walk = 2e-5;        // rad/s^2/sqrt(Hz)
+  double accelerometer_noise_density = 2e-2;  // m/s^2/sqrt(Hz)
+  double accelerometer_random_walk = 5e-4;    // m/s^3/sqrt(Hz)
+};
+
+}  // namespace adasfm

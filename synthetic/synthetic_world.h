@@ -1,0 +1,124 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <Eigen/Core>
+#include <string>
+#include <vector>
+
+#include "core/bearing.h"
+#include "core/rigid3d.h"
+#include "core/sensor_log.h"
+#include "core/types.h"
+
+namespace adasfm {
+
+enum class SyntheticCameraModel { kPinhole, kFisheye };
+
+enum class SyntheticTrajectory { kTown, kStraight };
+
+// A drive through streets with facades. One generator serves the tests, the
+// benchmarks and the demo; equal options give equal worlds.
+struct SyntheticWorldOptions {
+  int num_images = 100;
+  uint64_t seed = 1;
+  // Mean distance between images along the path.
+  double spacing_m = 1.5;
+  // kTown drives blocks with right-angle bends and returns to places seen
+  // before; kStraight is one street.
+  SyntheticTrajectory trajectory = SyntheticTrajectory::kTown;
+  SyntheticCameraModel camera_model = SyntheticCameraModel::kPinhole;
+
+  int num_keypoints_per_image = 300;
+  double pixel_noise_px = 0.5;
+  // Share of raw matches that are wrong at random (verification drops most).
+  double outlier_match_ratio = 0.2;
+  // Consecutive pairs up to this distance in the sequence are matched, as well
+  // as all pairs that truly see the same facades.
+  int num_sequential_neighbors = 10;
+  // Share of verified pairs that join look-alike places: mutually consistent
+  // wrong matches of repeated facades.
+  double alias_pair_ratio = 0.0;
+  // Intervals without texture: this many, each this many images long.
+  int num_blackouts = 0;
+  int blackout_num_images = 16;
+
+  double imu_rate_hz = 200.0;
+  double wheel_rate_hz = 50.0;
+  ImuNoise imu_noise = {5e-4, 2e-5, 5e-3, 2e-4};
+  double wheel_speed_noise = 0.05;  // m/s, 1 sigma per sample
+  // True speed = factor * what the log says.
+  double wheel_scale = 1.0;
+  // Intervals in which the wheels turn without moving the car so far.
+  int num_wheel_slips = 0;
+  // Seconds at rest before the first image.
+  double standstill_s = 3.0;
+  // t_imu = t_cam + shift.
+  double timeshift_cam_imu_s = 0.0;
+};
+
+struct SyntheticCamera {
+  SyntheticCameraModel model = SyntheticCameraModel::kPinhole;
+  int width = 800;
+  int height = 500;
+  double focal_px = 480.0;
+  double principal_x_px = 400.0;
+  double principal_y_px = 250.0;
+  // kFisheye: the four coefficients of OpenCV's fisheye model.
+  Eigen::Vector4d fisheye_coeffs = Eigen::Vector4d::Zero();
+};
+
+struct SyntheticImage {
+  image_t image_id = kInvalidImageId;  // 1, 2, ... in order of time
+  std::string name;                    // "<timestamp_ns>.png"
+  timestamp_t timestamp_ns = 0;        // the camera's clock
+  Rigid3d cam_from_world;              // true pose; world is z-up, in metres
+  std::vector<Eigen::Vector2d> keypoints;
+  // The landmark each keypoint sees.
+  std::vector<int> landmark_ids;
+};
+
+struct SyntheticPair {
+  image_t image_id1 = kInvalidImageId;  // < image_id2
+  image_t image_id2 = kInvalidImageId;
+  std::vector<FeatureMatch> raw_matches;
+  std::vector<FeatureMatch> inlier_matches;
+  // A two-view estimate with realistic errors; unit translation.
+  Rigid3d cam2_from_cam1;
+  // The pair joins two places that look alike; its matches are wrong.
+  bool is_alias = false;
+};
+
+struct SyntheticWorld {
+  SyntheticWorldOptions options;
+  SyntheticCamera camera;
+  Rigid3d cam_from_imu;
+  Rigid3d imu_from_wheel;
+  double track_width_m = 1.2;
+  std::vector<SyntheticImage> images;
+  std::vector<Eigen::Vector3d> landmarks;
+  // Sorted by (image_id1, image_id2).
+  std::vector<SyntheticPair> pairs;
+  std::vector<ImuSample> imu_samples;
+  std::vector<WheelSample> wheel_samples;                    // kDifferential
+  Eigen::Vector3d true_gyro_bias = Eigen::Vector3d::Zero();  // at the start
+  Eigen::Vector3d true_accel_bias = Eigen::Vector3d::Zero();
+  // Camera-clock intervals of the slips.
+  std::vector<std::pair<timestamp_t, timestamp_t>> wheel_slips;
+};
+
+SyntheticWorld BuildSyntheticWorld(const SyntheticWorldOptions& options);
+
+// The ray of a pixel and its derivative. Throws for a pixel that the fisheye
+// model cannot reach.
+Bearing ComputeBearing(const SyntheticCamera& camera,
+                       const Eigen::Vector2d& pixel);
+
+// False when the point lies behind the camera (beyond its field of view).
+bool ProjectPoint(const SyntheticCamera& camera,
+                  const Eigen::Vector3d& point_in_cam, Eigen::Vector2d* pixel);
+
+// All keypoints of an image as rays.
+std::vector<Bearing> ComputeBearings(const SyntheticCamera& camera,
+                                     const SyntheticImage& image);
+
+}  // namespace adasfm
