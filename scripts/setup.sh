@@ -133,7 +133,7 @@ main() {
   say "Building the project into $build (about $((14 / jobs + 1)) minutes the first time, seconds later)"
   cmake -S "$root" -B "$build" -G Ninja \
     -DCMAKE_BUILD_TYPE="${ADASFM_BUILD_TYPE:-Release}" \
-    -DCOLMAP_DIR="$colmap_dir" "$@" > "$cache/configure.log" 2>&1 || {
+    -DCOLMAP_DIR="$colmap_dir" -DADASFM_WERROR=ON "$@" > "$cache/configure.log" 2>&1 || {
     tail -n 20 "$cache/configure.log" >&2
     die "configuring failed; see $cache/configure.log"
   }

@@ -9,7 +9,7 @@ set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 
 jobs=$(nproc)
-scripts/setup.sh -DADASFM_WERROR=ON
+scripts/setup.sh
 printf '\n== Checking format and layers\n'
 scripts/check_format.sh
 scripts/check_layers.sh
