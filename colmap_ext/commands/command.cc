@@ -1,0 +1,161 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "colmap_ext/commands/command.h"
+
+#include <glog/logging.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cstdio>
+#include <cstdlib>
+#include <exception>
+#include <filesystem>
+#include <fstream>
+#include <iostream>
+#include <new>
+#include <vector>
+
+namespace adasfm {
+namespace {
+
+namespace po = boost::program_options;
+namespace fs = std::filesystem;
+
+// Messages of other libraries may have several lines; an error has one.
+std::string OneLine(std::string message) {
+  while (!message.empty() && std::isspace(message.back())) message.pop_back();
+  std::replace(message.begin(), message.end(), '\n', ' ');
+  return message;
+}
+
+void PrintError(const std::string& message) {
+  std::cout.flush();
+  std::cerr << "ERROR: " << OneLine(message) << std::endl;
+}
+
+// A failed CHECK of the host would abort with a core dump; glog has already
+// written the check itself to standard error.
+[[noreturn]] void ExitOnFailedCheck() {
+  PrintError(
+      "COLMAP stopped at the check above; look at the input that it names");
+  std::fflush(nullptr);
+  _exit(EXIT_FAILURE);
+}
+
+void SetUpLogging(const char* name) {
+  google::InitGoogleLogging(name);
+  google::InstallFailureFunction(
+      reinterpret_cast<google::logging_fail_func_t>(&ExitOnFailedCheck));
+  // Log files in /tmp are of no use to anybody who did not ask for them.
+  FLAGS_logtostderr = true;
+}
+
+}  // namespace
+
+CommandOptions::CommandOptions(const std::string& name,
+                               const std::string& description)
+    : name_(name), description_(description), options_("Options", 100, 60) {
+  options_.add_options()("help,h", "Show this help.");
+  options_.add_options()(
+      "project_path", po::value<std::string>(&project_path_),
+      "an .ini file with options; those of the command line win");
+  AddDefault("log_to_stderr", &log_to_stderr_,
+             "print COLMAP's informational log lines too (0 or 1)");
+  AddDefault("log_level", &log_level_,
+             "verbosity of COLMAP's log lines, 0 to 4");
+}
+
+void CommandOptions::PrintHelp() const {
+  std::cout << "colmap " << name_ << "\n\n"
+            << description_ << "\n\n"
+            << options_ << std::endl;
+}
+
+Status CommandOptions::ReadProject(const std::string& path,
+                                   po::variables_map* values) const {
+  std::ifstream file(path);
+  if (!file) {
+    return Status::Error("cannot read the project file " + path +
+                         "; check --project_path");
+  }
+  // A project file serves several commands, so other commands' options are
+  // passed over; a misspelt option of ours is not.
+  const po::parsed_options parsed =
+      po::parse_config_file(file, options_, /*allow_unregistered=*/true);
+  for (const po::option& option : parsed.options) {
+    if (!option.unregistered) continue;
+    const std::string group = option.string_key.substr(
+        0, std::min(option.string_key.find('.'), option.string_key.size()));
+    if (group.rfind("AdaSfm", 0) != 0) continue;
+    const std::vector<boost::shared_ptr<po::option_description>>& known =
+        options_.options();
+    if (std::any_of(known.begin(), known.end(), [&group](const auto& entry) {
+          return entry->long_name().rfind(group + ".", 0) == 0;
+        })) {
+      return Status::Error(path + ": unknown option '" + option.string_key +
+                           "'; see `colmap " + name_ + " -h`");
+    }
+  }
+  po::store(parsed, *values);
+  return Status::Ok();
+}
+
+Status CommandOptions::Parse(int argc, const char* const* argv) {
+  po::variables_map values;
+  try {
+    const int style = po::command_line_style::default_style &
+                      ~po::command_line_style::allow_guessing;
+    po::store(po::parse_command_line(argc, argv, options_, style), values);
+    if (values.count("help")) {
+      PrintHelp();
+      help_shown_ = true;
+      return Status::Ok();
+    }
+    if (values.count("project_path")) {
+      const Status read =
+          ReadProject(values["project_path"].as<std::string>(), &values);
+      if (!read.ok()) return read;
+    }
+    po::notify(values);
+  } catch (const po::error& error) {
+    return Status::Error(std::string(error.what()) + "; see `colmap " + name_ +
+                         " -h`");
+  }
+  FLAGS_minloglevel = log_to_stderr_ ? google::INFO : google::WARNING;
+  FLAGS_v = log_level_;
+  return Status::Ok();
+}
+
+int RunCommand(const Command& command, int argc, char** argv) {
+  SetUpLogging(command.name);
+  try {
+    const Status status = command.run(argc, argv);
+    if (status.ok()) return EXIT_SUCCESS;
+    PrintError(status.message());
+  } catch (const std::bad_alloc&) {
+    PrintError(std::string(command.name) +
+               ": out of memory; use fewer threads, or fewer images at a time");
+  } catch (const std::exception& error) {
+    PrintError(std::string(command.name) + ": " + error.what());
+  } catch (...) {
+    PrintError(std::string(command.name) + ": unknown exception");
+  }
+  return EXIT_FAILURE;
+}
+
+Status PrepareOutputFolder(const std::string& path) {
+  std::error_code error;
+  fs::create_directories(path, error);
+  if (!fs::is_directory(path)) {
+    return Status::Error(
+        "cannot create the output folder " + path + ": " +
+        (error ? error.message() : std::string("a file is in the way")) +
+        "; choose another folder");
+  }
+  if (access(path.c_str(), W_OK | X_OK) != 0) {
+    return Status::Error("the output folder " + path +
+                         " is not writable; choose another folder");
+  }
+  return Status::Ok();
+}
+
+}  // namespace adasfm

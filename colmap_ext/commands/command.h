@@ -1,0 +1,101 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <boost/program_options.hpp>
+#include <string>
+
+#include "core/status.h"
+
+namespace adasfm {
+
+// The options of one command, in COLMAP's manner: `--name value`, grouped
+// `--Group.name value`, 0/1 booleans, and `--project_path` for an .ini file
+// with the same names. The command line wins over the file. Unlike COLMAP's
+// OptionManager it never exits the process, and names are not guessed from
+// their beginning.
+//
+//   Status RunAdasfmExample(int argc, char** argv) {
+//     ExampleOptions options;
+//     std::string database_path;
+//     CommandOptions command("adasfm_example", "Does this and that.");
+//     command.AddRequired("database_path", &database_path, "COLMAP database");
+//     command.AddDefault("Example.max_error_px", &options.max_error_px,
+//                        "largest error of a match [px]");
+//     const Status parsed = command.Parse(argc, argv);
+//     if (!parsed.ok() || command.HelpShown()) return parsed;
+//     ...
+//   }
+class CommandOptions {
+ public:
+  CommandOptions(const std::string& name, const std::string& description);
+
+  // The help says what the value is, with its unit.
+  template <typename T>
+  void AddRequired(const std::string& name, T* value, const std::string& help);
+  // The value that *value holds now is the default, and is shown as such.
+  template <typename T>
+  void AddDefault(const std::string& name, T* value, const std::string& help);
+
+  // Reads argv[1..]; -h prints the help, after which HelpShown() is true and
+  // the command has nothing more to do.
+  Status Parse(int argc, const char* const* argv);
+  bool HelpShown() const { return help_shown_; }
+
+ private:
+  void PrintHelp() const;
+  Status ReadProject(const std::string& path,
+                     boost::program_options::variables_map* values) const;
+
+  std::string name_;
+  std::string description_;
+  boost::program_options::options_description options_;
+  std::string project_path_;
+  bool log_to_stderr_ = false;
+  int log_level_ = 2;
+  bool help_shown_ = false;
+};
+
+// argv[0] is the command's name. An error's message is one line: what, which
+// file, what to do; the caller prints it.
+using CommandFunction = Status (*)(int argc, char** argv);
+
+struct Command {
+  const char* name;
+  const char* description;
+  CommandFunction run;
+};
+
+// Runs the command with logging set up, prints `ERROR: message` on standard
+// error when it fails, and returns the exit code, 0 or 1. No exception and no
+// failed check of the host gets past it as an abort.
+int RunCommand(const Command& command, int argc, char** argv);
+
+// An option struct's IsValid as a Status.
+template <typename Options>
+Status CheckOptions(const Options& options) {
+  std::string error;
+  return options.IsValid(&error) ? Status::Ok() : Status::Error(error);
+}
+
+// Creates the folder, and its parents, unless it exists; an error when it
+// cannot be written to.
+Status PrepareOutputFolder(const std::string& path);
+
+template <typename T>
+void CommandOptions::AddRequired(const std::string& name, T* value,
+                                 const std::string& help) {
+  options_.add_options()(name.c_str(),
+                         boost::program_options::value<T>(value)->required(),
+                         (help + " (required)").c_str());
+}
+
+template <typename T>
+void CommandOptions::AddDefault(const std::string& name, T* value,
+                                const std::string& help) {
+  options_.add_options()(
+      name.c_str(),
+      boost::program_options::value<T>(value)->default_value(*value),
+      help.c_str());
+}
+
+}  // namespace adasfm
