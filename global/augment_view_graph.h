@@ -1,0 +1,36 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "core/relative_pose_prior.h"
+#include "global/view_graph.h"
+
+namespace adasfm {
+
+struct AugmentationOptions {
+  // Off: sensor edges only where vision has none would split the graph too, so
+  // nothing at all is added.
+  bool enabled = true;
+  // eps_T: priors over longer times take no part.
+  double max_prior_time_gap_s = 0.5;
+  // Keep lengths in metres; otherwise unit vectors, as the paper does.
+  bool use_metric_lengths = true;
+
+  bool IsValid(std::string* error) const;
+};
+
+// Before rotation averaging: adds the priors with a rotation as edges where the
+// graph has no kept edge. Returns how many.
+int AddSensorEdges(const AugmentationOptions& options,
+                   const std::vector<RelativePosePrior>& priors,
+                   ViewGraph* graph);
+
+// Before translation averaging: translations of consecutive images come from
+// the priors (design 7.2, step 5), rotations stay. Returns how many edges.
+int AugmentTranslations(const AugmentationOptions& options,
+                        const std::vector<RelativePosePrior>& priors,
+                        ViewGraph* graph);
+
+}  // namespace adasfm

@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <Eigen/Core>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "global/correspondences.h"
+#include "global/view_graph.h"
+
+namespace adasfm {
+
+struct EdgeLengthOptions {
+  // Matches with rays closer than this say nothing about depth.
+  double min_parallax_deg = 1.0;
+  // Matches used per edge, those with the largest parallax.
+  int max_num_matches = 60;
+  // Keypoints with known depth that an edge must share.
+  int min_num_shared = 5;
+  // Passes over all edges after the first.
+  int num_sweeps = 3;
+  int num_threads = -1;
+
+  bool IsValid(std::string* error) const;
+};
+
+struct EdgeLength {
+  // Distance of the centres: metres when metric, else in the unit of its
+  // component.
+  double length = 0.0;
+  // 1 sigma of log(length).
+  double log_sigma = 0.0;
+};
+
+struct EdgeLengths {
+  // One per edge of the graph; empty where nothing was learned.
+  std::vector<std::optional<EdgeLength>> lengths;
+  bool metric = false;
+};
+
+// How long the visual edges are, through the points that they share: a keypoint
+// has one depth in its image, and each edge sees it as a multiple of its own
+// length. Metric lengths of the priors start it; without any the edge with most
+// matches has length 1. So collinear centres, which directions alone leave
+// free, become solvable. known_lengths_m: of sensor edges.
+EdgeLengths EstimateEdgeLengths(
+    const EdgeLengthOptions& options, const ViewGraph& graph,
+    const std::map<ImagePair, double>& known_lengths_m,
+    const GlobalCorrespondences& correspondences);
+
+}  // namespace adasfm

@@ -1,0 +1,86 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <map>
+#include <string>
+#include <vector>
+
+#include "core/relative_pose_prior.h"
+#include "core/rigid3d.h"
+#include "global/augment_view_graph.h"
+#include "global/correspondences.h"
+#include "global/edge_lengths.h"
+#include "global/filter_loops_by_odometry.h"
+#include "global/odometry_chain.h"
+#include "global/refine_relative_poses.h"
+#include "global/relative_translation.h"
+#include "global/rotation_averaging.h"
+#include "global/translation_averaging.h"
+#include "global/view_graph.h"
+
+namespace adasfm {
+
+// Nested by step, in order of their use.
+struct CoarsePoseOptions {
+  OdometryChainOptions chain;
+  RelativePoseRefinementOptions relative_poses;
+  EdgeLengthOptions lengths;
+  LoopFilterOptions loops;
+  RotationAveragingOptions rotations;
+  // eps_R.
+  double max_rotation_discrepancy_deg = 5.0;
+  RelativeTranslationOptions translations;
+  AugmentationOptions augmentation;
+  TranslationAveragingOptions positions;
+  // Edges whose direction is off the positions by more are removed at the end.
+  double max_direction_discrepancy_deg = 15.0;
+  // Edges with fewer inliers take no part.
+  int min_num_inliers = 15;
+  // Of all steps; -1: all of the machine's.
+  int num_threads = -1;
+
+  bool IsValid(std::string* error) const;
+};
+
+// The poses of one component.
+struct CoarseComponent {
+  std::map<image_t, Rigid3d> cams_from_world;
+  // In metres.
+  bool metric = false;
+  bool rotations_converged = false;
+  bool positions_converged = false;
+  double sdp_optimality = 0.0;
+};
+
+struct CoarseStep {
+  std::string name;
+  double seconds = 0.0;
+  // What it did, in one line: "removed 238 of 5141 edges".
+  std::string summary;
+};
+
+struct CoarsePoses {
+  // Largest first; at least two images each. Empty when no edge is useful.
+  std::vector<CoarseComponent> components;
+  // The input's edges and those added, with reasons of removal and the
+  // relative poses as they were used.
+  ViewGraph graph;
+  std::vector<CoarseStep> steps;
+};
+
+// Steps 2 to 6 of the coarse global stage (design 7.2), from an initial view
+// graph (relative poses of verified pairs) to camera poses. Priors may be
+// empty. Throws std::invalid_argument for invalid options or an inconsistent
+// graph. Numbered steps:
+//   1 least-squares relative poses            RefineRelativePoses
+//   2 odometry chain, lengths, loop gating    FilterLoopsByOdometry
+//   3 sensor edges, rotation averaging        EstimateGlobalRotations
+//   4 edges off the rotations                 FilterEdgesByRotation
+//   5 directions, sensor translations         EstimateRelativeTranslations
+//   6 positions, edges off the positions      EstimateGlobalPositions
+CoarsePoses EstimateCoarsePoses(const CoarsePoseOptions& options,
+                                const ViewGraph& initial_graph,
+                                const GlobalCorrespondences& correspondences,
+                                const std::vector<RelativePosePrior>& priors);
+
+}  // namespace adasfm

@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <map>
+#include <string>
+#include <tuple>
+#include <vector>
+
+#include "core/types.h"
+
+namespace adasfm {
+
+struct TrackElement {
+  image_t image_id = kInvalidImageId;
+  point2D_t point2D_idx = 0;
+
+  friend bool operator==(const TrackElement& a, const TrackElement& b) {
+    return a.image_id == b.image_id && a.point2D_idx == b.point2D_idx;
+  }
+  friend bool operator<(const TrackElement& a, const TrackElement& b) {
+    return std::tie(a.image_id, a.point2D_idx) <
+           std::tie(b.image_id, b.point2D_idx);
+  }
+};
+
+// Sorted by image; every image at most once.
+using Track = std::vector<TrackElement>;
+
+struct TrackOptions {
+  int min_track_length = 3;
+  // Tracks are taken, longest first, while they help an image that has fewer
+  // than this many yet.
+  int min_num_tracks_per_image = 120;
+  // Bound of the number of tracks, whatever the images; -1: none.
+  int max_num_tracks = 200000;
+
+  bool IsValid(std::string* error) const;
+};
+
+// Tracks of matched keypoints (union-find). Where matches would join two
+// keypoints of one image, the later match (pairs by number of matches, most
+// first) is left out, so one wrong match does not cost the whole track.
+std::vector<Track> BuildTracks(
+    const TrackOptions& options,
+    const std::map<ImagePair, std::vector<FeatureMatch>>& matches);
+
+}  // namespace adasfm

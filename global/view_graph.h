@@ -1,0 +1,83 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <limits>
+#include <map>
+#include <optional>
+#include <vector>
+
+#include "core/rigid3d.h"
+#include "core/types.h"
+
+namespace adasfm {
+
+enum class EdgeSource {
+  kVisual,     // rotation and direction from matches
+  kSensor,     // rotation and translation from a prior; vision has no edge
+  kAugmented,  // rotation from matches, translation from a prior
+};
+
+// Why an edge takes no part any more.
+enum class EdgeRemoval {
+  kKept,
+  kFewInliers,
+  kRelativePose,      // its own matches do not support one relative pose
+  kOdometryRotation,  // turns farther from the odometry chain than it can err
+  kOdometryPosition,  // its places are farther apart than it says
+  kFalseLoop,         // belongs to a run of pairs that contradicts the chain
+  kRotation,          // off the global rotations
+  kTranslation,       // off the global positions
+  kDisconnected,      // one of its images has no pose
+};
+const char* EdgeRemovalName(EdgeRemoval removal);
+
+// One image pair. Directions without a length are unit vectors.
+struct ViewGraphEdge {
+  image_t image_id1 = kInvalidImageId;  // < image_id2
+  image_t image_id2 = kInvalidImageId;
+  // The translation has length_m where that is set, else length 1.
+  Rigid3d cam2_from_cam1;
+  int num_inliers = 0;
+  EdgeSource source = EdgeSource::kVisual;
+  bool has_rotation = true;
+  bool has_translation = true;
+  // Distance of the camera centres in metres, from sensors.
+  std::optional<double> length_m;
+
+  // 1 sigma; what the stages weigh with. Overwritten where a stage measures it.
+  double rotation_sigma_rad = 0.01;
+  double direction_sigma_rad = 0.05;
+  double length_sigma_m = std::numeric_limits<double>::infinity();
+
+  EdgeRemoval removal = EdgeRemoval::kKept;
+
+  bool IsKept() const { return removal == EdgeRemoval::kKept; }
+  ImagePair Pair() const { return ImagePair(image_id1, image_id2); }
+};
+
+struct ViewGraph {
+  std::vector<image_t> images;       // sorted
+  std::vector<ViewGraphEdge> edges;  // sorted by pair, one per pair
+
+  // The position of an image in images, -1 when absent.
+  int IndexOf(image_t image_id) const;
+  // Throws std::invalid_argument unless both lists are sorted without
+  // duplicates, all edges join two of the images, and all kept values are
+  // finite.
+  void Check() const;
+};
+
+// The images joined by kept edges (all kinds), largest component first, equal
+// sizes by smallest id; images sorted. Images without edges are components of
+// their own.
+std::vector<std::vector<image_t>> FindConnectedComponents(
+    const ViewGraph& graph);
+
+// The images and the edges with both ends among them; sorted image ids.
+ViewGraph ExtractSubgraph(const ViewGraph& graph,
+                          const std::vector<image_t>& images);
+
+// How many edges were removed, by reason.
+std::map<EdgeRemoval, int> CountRemovals(const ViewGraph& graph);
+
+}  // namespace adasfm
