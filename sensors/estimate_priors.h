@@ -1,0 +1,113 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <Eigen/Core>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "core/relative_pose_prior.h"
+#include "core/sensor_log.h"
+#include "core/status.h"
+#include "sensors/calibration.h"
+#include "sensors/odometry_fusion.h"
+
+namespace adasfm {
+
+// One image on the camera's clock.
+struct ImageStamp {
+  image_t image_id = kInvalidImageId;
+  std::string name;
+  timestamp_t timestamp_ns = 0;
+};
+
+// What was logged, each in order of time on the IMU's clock; empty when the
+// machine has no such sensor.
+struct SensorLogs {
+  std::vector<ImuSample> imu;
+  std::vector<WheelSample> wheel;
+  std::vector<OdometryPose> odometry;
+};
+
+// A verified two-view rotation of the database.
+struct VisualRotation {
+  image_t image_id1 = kInvalidImageId;
+  image_t image_id2 = kInvalidImageId;
+  Eigen::Quaterniond cam2_from_cam1 = Eigen::Quaterniond::Identity();
+  int num_inliers = 0;
+};
+
+struct PriorEstimationOptions {
+  // A link between two times needs samples at most this far apart: beyond it
+  // linear interpolation of a vehicle's motion is a guess.
+  double max_imu_gap_s = 0.1;
+  double max_wheel_gap_s = 0.25;
+  // Whether two-view rotations give the first gyroscope bias when the machine
+  // never stands still.
+  bool use_visual_rotations = true;
+  // Whether vision and gyroscope are compared before anything is believed
+  // (sensors/check_against_vision.h); a contradiction is an error.
+  bool check_against_vision = true;
+  // Whether the time shift that vision and gyroscope agree on is added to the
+  // calibration's.
+  bool estimate_time_shift = false;
+  OdometryFusionOptions fusion;
+
+  bool IsValid(std::string* error) const;
+};
+
+// Figures for the screen and the JSON summary; zero where there is no sensor.
+struct SensorSummary {
+  int num_images = 0;
+  int num_images_in_logs = 0;
+  int num_priors = 0;
+  double prior_ratio = 0.0;  // of the consecutive pairs
+  double imu_rate_hz = 0.0;
+  double wheel_rate_hz = 0.0;
+  int num_imu_gaps = 0;
+  int num_wheel_gaps = 0;
+  double max_imu_gap_s = 0.0;
+  double max_wheel_gap_s = 0.0;
+  double standstill_s = 0.0;
+  // Means over the sequence, with the mean 1 sigma of an axis.
+  Eigen::Vector3d gyroscope_bias = Eigen::Vector3d::Zero();
+  double gyroscope_bias_sigma = 0.0;
+  Eigen::Vector3d accelerometer_bias = Eigen::Vector3d::Zero();
+  double accelerometer_bias_sigma = 0.0;
+  // At the first image in the logs, in its camera frame; zero when unknown.
+  Eigen::Vector3d first_gravity_in_cam = Eigen::Vector3d::Zero();
+  // True speed = scale * logged speed.
+  double wheel_scale = 1.0;
+  double wheel_scale_sigma = 0.0;
+  // The time shift in use, and what vision would add to it (0 when unknown).
+  double timeshift_cam_imu_s = 0.0;
+  double visual_timeshift_correction_s = 0.0;
+  std::vector<WheelSlip> wheel_slips;  // camera clock
+  double distance_m = 0.0;
+  // Expected error of the chained priors after 100 m, 1 sigma.
+  double drift_per_100m_m = 0.0;
+  double drift_per_100m_deg = 0.0;
+  std::vector<std::string> warnings;
+};
+
+struct PriorEstimate {
+  // Consecutive images in order of time; a pair without data has none.
+  std::vector<RelativePosePrior> priors;
+  // Unit vectors that point down.
+  std::map<image_t, Eigen::Vector3d> gravity_in_cam;
+  SensorSummary summary;
+};
+
+// From logs to priors: (1) order images and find those inside the logs,
+// (2) compare vision with the gyroscope, (3) preintegrate between images,
+// (4) smooth all of it at once, (5) express motion and covariance in the camera
+// frames. What the sensors cannot observe is flagged
+// (core/relative_pose_prior). Bad data gives a status of one line; invalid
+// options throw std::invalid_argument.
+StatusOr<PriorEstimate> EstimatePriors(
+    const std::vector<ImageStamp>& images, const SensorLogs& logs,
+    const SensorCalibration& calibration,
+    const std::vector<VisualRotation>& visual_rotations,
+    const PriorEstimationOptions& options);
+
+}  // namespace adasfm
