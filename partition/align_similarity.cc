@@ -1,0 +1,270 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "partition/align_similarity.h"
+
+#include <Eigen/Eigenvalues>
+#include <Eigen/SVD>
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+
+#include "core/random.h"
+#include "core/so3.h"
+
+namespace adasfm {
+namespace {
+
+// Orientations weigh as if they were known to this angle when centres are known
+// to the threshold.
+constexpr double kOrientationSigmaRad = 0.1;
+
+Eigen::Matrix3d NearestRotation(const Eigen::Matrix3d& matrix) {
+  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(
+      matrix, Eigen::ComputeFullU | Eigen::ComputeFullV);
+  Eigen::Vector3d sign = Eigen::Vector3d::Ones();
+  if (svd.matrixU().determinant() * svd.matrixV().determinant() < 0.0) {
+    sign(2) = -1.0;
+  }
+  return svd.matrixU() * sign.asDiagonal() * svd.matrixV().transpose();
+}
+
+// The distance between the first and the last decile of the target's centres
+// along their longest axis.
+double ComputeExtent(const std::vector<PosePair>& poses) {
+  Eigen::Vector3d mean = Eigen::Vector3d::Zero();
+  for (const PosePair& pose : poses) {
+    mean += pose.cam_from_target.TargetOriginInSource() / poses.size();
+  }
+  Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
+  for (const PosePair& pose : poses) {
+    const Eigen::Vector3d centred =
+        pose.cam_from_target.TargetOriginInSource() - mean;
+    covariance += centred * centred.transpose();
+  }
+  const Eigen::Vector3d axis =
+      Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(covariance)
+          .eigenvectors()
+          .col(2);
+  std::vector<double> coordinates;
+  for (const PosePair& pose : poses) {
+    coordinates.push_back(
+        axis.dot(pose.cam_from_target.TargetOriginInSource()));
+  }
+  std::sort(coordinates.begin(), coordinates.end());
+  const size_t decile = coordinates.size() / 10;
+  return coordinates[coordinates.size() - 1 - decile] - coordinates[decile];
+}
+
+// One threshold's RANSAC.
+class Attempt {
+ public:
+  Attempt(const AlignSimilarityOptions& options,
+          const std::vector<PosePair>& poses, double threshold)
+      : options_(options), poses_(poses), threshold_(threshold) {
+    result_.threshold = threshold;
+    result_.inlier_mask.assign(poses.size(), 0);
+  }
+
+  AlignSimilarityResult Run() {
+    // All images first: most parts fit, and then the result has no chance in
+    // it. RANSAC's samples follow.
+    Consider(std::vector<char>(poses_.size(), 1));
+    Random random(options_.seed);
+    for (int trial = 0; trial < options_.num_trials; ++trial) {
+      std::vector<char> mask(poses_.size(), 0);
+      for (const int i : random.Sample(3, static_cast<int>(poses_.size()))) {
+        mask[i] = 1;
+      }
+      Consider(mask);
+    }
+    return result_;
+  }
+
+ private:
+  // Estimates from the mask, then again from the inliers while these grow.
+  void Consider(const std::vector<char>& initial_mask) {
+    std::vector<char> mask = initial_mask;
+    for (int round = 0; round < 10; ++round) {
+      Sim3d target_from_source;
+      if (!EstimatePoseSimilarity(poses_, mask,
+                                  threshold_ / kOrientationSigmaRad,
+                                  &target_from_source)) {
+        return;
+      }
+      std::vector<char> inlier_mask = mask;
+      if (!Evaluate(target_from_source, &inlier_mask)) return;
+      if (inlier_mask == mask) return;
+      mask = inlier_mask;
+    }
+  }
+
+  // False when this is no better than what was found before.
+  bool Evaluate(const Sim3d& target_from_source, std::vector<char>* mask) {
+    int num_inliers = 0;
+    double sum_squares = 0.0;
+    for (size_t i = 0; i < poses_.size(); ++i) {
+      const double error =
+          (target_from_source *
+               poses_[i].cam_from_source.TargetOriginInSource() -
+           poses_[i].cam_from_target.TargetOriginInSource())
+              .norm();
+      const double rotation_error_rad = AngleBetweenRad(
+          Eigen::Quaterniond(poses_[i].cam_from_source.rotation *
+                             target_from_source.rotation.conjugate()),
+          poses_[i].cam_from_target.rotation);
+      const bool is_inlier =
+          error <= threshold_ &&
+          rotation_error_rad <= DegToRad(options_.max_rotation_error_deg);
+      (*mask)[i] = is_inlier;
+      num_inliers += is_inlier;
+      if (is_inlier) sum_squares += error * error;
+    }
+    const double ratio = 1.0 * num_inliers / poses_.size();
+    const double rmse = std::sqrt(sum_squares / std::max(1, num_inliers));
+    if (num_inliers == 0 || ratio < result_.inlier_ratio ||
+        (ratio == result_.inlier_ratio && rmse >= result_.rmse)) {
+      return false;
+    }
+    result_.target_from_source = target_from_source;
+    result_.inlier_ratio = ratio;
+    result_.rmse = rmse;
+    result_.inlier_mask = *mask;
+    return true;
+  }
+
+  const AlignSimilarityOptions& options_;
+  const std::vector<PosePair>& poses_;
+  const double threshold_;
+  AlignSimilarityResult result_;
+};
+
+bool CheckRule(bool holds, const std::string& name, double value,
+               const std::string& rule, std::string* error) {
+  if (!holds) {
+    *error = "AdaSfmAlign." + name + " = " + std::to_string(value) + " " + rule;
+  }
+  return holds;
+}
+
+}  // namespace
+
+bool AlignSimilarityOptions::IsValid(std::string* error) const {
+  return CheckRule(min_threshold > 0.0, "min_threshold", min_threshold,
+                   "must be positive", error) &&
+         CheckRule(initial_threshold >= min_threshold, "initial_threshold",
+                   initial_threshold, "must not be below min_threshold",
+                   error) &&
+         CheckRule(threshold_increase > 0.0, "threshold_increase",
+                   threshold_increase, "must be positive", error) &&
+         CheckRule(threshold_decrease > 0.0, "threshold_decrease",
+                   threshold_decrease, "must be positive", error) &&
+         CheckRule(min_inlier_ratio > 0.0 && min_inlier_ratio <= 1.0,
+                   "min_inlier_ratio", min_inlier_ratio, "must be in (0, 1]",
+                   error) &&
+         CheckRule(max_inlier_ratio >= min_inlier_ratio, "max_inlier_ratio",
+                   max_inlier_ratio, "must not be below min_inlier_ratio",
+                   error) &&
+         CheckRule(max_num_iterations > 0, "max_num_iterations",
+                   max_num_iterations, "must be positive", error) &&
+         CheckRule(max_threshold_to_extent > 0.0, "max_threshold_to_extent",
+                   max_threshold_to_extent, "must be positive", error) &&
+         CheckRule(max_rotation_error_deg > 0.0, "max_rotation_error_deg",
+                   max_rotation_error_deg, "must be positive", error) &&
+         CheckRule(unit > 0.0, "unit", unit, "must be positive", error) &&
+         CheckRule(num_trials >= 0, "num_trials", num_trials,
+                   "must not be negative", error);
+}
+
+AlignSimilarityResult AlignSimilarity(const AlignSimilarityOptions& options,
+                                      const std::vector<PosePair>& poses) {
+  std::string error;
+  if (!options.IsValid(&error)) throw std::invalid_argument(error);
+  if (poses.size() < 3) return AlignSimilarityResult();
+  const double max_threshold =
+      options.max_threshold_to_extent * ComputeExtent(poses);
+  const double min_threshold =
+      std::min(options.min_threshold * options.unit, max_threshold);
+  if (!(max_threshold > 0.0)) return AlignSimilarityResult();
+  double threshold =
+      std::min(options.initial_threshold * options.unit, max_threshold);
+  AlignSimilarityResult best;
+  const int max_num_iterations =
+      options.adapt_threshold ? options.max_num_iterations : 1;
+  for (int iteration = 1; iteration <= max_num_iterations; ++iteration) {
+    AlignSimilarityResult result = Attempt(options, poses, threshold).Run();
+    result.success = result.inlier_ratio >= options.min_inlier_ratio;
+    const bool was_success = best.success;
+    // A threshold lowered too far: the one before it was the final one.
+    if (was_success && !result.success) break;
+    best = result;
+    best.num_iterations = iteration;
+    if (!result.success) {
+      if (threshold >= max_threshold) break;
+      threshold = std::min(
+          max_threshold, threshold + options.threshold_increase * options.unit);
+    } else if (result.inlier_ratio >= options.max_inlier_ratio) {
+      // Raised before: lowering it again would only go back and forth.
+      if (iteration > 1 && !was_success) break;
+      if (threshold <= min_threshold) break;
+      threshold = std::max(
+          min_threshold, threshold - options.threshold_decrease * options.unit);
+    } else {
+      break;
+    }
+  }
+  return best;
+}
+
+bool EstimatePoseSimilarity(const std::vector<PosePair>& poses,
+                            const std::vector<char>& mask,
+                            double orientation_weight,
+                            Sim3d* target_from_source) {
+  if (mask.size() != poses.size()) {
+    throw std::invalid_argument("EstimatePoseSimilarity: mask size differs");
+  }
+  int count = 0;
+  Eigen::Vector3d source_mean = Eigen::Vector3d::Zero();
+  Eigen::Vector3d target_mean = Eigen::Vector3d::Zero();
+  for (size_t i = 0; i < poses.size(); ++i) {
+    if (!mask[i]) continue;
+    ++count;
+    source_mean += poses[i].cam_from_source.TargetOriginInSource();
+    target_mean += poses[i].cam_from_target.TargetOriginInSource();
+  }
+  if (count < 2) return false;
+  source_mean /= count;
+  target_mean /= count;
+  Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
+  Eigen::Matrix3d orientations = Eigen::Matrix3d::Zero();
+  double source_variance = 0.0;
+  double target_variance = 0.0;
+  for (size_t i = 0; i < poses.size(); ++i) {
+    if (!mask[i]) continue;
+    const Eigen::Vector3d source =
+        poses[i].cam_from_source.TargetOriginInSource() - source_mean;
+    const Eigen::Vector3d target =
+        poses[i].cam_from_target.TargetOriginInSource() - target_mean;
+    covariance += target * source.transpose();
+    source_variance += source.squaredNorm();
+    target_variance += target.squaredNorm();
+    orientations += (poses[i].cam_from_target.rotation.conjugate() *
+                     poses[i].cam_from_source.rotation)
+                        .toRotationMatrix();
+  }
+  if (!(source_variance > 0.0) || !(target_variance > 0.0)) return false;
+  // The rotation depends on the scale only through the two terms' weights:
+  // alternating converges at once.
+  double scale = std::sqrt(target_variance / source_variance);
+  Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();
+  for (int round = 0; round < 3; ++round) {
+    rotation =
+        NearestRotation(scale * covariance +
+                        orientation_weight * orientation_weight * orientations);
+    scale = (rotation.transpose() * covariance).trace() / source_variance;
+    if (!(scale > 0.0) || !std::isfinite(scale)) return false;
+  }
+  *target_from_source = Sim3d(scale, Eigen::Quaterniond(rotation),
+                              target_mean - scale * (rotation * source_mean));
+  return true;
+}
+
+}  // namespace adasfm

@@ -1,0 +1,81 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "core/rigid3d.h"
+#include "core/sim3d.h"
+
+namespace adasfm {
+
+// The same image in two worlds.
+struct PosePair {
+  Rigid3d cam_from_source;
+  Rigid3d cam_from_target;
+};
+
+// Alg. 2 of the paper. Thresholds are in units of `unit` (1 m when the target
+// is metric, else the median distance between neighbouring images).
+struct AlignSimilarityOptions {
+  // tau_init, alpha_inc, alpha_dec, r_min, r_max: the paper's values.
+  double initial_threshold = 1.0;
+  double threshold_increase = 0.2;
+  double threshold_decrease = 0.1;
+  double min_inlier_ratio = 0.7;
+  double max_inlier_ratio = 0.9;
+  // Bounds of the adaptation. Alg. 2 has none: any part fits a threshold that
+  // may grow for ever.
+  int max_num_iterations = 20;
+  double min_threshold = 0.1;
+  // No threshold exceeds this share of the target's extent (the distance of the
+  // first to the last decile along its longest axis): a short part would fit
+  // anywhere within tau_init.
+  double max_threshold_to_extent = 0.1;
+  // An image whose orientation is off by more than this is no inlier, however
+  // near its centre is.
+  double max_rotation_error_deg = 20.0;
+  // Off: tau_init is used as it is (the paper's ablation).
+  bool adapt_threshold = true;
+  double unit = 1.0;
+  // Samples of three images that RANSAC draws for each threshold.
+  int num_trials = 100;
+  uint64_t seed = 1;
+
+  bool IsValid(std::string* error) const;
+};
+
+struct AlignSimilarityResult {
+  // False when fewer than three images are common or the inlier ratio stayed
+  // below min_inlier_ratio; the other fields then describe the last attempt.
+  bool success = false;
+  Sim3d target_from_source;
+  // In the target's unit of length.
+  double threshold = 0.0;
+  double inlier_ratio = 0.0;
+  // Of the inliers' centres.
+  double rmse = 0.0;
+  int num_iterations = 0;
+  std::vector<char> inlier_mask;
+};
+
+// Aligns a part to the global frame: RANSAC on camera poses whose threshold
+// rises while fewer than r_min of the images are inliers, and falls while r_max
+// of them are. The similarity returned is the one estimated at the final
+// threshold, the lowest one that still keeps r_min.
+AlignSimilarityResult AlignSimilarity(const AlignSimilarityOptions& options,
+                                      const std::vector<PosePair>& poses);
+
+// Least squares on centres and orientations of the pairs in the mask:
+//   min sum |C_target - (s Q C_source + t)|^2 + weight^2 sum |Q - Q_i|^2,
+// with Q_i = R_target^T R_source and the Frobenius norm. `orientation_weight`
+// has the target's unit of length: centres whose spread about a line exceeds it
+// fix the rotation themselves, on a straight road the orientations fix the
+// roll. False with fewer than two pairs or coinciding centres.
+bool EstimatePoseSimilarity(const std::vector<PosePair>& poses,
+                            const std::vector<char>& mask,
+                            double orientation_weight,
+                            Sim3d* target_from_source);
+
+}  // namespace adasfm
