@@ -1,0 +1,37 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "core/sensor_log.h"
+#include "core/status.h"
+
+namespace adasfm {
+
+// Where samples came from: the data line of each, for messages.
+struct LogOrigin {
+  std::string path;
+  std::vector<size_t> line_numbers;
+
+  std::string Locate(size_t index) const {
+    return path + ", line " + std::to_string(line_numbers[index]);
+  }
+};
+
+// Times must increase: an error names the first line that goes back or repeats
+// its predecessor. Gaps of more than three median periods become one warning
+// that counts them and names the first and the longest.
+Status CheckLogTimes(const std::vector<timestamp_t>& times_ns,
+                     const LogOrigin& origin,
+                     std::vector<std::string>* warnings);
+
+// The median difference of successive times in seconds; 0 for fewer than two.
+double ComputeMedianPeriod(const std::vector<timestamp_t>& times_ns);
+
+// Units: degrees for radians, g for m/s^2, and |a| at rest off by more than 5 %
+// are errors.
+Status CheckImuUnits(const std::vector<ImuSample>& samples,
+                     const LogOrigin& origin);
+
+}  // namespace adasfm

@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "sensors/read_imu.h"
+
+#include <filesystem>
+
+#include "sensors/log_checks.h"
+#include "sensors/log_file.h"
+#include "sensors/read_kitti_oxts.h"
+
+namespace adasfm {
+
+StatusOr<std::vector<ImuSample>> ReadImu(const std::string& path,
+                                         std::vector<std::string>* warnings) {
+  LogOrigin origin;
+  origin.path = path;
+  std::vector<ImuSample> samples;
+  std::vector<timestamp_t> times;
+  std::error_code error;
+  if (std::filesystem::is_directory(path, error)) {
+    StatusOr<std::vector<ImuSample>> oxts = ReadKittiOxts(path);
+    if (!oxts.ok()) return oxts.status();
+    samples = std::move(*oxts);
+    origin.path = path + "/timestamps.txt";
+    for (size_t i = 0; i < samples.size(); ++i) {
+      origin.line_numbers.push_back(i + 1);
+    }
+  } else {
+    StatusOr<LogFile> file = LogFile::Read(path);
+    if (!file.ok()) return file.status();
+    for (size_t i = 0; i < file->num_lines(); ++i) {
+      const LogLine line = file->Line(i);
+      Status status =
+          CheckNumFields(*file, line, 7, "ns, wx, wy, wz, ax, ay, az");
+      if (!status.ok()) return status;
+      ImuSample sample;
+      if (!ParseInt64(line.fields[0], &sample.timestamp_ns)) {
+        return file->Error(line.number,
+                           "column 1 is '" + std::string(line.fields[0]) +
+                               "', not a time in whole nanoseconds");
+      }
+      double values[6];
+      status = ParseNumbers(*file, line, 1, 6, values);
+      if (!status.ok()) return status;
+      sample.angular_velocity << values[0], values[1], values[2];
+      sample.specific_force << values[3], values[4], values[5];
+      samples.push_back(sample);
+      origin.line_numbers.push_back(line.number);
+    }
+  }
+  for (const ImuSample& sample : samples) times.push_back(sample.timestamp_ns);
+  Status status = CheckLogTimes(times, origin, warnings);
+  if (status.ok()) status = CheckImuUnits(samples, origin);
+  if (!status.ok()) return status;
+  return samples;
+}
+
+}  // namespace adasfm
