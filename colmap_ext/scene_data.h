@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "core/relative_pose_prior.h"
+#include "core/rigid3d.h"
 #include "core/status.h"
 #include "core/types.h"
 
@@ -36,6 +37,8 @@ struct ScenePair {
   // As stored: unit translation, or none when the row has no pose (COLMAP
   // stores identity and zero then).
   std::optional<Rigid3d> cam2_from_cam1;
+  // As stored; none when the row has none.
+  std::optional<Eigen::Matrix3d> essential_matrix;
   // All matches before verification; filled only with read_raw_matches, and
   // empty when the database has none for the pair.
   std::vector<FeatureMatch> raw_matches;
@@ -49,6 +52,8 @@ struct SceneData {
   std::vector<ScenePair> pairs;
   // Consecutive images, sorted by time. Empty without sensors.
   std::vector<RelativePosePrior> priors;
+  // For the user: what was left out, and why.
+  std::vector<std::string> warnings;
 };
 
 struct SceneDataOptions {

@@ -1,0 +1,295 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "colmap_ext/host/database.h"
+
+#include <base/camera_models.h>
+#include <base/database.h>
+#include <estimators/two_view_geometry.h>
+
+#include <algorithm>
+#include <cstring>
+#include <filesystem>
+#include <stdexcept>
+
+#include "core/so3.h"
+
+namespace adasfm {
+namespace {
+
+using RowMajorMatrix3d = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
+
+// What every version of COLMAP that the host can read has.
+const std::map<std::string, std::vector<std::string>>& RequiredColumns() {
+  static const std::map<std::string, std::vector<std::string>> columns = {
+      {"cameras", {"camera_id", "model", "width", "height", "params"}},
+      {"images", {"image_id", "name", "camera_id"}},
+      {"keypoints", {"image_id", "rows", "cols", "data"}},
+      {"matches", {"pair_id", "rows", "cols", "data"}},
+      {"two_view_geometries",
+       {"pair_id", "rows", "cols", "data", "config", "F", "E", "H", "qvec",
+        "tvec"}},
+  };
+  return columns;
+}
+
+Status CheckTables(const std::string& path, SqliteConnection* database) {
+  for (const auto& [table, required] : RequiredColumns()) {
+    const std::vector<std::string> columns = database->Columns(table);
+    for (const std::string& column : required) {
+      if (std::find(columns.begin(), columns.end(), column) != columns.end()) {
+        continue;
+      }
+      const std::string missing =
+          columns.empty() ? "table " + table : "column " + table + "." + column;
+      return Status::Error(path + " is not a database of COLMAP: " + missing +
+                           " is missing; check --database_path");
+    }
+  }
+  // COLMAP 3.11 moved the pose priors out of the images, 3.12 added rigs; the
+  // host would write into tables that it does not know.
+  for (const char* table : {"pose_priors", "rigs", "frames"}) {
+    if (!database->HasTable(table)) continue;
+    return Status::Error(
+        path + " was written by a newer COLMAP (it has the table " + table +
+        "); make the database with the COLMAP 3.8 that this program runs on");
+  }
+  return Status::Ok();
+}
+
+[[noreturn]] void ThrowRowError(const std::string& table, int64_t row,
+                                const std::string& what) {
+  throw SqliteError("table " + table + ", row " + std::to_string(row) + ": " +
+                    what);
+}
+
+std::vector<FeatureMatch> MatchesFromRow(const SqliteStatement& statement,
+                                         const std::string& table,
+                                         int first_column) {
+  static_assert(sizeof(FeatureMatch) == 2 * sizeof(point2D_t), "blob layout");
+  const int64_t num_rows = statement.Int(first_column);
+  const int64_t num_bytes = statement.NumBytes(first_column + 2);
+  if (num_rows < 0 || (num_rows > 0 && statement.Int(first_column + 1) != 2) ||
+      num_bytes != num_rows * static_cast<int64_t>(sizeof(FeatureMatch))) {
+    ThrowRowError(table, statement.Int(0), "malformed matches");
+  }
+  std::vector<FeatureMatch> matches(num_rows);
+  if (num_rows > 0) {
+    std::memcpy(matches.data(), statement.Blob(first_column + 2), num_bytes);
+  }
+  return matches;
+}
+
+// A fixed-size blob of doubles; zeros when the row has none.
+template <typename Matrix>
+Matrix MatrixFromRow(const SqliteStatement& statement, const std::string& table,
+                     int column) {
+  Matrix matrix = Matrix::Zero();
+  const size_t num_bytes = statement.NumBytes(column);
+  if (num_bytes == 0) return matrix;
+  if (num_bytes != matrix.size() * sizeof(double)) {
+    ThrowRowError(table, statement.Int(0),
+                  "a matrix of " + std::to_string(num_bytes) + " bytes");
+  }
+  std::memcpy(matrix.data(), statement.Blob(column), num_bytes);
+  if (!matrix.allFinite()) {
+    ThrowRowError(table, statement.Int(0), "a matrix that is not finite");
+  }
+  return matrix;
+}
+
+std::optional<Rigid3d> PoseFromBlobs(const Eigen::Vector4d& qvec,
+                                     const Eigen::Vector3d& tvec) {
+  if (qvec.isZero() || tvec.isZero()) return std::nullopt;
+  return Rigid3d(Eigen::Quaterniond(qvec(0), qvec(1), qvec(2), qvec(3)), tvec);
+}
+
+template <typename Matrix>
+void BindMatrix(SqliteStatement* statement, int parameter,
+                const Matrix& matrix) {
+  statement->BindBlob(parameter, matrix.data(), matrix.size() * sizeof(double));
+}
+
+void WriteTwoViewGeometry(const colmap::Camera& camera1,
+                          const colmap::Camera& camera2,
+                          const NewTwoViewGeometry& row,
+                          SqliteStatement* statement) {
+  if (row.cam2_from_cam1.translation.isZero()) {
+    throw std::invalid_argument("NewTwoViewGeometry: translation is zero");
+  }
+  const Eigen::Quaterniond& rotation = row.cam2_from_cam1.rotation;
+  const Eigen::Vector4d qvec(rotation.w(), rotation.x(), rotation.y(),
+                             rotation.z());
+  const Eigen::Vector3d tvec = row.cam2_from_cam1.translation.normalized();
+  const RowMajorMatrix3d E = Hat(tvec) * rotation.toRotationMatrix();
+  const RowMajorMatrix3d F = camera2.CalibrationMatrix().inverse().transpose() *
+                             E * camera1.CalibrationMatrix().inverse();
+  const RowMajorMatrix3d H = RowMajorMatrix3d::Zero();
+  statement->Reset();
+  statement->BindInt(1, PairIdFromImagePair(row.pair));
+  statement->BindInt(2, row.inlier_matches.size());
+  statement->BindBlob(3, row.inlier_matches.data(),
+                      row.inlier_matches.size() * sizeof(FeatureMatch));
+  statement->BindInt(4, colmap::TwoViewGeometry::CALIBRATED);
+  BindMatrix(statement, 5, F);
+  BindMatrix(statement, 6, E);
+  BindMatrix(statement, 7, H);
+  BindMatrix(statement, 8, qvec);
+  BindMatrix(statement, 9, tvec);
+  statement->Step();
+}
+
+}  // namespace
+
+Status CheckDatabase(const std::string& database_path) {
+  std::error_code error;
+  if (!std::filesystem::is_regular_file(database_path, error)) {
+    return Status::Error("the database " + database_path +
+                         " does not exist or is not a file; check "
+                         "--database_path");
+  }
+  if (std::filesystem::file_size(database_path, error) == 0) {
+    return Status::Error("the database " + database_path +
+                         " is empty; run COLMAP's feature_extractor and a "
+                         "matcher on it first");
+  }
+  try {
+    SqliteConnection database(database_path, SqliteConnection::Mode::kRead);
+    return CheckTables(database_path, &database);
+  } catch (const SqliteError& sqlite_error) {
+    return Status::Error(database_path + " is not a database of COLMAP (" +
+                         sqlite_error.what() + "); check --database_path");
+  }
+}
+
+int64_t PairIdFromImagePair(const ImagePair& pair) {
+  return colmap::Database::ImagePairToPairId(pair.image_id1, pair.image_id2);
+}
+
+ImagePair ImagePairFromPairId(int64_t pair_id) {
+  image_t image_id1 = kInvalidImageId;
+  image_t image_id2 = kInvalidImageId;
+  colmap::Database::PairIdToImagePair(pair_id, &image_id1, &image_id2);
+  return ImagePair(image_id1, image_id2);
+}
+
+std::map<camera_t, colmap::Camera> ReadCameras(SqliteConnection* database) {
+  std::map<camera_t, colmap::Camera> cameras;
+  SqliteStatement statement(
+      database,
+      "SELECT camera_id, model, width, height, params, prior_focal_length "
+      "FROM cameras ORDER BY camera_id");
+  while (statement.Step()) {
+    const int64_t camera_id = statement.Int(0);
+    if (!colmap::ExistsCameraModelWithId(statement.Int(1))) {
+      ThrowRowError("cameras", camera_id,
+                    "unknown camera model " + std::to_string(statement.Int(1)));
+    }
+    colmap::Camera camera;
+    camera.SetCameraId(camera_id);
+    camera.SetModelId(statement.Int(1));
+    camera.SetWidth(statement.Int(2));
+    camera.SetHeight(statement.Int(3));
+    camera.SetPriorFocalLength(statement.Int(5) != 0);
+    if (statement.NumBytes(4) != camera.NumParams() * sizeof(double)) {
+      ThrowRowError("cameras", camera_id, "wrong number of parameters");
+    }
+    std::memcpy(camera.ParamsData(), statement.Blob(4), statement.NumBytes(4));
+    cameras.emplace(camera_id, std::move(camera));
+  }
+  return cameras;
+}
+
+std::vector<DatabaseImage> ReadImages(SqliteConnection* database) {
+  std::vector<DatabaseImage> images;
+  SqliteStatement statement(
+      database,
+      "SELECT image_id, name, camera_id FROM images ORDER BY image_id");
+  while (statement.Step()) {
+    images.push_back({static_cast<image_t>(statement.Int(0)),
+                      static_cast<camera_t>(statement.Int(2)),
+                      statement.Text(1)});
+  }
+  return images;
+}
+
+std::map<image_t, std::vector<Eigen::Vector2d>> ReadKeypoints(
+    SqliteConnection* database) {
+  std::map<image_t, std::vector<Eigen::Vector2d>> keypoints;
+  SqliteStatement statement(
+      database,
+      "SELECT image_id, rows, cols, data FROM keypoints ORDER BY image_id");
+  while (statement.Step()) {
+    const int64_t num_rows = statement.Int(1);
+    const int64_t num_cols = statement.Int(2);
+    if (num_rows < 0 || (num_rows > 0 && num_cols < 2) ||
+        statement.NumBytes(3) != num_rows * num_cols * sizeof(float)) {
+      ThrowRowError("keypoints", statement.Int(0), "malformed keypoints");
+    }
+    std::vector<Eigen::Vector2d>& points = keypoints[statement.Int(0)];
+    points.reserve(num_rows);
+    const char* data = static_cast<const char*>(statement.Blob(3));
+    for (int64_t i = 0; i < num_rows; ++i) {
+      Eigen::Vector2f point;
+      std::memcpy(point.data(), data + i * num_cols * sizeof(float),
+                  2 * sizeof(float));
+      points.push_back(point.cast<double>());
+    }
+  }
+  return keypoints;
+}
+
+void ReadMatches(
+    SqliteConnection* database,
+    const std::function<void(const ImagePair&, std::vector<FeatureMatch>)>&
+        function) {
+  SqliteStatement statement(
+      database,
+      "SELECT pair_id, rows, cols, data FROM matches ORDER BY pair_id");
+  while (statement.Step()) {
+    function(ImagePairFromPairId(statement.Int(0)),
+             MatchesFromRow(statement, "matches", 1));
+  }
+}
+
+std::vector<DatabaseTwoViewGeometry> ReadTwoViewGeometries(
+    SqliteConnection* database, const std::string& table, int min_num_matches) {
+  std::vector<DatabaseTwoViewGeometry> rows;
+  SqliteStatement statement(
+      database,
+      "SELECT pair_id, rows, cols, data, config, E, qvec, tvec FROM " + table +
+          " WHERE rows >= ? ORDER BY pair_id");
+  statement.BindInt(1, min_num_matches);
+  while (statement.Step()) {
+    DatabaseTwoViewGeometry row;
+    row.pair = ImagePairFromPairId(statement.Int(0));
+    row.inlier_matches = MatchesFromRow(statement, table, 1);
+    row.config = statement.Int(4);
+    const Eigen::Matrix3d E =
+        MatrixFromRow<RowMajorMatrix3d>(statement, table, 5);
+    if (!E.isZero()) row.essential_matrix = E;
+    row.cam2_from_cam1 =
+        PoseFromBlobs(MatrixFromRow<Eigen::Vector4d>(statement, table, 6),
+                      MatrixFromRow<Eigen::Vector3d>(statement, table, 7));
+    rows.push_back(std::move(row));
+  }
+  return rows;
+}
+
+void WriteTwoViewGeometries(SqliteConnection* database,
+                            const std::vector<NewTwoViewGeometry>& rows) {
+  const std::map<camera_t, colmap::Camera> cameras = ReadCameras(database);
+  std::map<image_t, camera_t> camera_ids;
+  for (const DatabaseImage& image : ReadImages(database)) {
+    camera_ids[image.image_id] = image.camera_id;
+  }
+  SqliteStatement statement(
+      database,
+      "INSERT OR REPLACE INTO two_view_geometries (pair_id, rows, cols, data, "
+      "config, F, E, H, qvec, tvec) VALUES (?, ?, 2, ?, ?, ?, ?, ?, ?, ?)");
+  for (const NewTwoViewGeometry& row : rows) {
+    WriteTwoViewGeometry(cameras.at(camera_ids.at(row.pair.image_id1)),
+                         cameras.at(camera_ids.at(row.pair.image_id2)), row,
+                         &statement);
+  }
+}
+
+}  // namespace adasfm

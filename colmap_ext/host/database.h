@@ -1,0 +1,81 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <base/camera.h>
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "colmap_ext/sqlite.h"
+#include "core/rigid3d.h"
+#include "core/status.h"
+#include "core/types.h"
+
+namespace adasfm {
+
+// The host's database, read over a connection of our own: COLMAP's class
+// converts a file when it opens it, and ends the process on bad rows.
+
+// An error for a missing file, one that is no SQLite database, one that is not
+// COLMAP's, and one of a newer COLMAP than the host. Changes nothing.
+Status CheckDatabase(const std::string& database_path);
+
+// The key of a pair in the host's tables, and back.
+int64_t PairIdFromImagePair(const ImagePair& pair);
+ImagePair ImagePairFromPairId(int64_t pair_id);
+
+struct DatabaseImage {
+  image_t image_id = kInvalidImageId;
+  camera_t camera_id = 0;
+  std::string name;
+};
+
+struct DatabaseTwoViewGeometry {
+  ImagePair pair;
+  int config = 0;
+  std::vector<FeatureMatch> inlier_matches;
+  // None when the row has none (zeros).
+  std::optional<Eigen::Matrix3d> essential_matrix;
+  std::optional<Rigid3d> cam2_from_cam1;
+};
+
+// The functions below throw SqliteError, naming table and row, for rows that
+// COLMAP could not have written.
+
+std::map<camera_t, colmap::Camera> ReadCameras(SqliteConnection* database);
+
+// Sorted by id.
+std::vector<DatabaseImage> ReadImages(SqliteConnection* database);
+
+// Positions only, in pixels.
+std::map<image_t, std::vector<Eigen::Vector2d>> ReadKeypoints(
+    SqliteConnection* database);
+
+// Calls function(pair, matches) for every pair in order of the pairs.
+void ReadMatches(
+    SqliteConnection* database,
+    const std::function<void(const ImagePair&, std::vector<FeatureMatch>)>&
+        function);
+
+// The rows of `table`, which has the columns of two_view_geometries, with at
+// least min_num_matches inliers; sorted by pair.
+std::vector<DatabaseTwoViewGeometry> ReadTwoViewGeometries(
+    SqliteConnection* database, const std::string& table, int min_num_matches);
+
+// A new row for two_view_geometries: configuration CALIBRATED, E of the pose
+// with a translation of unit length, and F of E and the calibration matrices.
+struct NewTwoViewGeometry {
+  ImagePair pair;
+  std::vector<FeatureMatch> inlier_matches;
+  // Of image_id2 from image_id1; the translation must not be zero.
+  Rigid3d cam2_from_cam1;
+};
+void WriteTwoViewGeometries(SqliteConnection* database,
+                            const std::vector<NewTwoViewGeometry>& rows);
+
+}  // namespace adasfm

@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "colmap_ext/host/database.h"
+#include "colmap_ext/sqlite.h"
+#include "core/status.h"
+#include "core/types.h"
+
+namespace adasfm {
+
+// The table adasfm_two_view_geometries keeps the rows that were replaced or
+// removed, byte for byte (docs/formats.md). A kept row counts for as long as
+// the row in its place is the one we wrote: when COLMAP has verified the pair
+// anew since, the present row is the original.
+
+// Puts `rows` in the place of the pairs' two-view geometries and removes those
+// of `removed`, in one transaction. What an earlier call replaced is put back
+// first, so calling twice equals calling once. On error nothing has changed.
+Status RewriteTwoViewGeometries(const std::string& database_path,
+                                const std::vector<NewTwoViewGeometry>& rows,
+                                const std::vector<ImagePair>& removed);
+
+struct RestoreSummary {
+  int num_restored = 0;
+  // Rows that COLMAP has replaced in the meantime, or whose images changed.
+  int num_outdated = 0;
+};
+
+// Puts all originals back and drops the table, in one transaction. Without the
+// table there is nothing to do, and nothing is changed.
+StatusOr<RestoreSummary> RestoreTwoViewGeometries(
+    const std::string& database_path);
+
+// The pairs that have a kept original that counts; throws SqliteError.
+std::vector<ImagePair> FindKeptOriginals(SqliteConnection* database);
+
+inline constexpr char kTwoViewGeometryBackupTable[] =
+    "adasfm_two_view_geometries";
+
+}  // namespace adasfm
