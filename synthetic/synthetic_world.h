@@ -3,6 +3,7 @@
 
 #include <Eigen/Core>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "core/bearing.h"
@@ -28,6 +29,9 @@ struct SyntheticWorldOptions {
   SyntheticTrajectory trajectory = SyntheticTrajectory::kTown;
   SyntheticCameraModel camera_model = SyntheticCameraModel::kPinhole;
 
+  // The focal length follows the width.
+  int image_width = 800;
+  int image_height = 500;
   int num_keypoints_per_image = 300;
   double pixel_noise_px = 0.5;
   // Share of raw matches that are wrong at random (verification drops most).
@@ -45,15 +49,21 @@ struct SyntheticWorldOptions {
   double imu_rate_hz = 200.0;
   double wheel_rate_hz = 50.0;
   ImuNoise imu_noise = {5e-4, 2e-5, 5e-3, 2e-4};
+  // The biases at the start are drawn with these, rad/s and m/s^2 per axis.
+  double gyro_bias_sigma = 0.003;
+  double accel_bias_sigma = 0.03;
   double wheel_speed_noise = 0.05;  // m/s, 1 sigma per sample
   // True speed = factor * what the log says.
   double wheel_scale = 1.0;
   // Intervals in which the wheels turn without moving the car so far.
   int num_wheel_slips = 0;
-  // Seconds at rest before the first image.
+  // Seconds at rest before the car sets off (the first image follows a second
+  // later); 0: the log begins at full speed.
   double standstill_s = 3.0;
   // t_imu = t_cam + shift.
   double timeshift_cam_imu_s = 0.0;
+
+  bool IsValid(std::string* error) const;
 };
 
 struct SyntheticCamera {
@@ -106,6 +116,7 @@ struct SyntheticWorld {
   std::vector<std::pair<timestamp_t, timestamp_t>> wheel_slips;
 };
 
+// Throws std::invalid_argument for options that are not valid.
 SyntheticWorld BuildSyntheticWorld(const SyntheticWorldOptions& options);
 
 // The ray of a pixel and its derivative. Throws for a pixel that the fisheye

@@ -1,0 +1,18 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <vector>
+
+#include "synthetic/landmarks.h"
+#include "synthetic/street_grid.h"
+#include "synthetic/synthetic_world.h"
+
+namespace adasfm {
+
+// Matches the images: neighbours in the sequence, places seen again, and
+// look-alike places. arc_lengths_m: how far the car had driven, by image.
+void MatchImages(const StreetGrid& grid, const LandmarkMap& map,
+                 const std::vector<double>& arc_lengths_m,
+                 SyntheticWorld* world);
+
+}  // namespace adasfm

@@ -1,0 +1,188 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "synthetic/synthetic_world.h"
+
+#include <algorithm>
+#include <cmath>
+#include <sstream>
+#include <stdexcept>
+
+#include "core/so3.h"
+#include "synthetic/drive.h"
+#include "synthetic/image_pairs.h"
+#include "synthetic/landmarks.h"
+#include "synthetic/sensor_logs.h"
+#include "synthetic/street_grid.h"
+
+namespace adasfm {
+namespace {
+
+// The logs go on after the last image for so long.
+constexpr double kTail = 0.5;
+// Images are late or early by up to this share of their distance in time.
+constexpr double kTimeJitter = 0.01;
+
+SyntheticCamera MakeCamera(const SyntheticWorldOptions& options) {
+  SyntheticCamera camera;
+  camera.model = options.camera_model;
+  camera.width = options.image_width;
+  camera.height = options.image_height;
+  camera.principal_x_px = 0.5 * camera.width;
+  camera.principal_y_px = 0.5 * camera.height;
+  const bool is_pinhole = camera.model == SyntheticCameraModel::kPinhole;
+  camera.focal_px = (is_pinhole ? 0.6 : 0.42) * camera.width;
+  if (!is_pinhole) camera.fisheye_coeffs << -0.02, 0.004, -0.001, 0.0001;
+  return camera;
+}
+
+// Forward-looking (camera z along the body's x), turned by a few degrees as
+// mounts are, ahead of and above the IMU.
+Rigid3d MakeCamFromImu() {
+  Eigen::Matrix3d axes;
+  axes << 0, -1, 0, 0, 0, -1, 1, 0, 0;
+  const Eigen::Quaterniond turn =
+      ExpSo3(Eigen::Vector3d(DegToRad(1.0), DegToRad(-2.0), DegToRad(0.5)));
+  return CamFromWorldWithCenter(turn * Eigen::Quaterniond(axes),
+                                Eigen::Vector3d(0.5, 0.05, 0.9));
+}
+
+std::vector<bool> DrawBlackouts(const SyntheticWorldOptions& options) {
+  Random random = MakeRandom(options.seed, 12);
+  std::vector<bool> is_blacked_out(options.num_images, false);
+  // One in each of equally long stretches, away from their ends.
+  for (int i = 0; i < options.num_blackouts; ++i) {
+    const int64_t begin = int64_t{options.num_images} * i;
+    const int first = static_cast<int>(begin / options.num_blackouts);
+    const int last =
+        static_cast<int>((begin + options.num_images) / options.num_blackouts);
+    const int slack = last - first - options.blackout_num_images;
+    const int start = first + static_cast<int>(random.UniformInt(
+                                  slack / 4, slack - slack / 4));
+    for (int k = 0; k < options.blackout_num_images; ++k) {
+      is_blacked_out[start + k] = true;
+    }
+  }
+  return is_blacked_out;
+}
+
+// Poses and times; returns how far the car had driven at each image.
+std::vector<double> TakeImages(const Drive& drive, SyntheticWorld* world) {
+  const SyntheticWorldOptions& options = world->options;
+  Random random = MakeRandom(options.seed, 13);
+  const double first_s = drive.FirstImageTime();
+  const double last_s =
+      drive.TimeAt(drive.ArcLengthAt(first_s) +
+                   options.spacing_m * (options.num_images - 1));
+  const double period_s =
+      (last_s - first_s) / std::max(1, options.num_images - 1);
+  const timestamp_t shift_ns = std::llround(1e9 * options.timeshift_cam_imu_s);
+  std::vector<double> arc_lengths_m;
+  for (int i = 0; i < options.num_images; ++i) {
+    const double jitter = random.Uniform(-kTimeJitter, kTimeJitter);
+    const timestamp_t time_ns =
+        std::llround(1e9 * (first_s + (i + jitter) * period_s));
+    const double time_s = SecondsFromNs(time_ns);
+    SyntheticImage image;
+    image.image_id = static_cast<image_t>(i + 1);
+    image.timestamp_ns = kWorldStartNs + time_ns - shift_ns;
+    image.name = std::to_string(image.timestamp_ns) + ".png";
+    image.cam_from_world =
+        world->cam_from_imu * drive.StateAt(time_s).world_from_imu.Inverse();
+    world->images.push_back(image);
+    arc_lengths_m.push_back(drive.ArcLengthAt(time_s));
+  }
+  return arc_lengths_m;
+}
+
+// Reports the first rule that is broken.
+template <typename T>
+bool Require(bool is_valid, const char* name, const T& value, const char* rule,
+             std::string* error) {
+  if (is_valid) return true;
+  std::ostringstream message;
+  message << "SyntheticWorldOptions: " << name << " = " << value
+          << ", but it must be " << rule;
+  *error = message.str();
+  return false;
+}
+
+}  // namespace
+
+bool SyntheticWorldOptions::IsValid(std::string* error) const {
+  const auto positive = [error](double value, const char* name) {
+    return Require(std::isfinite(value) && value > 0.0, name, value,
+                   "above zero", error);
+  };
+  const auto not_negative = [error](double value, const char* name) {
+    return Require(std::isfinite(value) && value >= 0.0, name, value,
+                   "zero or more", error);
+  };
+  const auto share = [error](double value, const char* name) {
+    return Require(value >= 0.0 && value <= 0.9, name, value, "in [0, 0.9]",
+                   error);
+  };
+  return Require(num_images >= 2, "num_images", num_images, "at least 2",
+                 error) &&
+         Require(image_width >= 64 && image_height >= 64, "image size",
+                 std::min(image_width, image_height), "at least 64 px",
+                 error) &&
+         positive(spacing_m, "spacing_m") &&
+         positive(num_keypoints_per_image, "num_keypoints_per_image") &&
+         not_negative(pixel_noise_px, "pixel_noise_px") &&
+         share(outlier_match_ratio, "outlier_match_ratio") &&
+         positive(num_sequential_neighbors, "num_sequential_neighbors") &&
+         share(alias_pair_ratio, "alias_pair_ratio") &&
+         not_negative(num_blackouts, "num_blackouts") &&
+         positive(blackout_num_images, "blackout_num_images") &&
+         Require(2 * int64_t{num_blackouts} * blackout_num_images <= num_images,
+                 "num_blackouts", num_blackouts,
+                 "so small that half of the images keep their texture",
+                 error) &&
+         positive(imu_rate_hz, "imu_rate_hz") &&
+         positive(wheel_rate_hz, "wheel_rate_hz") &&
+         not_negative(imu_noise.gyroscope_noise_density,
+                      "gyroscope_noise_density") &&
+         not_negative(imu_noise.gyroscope_random_walk,
+                      "gyroscope_random_walk") &&
+         not_negative(imu_noise.accelerometer_noise_density,
+                      "accelerometer_noise_density") &&
+         not_negative(imu_noise.accelerometer_random_walk,
+                      "accelerometer_random_walk") &&
+         not_negative(gyro_bias_sigma, "gyro_bias_sigma") &&
+         not_negative(accel_bias_sigma, "accel_bias_sigma") &&
+         not_negative(wheel_speed_noise, "wheel_speed_noise") &&
+         positive(wheel_scale, "wheel_scale") &&
+         not_negative(num_wheel_slips, "num_wheel_slips") &&
+         not_negative(standstill_s, "standstill_s") &&
+         Require(std::abs(timeshift_cam_imu_s) < 1e6, "timeshift_cam_imu_s",
+                 timeshift_cam_imu_s, "within a million seconds", error);
+}
+
+SyntheticWorld BuildSyntheticWorld(const SyntheticWorldOptions& options) {
+  std::string error;
+  if (!options.IsValid(&error)) throw std::invalid_argument(error);
+  SyntheticWorld world;
+  world.options = options;
+  world.camera = MakeCamera(options);
+  world.cam_from_imu = MakeCamFromImu();
+  world.imu_from_wheel = Rigid3d(Eigen::Quaterniond::Identity(),
+                                 Eigen::Vector3d(-0.4, 0.05, -0.3));
+  // 1. The streets and the drive through them.
+  const StreetGrid grid = BuildStreetGrid(options);
+  const Drive drive(options, grid.route, world.imu_from_wheel);
+  const std::vector<double> arc_lengths_m = TakeImages(drive, &world);
+  // 2. The logs.
+  const double first_s = drive.FirstImageTime();
+  const double end_s = drive.TimeAt(arc_lengths_m.back()) + kTail;
+  SimulateImu(drive, end_s, &world);
+  SimulateWheels(drive, first_s, end_s, &world);
+  // 3. What the camera sees, and the matches.
+  const LandmarkMap map = BuildLandmarks(options, grid);
+  for (const Landmark& landmark : map.landmarks) {
+    world.landmarks.push_back(landmark.position_in_world);
+  }
+  ObserveLandmarks(grid, map, DrawBlackouts(options), &world);
+  MatchImages(grid, map, arc_lengths_m, &world);
+  return world;
+}
+
+}  // namespace adasfm
