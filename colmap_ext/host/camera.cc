@@ -1,0 +1,73 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "colmap_ext/host/camera.h"
+
+#include <Eigen/LU>
+
+namespace adasfm {
+namespace {
+
+// COLMAP inverts distortions by iteration; a pixel is taken back to itself to
+// within this, or it has no ray.
+constexpr double kMaxRoundTripError_px = 0.05;
+
+// Central differences of COLMAP's analytic projection: step^2 is far below, and
+// epsilon / step well below, what a pixel means.
+constexpr double kStep = 1e-5;
+
+// d pixel / d (x/z, y/z).
+Eigen::Matrix2d ComputeProjectionJacobian(const colmap::Camera& camera,
+                                          const Eigen::Vector2d& normalized) {
+  Eigen::Matrix2d jacobian;
+  for (int i = 0; i < 2; ++i) {
+    const Eigen::Vector2d step = kStep * Eigen::Vector2d::Unit(i);
+    jacobian.col(i) = (camera.WorldToImage(normalized + step) -
+                       camera.WorldToImage(normalized - step)) /
+                      (2.0 * kStep);
+  }
+  return jacobian;
+}
+
+}  // namespace
+
+std::optional<Bearing> ComputeBearing(const colmap::Camera& camera,
+                                      const Eigen::Vector2d& pixel) {
+  const Eigen::Vector2d normalized = camera.ImageToWorld(pixel);
+  // Written so that NaN fails.
+  if (!((camera.WorldToImage(normalized) - pixel).norm() <=
+        kMaxRoundTripError_px)) {
+    return std::nullopt;
+  }
+  const Eigen::Matrix2d projection =
+      ComputeProjectionJacobian(camera, normalized);
+  // Where the distortion folds back, the image turns inside out.
+  if (!(projection.determinant() > 0.0)) return std::nullopt;
+  Bearing bearing;
+  const double norm = normalized.homogeneous().norm();
+  bearing.direction = normalized.homogeneous() / norm;
+  const Eigen::Matrix3d tangent =
+      (Eigen::Matrix3d::Identity() -
+       bearing.direction * bearing.direction.transpose()) /
+      norm;
+  bearing.jacobian = tangent.leftCols<2>() * projection.inverse();
+  return bearing;
+}
+
+std::vector<Bearing> ComputeBearings(
+    const colmap::Camera& camera, const std::vector<Eigen::Vector2d>& pixels) {
+  const Bearing none{Eigen::Vector3d::Zero(),
+                     Eigen::Matrix<double, 3, 2>::Zero()};
+  std::vector<Bearing> bearings;
+  bearings.reserve(pixels.size());
+  for (const Eigen::Vector2d& pixel : pixels) {
+    bearings.push_back(ComputeBearing(camera, pixel).value_or(none));
+  }
+  return bearings;
+}
+
+std::optional<Eigen::Vector2d> ProjectPoint(
+    const colmap::Camera& camera, const Eigen::Vector3d& point_in_cam) {
+  if (!(point_in_cam.z() > 0.0)) return std::nullopt;
+  return camera.WorldToImage(point_in_cam.hnormalized());
+}
+
+}  // namespace adasfm

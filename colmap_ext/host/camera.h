@@ -1,0 +1,28 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <base/camera.h>
+
+#include <Eigen/Core>
+#include <optional>
+#include <vector>
+
+#include "core/bearing.h"
+
+namespace adasfm {
+
+// The ray of a pixel and its derivative, for every camera model of COLMAP. None
+// where the model cannot be inverted: beyond 90 degrees from the axis, or where
+// a polynomial distortion folds back.
+std::optional<Bearing> ComputeBearing(const colmap::Camera& camera,
+                                      const Eigen::Vector2d& pixel);
+
+// One ray a keypoint; direction and Jacobian are zero where there is none.
+std::vector<Bearing> ComputeBearings(
+    const colmap::Camera& camera, const std::vector<Eigen::Vector2d>& pixels);
+
+// None for a point that does not lie in front of the camera.
+std::optional<Eigen::Vector2d> ProjectPoint(
+    const colmap::Camera& camera, const Eigen::Vector3d& point_in_cam);
+
+}  // namespace adasfm
