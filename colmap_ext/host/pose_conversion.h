@@ -1,9 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <base/image.h>
+#include <base/reconstruction.h>
+
+#include <map>
 
 #include "core/rigid3d.h"
+#include "core/types.h"
 
 namespace adasfm {
 
@@ -20,6 +23,16 @@ inline void SetCamFromWorld(const Rigid3d& cam_from_world,
   image->SetQvec(
       Eigen::Vector4d(rotation.w(), rotation.x(), rotation.y(), rotation.z()));
   image->SetTvec(cam_from_world.translation);
+}
+
+// The poses of all registered images.
+inline std::map<image_t, Rigid3d> CamsFromWorld(
+    const colmap::Reconstruction& reconstruction) {
+  std::map<image_t, Rigid3d> poses;
+  for (const image_t image_id : reconstruction.RegImageIds()) {
+    poses[image_id] = CamFromWorld(reconstruction.Image(image_id));
+  }
+  return poses;
 }
 
 }  // namespace adasfm

@@ -1,0 +1,246 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "colmap_ext/coarse_structure.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "colmap_ext/host/pose_conversion.h"
+#include "core/sim3d.h"
+
+namespace adasfm {
+namespace {
+
+// The angles that the images need: all tracks of the wanted angle, then, widest
+// first, those that help an image with too few points.
+std::vector<TriangulatedTrack> SelectTracks(
+    const CoarseStructureOptions& options,
+    std::vector<TriangulatedTrack> triangulated, double* min_angle_deg) {
+  std::vector<size_t> order(triangulated.size());
+  for (size_t i = 0; i < order.size(); ++i) order[i] = i;
+  std::stable_sort(order.begin(), order.end(), [&](size_t a, size_t b) {
+    return triangulated[a].angle_deg > triangulated[b].angle_deg;
+  });
+  std::map<image_t, int> num_points;
+  std::vector<char> selected(triangulated.size(), false);
+  *min_angle_deg = options.triangulation.min_triangulation_angle_deg;
+  for (const size_t i : order) {
+    const TriangulatedTrack& point = triangulated[i];
+    selected[i] =
+        point.angle_deg >= options.triangulation.min_triangulation_angle_deg ||
+        std::any_of(point.track.begin(), point.track.end(),
+                    [&](const TrackElement& element) {
+                      return num_points[element.image_id] <
+                             options.min_num_points_per_image;
+                    });
+    if (!selected[i]) continue;
+    *min_angle_deg = std::min(*min_angle_deg, point.angle_deg);
+    for (const TrackElement& element : point.track) {
+      ++num_points[element.image_id];
+    }
+  }
+  std::vector<TriangulatedTrack> result;
+  for (size_t i = 0; i < triangulated.size(); ++i) {
+    if (selected[i]) result.push_back(std::move(triangulated[i]));
+  }
+  return result;
+}
+
+colmap::Reconstruction CreateReconstruction(
+    const SceneData& scene, const std::map<image_t, Rigid3d>& cams_from_world) {
+  colmap::Reconstruction reconstruction;
+  for (const auto& [image_id, pose] : cams_from_world) {
+    const SceneImage& scene_image = scene.images.at(image_id);
+    if (!reconstruction.ExistsCamera(scene_image.camera_id)) {
+      reconstruction.AddCamera(scene.cameras.at(scene_image.camera_id));
+    }
+    colmap::Image image;
+    image.SetImageId(image_id);
+    image.SetName(scene_image.name);
+    image.SetCameraId(scene_image.camera_id);
+    image.SetPoints2D(scene_image.keypoints);
+    SetCamFromWorld(pose, &image);
+    reconstruction.AddImage(image);
+    reconstruction.RegisterImage(image_id);
+  }
+  return reconstruction;
+}
+
+void AddPoints(const std::vector<TriangulatedTrack>& points,
+               colmap::Reconstruction* reconstruction) {
+  for (const TriangulatedTrack& point : points) {
+    colmap::Track track;
+    track.Reserve(point.track.size());
+    for (const TrackElement& element : point.track) {
+      track.AddElement(element.image_id, element.point2D_idx);
+    }
+    reconstruction->AddPoint3D(point.point_in_world, track);
+  }
+}
+
+PriorBundleAdjustmentProblem CreateProblem(
+    const CoarseStructureOptions& options, const SceneData& scene,
+    const CoarseModelInput& input) {
+  PriorBundleAdjustmentProblem problem;
+  for (const auto& [image_id, pose] : input.cams_from_world) {
+    problem.images.insert(image_id);
+  }
+  if (!options.use_priors) return problem;
+  for (const RelativePosePrior& prior : scene.priors) {
+    if (problem.images.count(prior.image_id1) == 0 ||
+        problem.images.count(prior.image_id2) == 0) {
+      continue;
+    }
+    PosePriorEdge edge = PosePriorEdgeFromPrior(prior);
+    if (!input.metric) {
+      edge.length_sigma_m = std::numeric_limits<double>::infinity();
+    }
+    problem.priors.push_back(edge);
+  }
+  return problem;
+}
+
+// The direction that most images call down: mean, then mean of those near it.
+std::optional<Eigen::Vector3d> FindGravityInWorld(
+    const SceneData& scene, const colmap::Reconstruction& reconstruction) {
+  std::vector<Eigen::Vector3d> directions;
+  for (const image_t image_id : reconstruction.RegImageIds()) {
+    const auto& gravity = scene.images.at(image_id).gravity_in_cam;
+    if (!gravity.has_value()) continue;
+    directions.push_back(
+        CamFromWorld(reconstruction.Image(image_id)).rotation.conjugate() *
+        *gravity);
+  }
+  if (directions.empty()) return std::nullopt;
+  Eigen::Vector3d mean = Eigen::Vector3d::Zero();
+  for (const Eigen::Vector3d& direction : directions) mean += direction;
+  // Weiszfeld: the geometric median ignores a minority of wrong directions.
+  for (int iteration = 0; iteration < 20; ++iteration) {
+    if (!(mean.norm() > 1e-9)) return std::nullopt;
+    mean.normalize();
+    Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+    for (const Eigen::Vector3d& direction : directions) {
+      sum += direction / std::max(1e-6, (direction - mean).norm());
+    }
+    mean = sum;
+  }
+  return mean.normalized();
+}
+
+// Turns the world so that gravity points along -z and puts the first camera at
+// the origin.
+void AlignToGravity(const Eigen::Vector3d& gravity_in_world,
+                    colmap::Reconstruction* reconstruction) {
+  const std::map<image_t, Rigid3d> poses = CamsFromWorld(*reconstruction);
+  const Eigen::Quaterniond new_from_old = Eigen::Quaterniond::FromTwoVectors(
+      gravity_in_world, -Eigen::Vector3d::UnitZ());
+  const Eigen::Vector3d origin = poses.begin()->second.TargetOriginInSource();
+  const Sim3d sim(1.0, new_from_old, new_from_old * -origin);
+  for (const auto& [image_id, pose] : poses) {
+    SetCamFromWorld(TransformCamFromWorld(sim, pose),
+                    &reconstruction->Image(image_id));
+  }
+  for (const colmap::point3D_t point_id : reconstruction->Point3DIds()) {
+    colmap::Point3D& point = reconstruction->Point3D(point_id);
+    point.SetXYZ(sim * point.XYZ());
+  }
+}
+
+void FillFigures(const CoarseStructureOptions& options, CoarseModel* model) {
+  const colmap::Reconstruction& reconstruction = model->reconstruction;
+  model->num_points = reconstruction.NumPoints3D();
+  model->num_observations = reconstruction.ComputeNumObservations();
+  model->mean_reproj_error_px =
+      model->num_points == 0 ? 0.0
+                             : reconstruction.ComputeMeanReprojectionError();
+  for (const image_t image_id : reconstruction.RegImageIds()) {
+    const int num_points = reconstruction.Image(image_id).NumPoints3D();
+    model->num_images_without_points += num_points == 0;
+    model->num_images_with_few_points +=
+        num_points < options.min_num_points_per_image;
+  }
+}
+
+// The threshold of a round, geometrically from the first to the last.
+double MaxReprojError(const CoarseStructureOptions& options, int round) {
+  if (options.num_rounds <= 1) return options.final_max_reproj_error_px;
+  const double first = options.triangulation.max_reproj_error_px;
+  const double ratio = options.final_max_reproj_error_px / first;
+  return first *
+         std::pow(ratio, static_cast<double>(round) / (options.num_rounds - 1));
+}
+
+}  // namespace
+
+bool CoarseStructureOptions::IsValid(std::string* error) const {
+  if (!tracks.IsValid(error) || !triangulation.IsValid(error) ||
+      !bundle.IsValid(error)) {
+    return false;
+  }
+  if (num_rounds < 1) {
+    *error = "num_rounds is " + std::to_string(num_rounds) +
+             ", but must be at least 1";
+    return false;
+  }
+  if (!(min_angle_floor_deg > 0.0)) {
+    *error = "min_angle_floor_deg is " + std::to_string(min_angle_floor_deg) +
+             ", but must be positive";
+    return false;
+  }
+  if (min_num_points_per_image < 0) {
+    *error = "min_num_points_per_image must not be negative";
+    return false;
+  }
+  if (!(final_max_reproj_error_px > 0.0)) {
+    *error = "final_max_reproj_error_px is " +
+             std::to_string(final_max_reproj_error_px) +
+             ", but must be positive";
+    return false;
+  }
+  return true;
+}
+
+CoarseModel BuildCoarseModel(
+    const CoarseStructureOptions& options, const SceneData& scene,
+    const std::map<image_t, std::vector<Bearing>>& bearings,
+    const CoarseModelInput& input) {
+  CoarseModel model;
+  model.metric = input.metric;
+  const std::vector<Track> tracks = BuildTracks(options.tracks, input.matches);
+  model.num_tracks = tracks.size();
+  const PriorBundleAdjustmentProblem problem =
+      CreateProblem(options, scene, input);
+
+  for (int round = 0; round < options.num_rounds; ++round) {
+    TrackTriangulationOptions triangulation = options.triangulation;
+    triangulation.max_reproj_error_px = MaxReprojError(options, round);
+    triangulation.min_triangulation_angle_deg =
+        std::min(options.min_angle_floor_deg,
+                 options.triangulation.min_triangulation_angle_deg);
+    const std::map<image_t, Rigid3d> cams_from_world =
+        round == 0 ? input.cams_from_world
+                   : CamsFromWorld(model.reconstruction);
+    model.reconstruction = CreateReconstruction(scene, cams_from_world);
+    AddPoints(SelectTracks(options,
+                           TriangulateTracks(triangulation, cams_from_world,
+                                             bearings, tracks),
+                           &model.min_angle_deg),
+              &model.reconstruction);
+    model.rounds.push_back(
+        AdjustBundle(options.bundle, problem, &model.reconstruction));
+    if (!model.rounds.back().success) break;
+  }
+  model.reconstruction.FilterAllPoints3D(
+      options.final_max_reproj_error_px,
+      std::min(options.min_angle_floor_deg,
+               options.triangulation.min_triangulation_angle_deg));
+  const std::optional<Eigen::Vector3d> gravity =
+      FindGravityInWorld(scene, model.reconstruction);
+  if (gravity.has_value()) {
+    AlignToGravity(*gravity, &model.reconstruction);
+    model.gravity_aligned = true;
+  }
+  FillFigures(options, &model);
+  return model;
+}
+
+}  // namespace adasfm

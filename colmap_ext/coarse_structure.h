@@ -1,0 +1,75 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <base/reconstruction.h>
+
+#include <map>
+#include <string>
+#include <vector>
+
+#include "colmap_ext/bundle_adjustment.h"
+#include "colmap_ext/scene_data.h"
+#include "core/bearing.h"
+#include "core/rigid3d.h"
+#include "global/tracks.h"
+#include "global/triangulate_tracks.h"
+
+namespace adasfm {
+
+struct CoarseStructureOptions {
+  TrackOptions tracks;
+  TrackTriangulationOptions triangulation;
+  PriorBundleAdjustmentOptions bundle;
+  // Motion straight ahead leaves some images without points of a wide angle.
+  // Images with fewer points than this get those with the next smaller angles,
+  int min_num_points_per_image = 40;
+  // down to this one.
+  double min_angle_floor_deg = 1.0;
+  // Rounds of triangulation and adjustment; the largest reprojection error
+  // shrinks from triangulation.max_reproj_error_px to this.
+  int num_rounds = 3;
+  double final_max_reproj_error_px = 4.0;
+  // Sensor priors take part in the adjustment.
+  bool use_priors = true;
+
+  bool IsValid(std::string* error) const;
+};
+
+struct CoarseModelInput {
+  // One component's poses; images without matches are welcome.
+  std::map<image_t, Rigid3d> cams_from_world;
+  // Whether their unit is the metre; otherwise the priors' lengths say nothing.
+  bool metric = false;
+  // Verified matches that the view graph kept, both images in the component.
+  std::map<ImagePair, std::vector<FeatureMatch>> matches;
+};
+
+struct CoarseModel {
+  // Poses of all images of the component, points, and all of their keypoints.
+  colmap::Reconstruction reconstruction;
+  bool metric = false;
+  // The world's z axis points up.
+  bool gravity_aligned = false;
+  size_t num_tracks = 0;
+  size_t num_points = 0;
+  size_t num_observations = 0;
+  double mean_reproj_error_px = 0.0;
+  // Smallest triangulation angle that had to be accepted.
+  double min_angle_deg = 0.0;
+  // Images with fewer points than asked for, in spite of that.
+  int num_images_with_few_points = 0;
+  int num_images_without_points = 0;
+  // One per round; the poses before a failed round are kept.
+  std::vector<PriorBundleAdjustmentSummary> rounds;
+};
+
+// Step 7 of the coarse global stage (design 7.2): tracks, points with an angle,
+// and rounds of bundle adjustment with priors and tightening thresholds. Points
+// start afresh from the adjusted poses in every round. The unit of the poses is
+// kept; the world is turned z-up when images know where the ground is.
+CoarseModel BuildCoarseModel(
+    const CoarseStructureOptions& options, const SceneData& scene,
+    const std::map<image_t, std::vector<Bearing>>& bearings,
+    const CoarseModelInput& input);
+
+}  // namespace adasfm

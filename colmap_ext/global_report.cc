@@ -1,0 +1,107 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "colmap_ext/global_report.h"
+
+#include <iomanip>
+#include <nlohmann/json.hpp>
+#include <sstream>
+
+namespace adasfm {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+Json ModelJson(const CoarseComponent& component, const CoarseModel& model) {
+  Json rounds = Json::array();
+  for (const PriorBundleAdjustmentSummary& round : model.rounds) {
+    rounds.push_back({{"success", round.success},
+                      {"images", round.num_images},
+                      {"points", round.num_points},
+                      {"residuals", round.num_residuals},
+                      {"iterations", round.num_iterations},
+                      {"initial_cost", round.initial_cost},
+                      {"final_cost", round.final_cost},
+                      {"seconds", round.seconds},
+                      {"message", round.message}});
+  }
+  return {{"images", model.reconstruction.NumRegImages()},
+          {"images_without_points", model.num_images_without_points},
+          {"images_with_few_points", model.num_images_with_few_points},
+          {"tracks", model.num_tracks},
+          {"points", model.num_points},
+          {"observations", model.num_observations},
+          {"mean_reproj_error_px", model.mean_reproj_error_px},
+          {"min_triangulation_angle_deg", model.min_angle_deg},
+          {"metric", model.metric},
+          {"gravity_aligned", model.gravity_aligned},
+          {"rotations_converged", component.rotations_converged},
+          {"positions_converged", component.positions_converged},
+          {"rotation_optimality", component.sdp_optimality},
+          {"adjustments", rounds}};
+}
+
+}  // namespace
+
+std::string FormatGlobalReportJson(const SceneData& scene,
+                                   const GlobalStageResult& result,
+                                   double total_seconds) {
+  Json report;
+  report["seconds"] = total_seconds;
+  report["images"] = scene.images.size();
+  report["pairs"] = scene.pairs.size();
+  report["priors"] = scene.priors.size();
+  Json removals;
+  for (const auto& [removal, count] : CountRemovals(result.poses.graph)) {
+    removals[EdgeRemovalName(removal)] = count;
+  }
+  report["edges"] = removals;
+  for (size_t i = 0; i < result.models.size(); ++i) {
+    report["models"].push_back(
+        ModelJson(result.poses.components[i], result.models[i]));
+  }
+  report["matches"] = {{"candidates", result.refinement.num_candidates},
+                       {"kept", result.refinement.num_kept},
+                       {"pairs_written", result.geometries.size()},
+                       {"pairs_removed", result.removed_pairs.size()},
+                       {"pairs_skipped", result.refinement.num_skipped_pairs}};
+  for (const StepReport& step : result.steps) {
+    report["steps"].push_back({{"name", step.name},
+                               {"seconds", step.seconds},
+                               {"summary", step.summary}});
+  }
+  return report.dump(2) + "\n";
+}
+
+std::string FormatGlobalReportText(const GlobalStageResult& result,
+                                   double total_seconds) {
+  std::ostringstream text;
+  text << std::fixed << std::setprecision(2);
+  for (const StepReport& step : result.steps) {
+    text << std::setw(8) << step.seconds << " s  " << step.name << ": "
+         << step.summary << "\n";
+  }
+  for (size_t i = 0; i < result.models.size(); ++i) {
+    const CoarseModel& model = result.models[i];
+    text << "Model " << i << ": " << model.reconstruction.NumRegImages()
+         << " images, " << model.num_points << " points, "
+         << (model.metric ? "in metres" : "scale unknown") << ", "
+         << (model.gravity_aligned ? "z up" : "gravity unknown");
+    const CoarseComponent& component = result.poses.components[i];
+    if (!component.rotations_converged) text << ", rotations not converged";
+    if (!component.positions_converged) text << ", positions not converged";
+    text << "\n";
+  }
+  text << "Total: " << total_seconds << " s\n";
+  return text.str();
+}
+
+std::string FormatRemovedPairs(const SceneData& scene,
+                               const std::vector<ImagePair>& pairs) {
+  std::ostringstream text;
+  for (const ImagePair& pair : pairs) {
+    text << scene.images.at(pair.image_id1).name << " "
+         << scene.images.at(pair.image_id2).name << "\n";
+  }
+  return text.str();
+}
+
+}  // namespace adasfm
