@@ -10,8 +10,7 @@
 namespace adasfm {
 
 struct AugmentationOptions {
-  // Off: sensor edges only where vision has none would split the graph too, so
-  // nothing at all is added.
+  // Off: the plain visual graph; where vision has no edge it stays split.
   bool enabled = true;
   // eps_T: priors over longer times take no part.
   double max_prior_time_gap_s = 0.5;

@@ -10,6 +10,7 @@
 #include "global/augment_view_graph.h"
 #include "global/correspondences.h"
 #include "global/edge_lengths.h"
+#include "global/filter_edges_by_position.h"
 #include "global/filter_loops_by_odometry.h"
 #include "global/odometry_chain.h"
 #include "global/refine_relative_poses.h"
@@ -32,10 +33,11 @@ struct CoarsePoseOptions {
   RelativeTranslationOptions translations;
   AugmentationOptions augmentation;
   TranslationAveragingOptions positions;
-  // Edges whose direction is off the positions by more are removed at the end.
-  double max_direction_discrepancy_deg = 15.0;
+  PositionFilterOptions position_filter;
   // Edges with fewer inliers take no part.
   int min_num_inliers = 15;
+  // Priors shorter than this (standstill) say nothing about depths.
+  double min_known_length_m = 0.05;
   // Of all steps; -1: all of the machine's.
   int num_threads = -1;
 

@@ -19,11 +19,12 @@ struct LoopFilterOptions {
   // Share of a visual length that may be wrong, and metres that always may.
   double length_error_ratio = 0.15;
   double min_position_error_m = 0.3;
-  // Pairs whose both ends lie within so many steps of another's belong to one
-  // run.
+  // Pairs whose both ends lie within so many steps of another's are its
+  // neighbours.
   int max_group_gap = 4;
-  // A run with more than this share of contradicting pairs is one false loop:
-  // its untested pairs go too.
+  // A pair that the chain neither confirms nor excludes goes when more than
+  // this share of its decided neighbours contradict the chain: a run of pairs
+  // is one false loop, not fifty votes.
   double max_contradicting_ratio = 0.5;
 
   bool IsValid(std::string* error) const;
@@ -31,9 +32,9 @@ struct LoopFilterOptions {
 
 struct LoopFilterReport {
   int num_tested = 0;
-  int num_removed = 0;
-  int num_groups = 0;
-  int num_false_groups = 0;
+  int num_contradicting = 0;
+  int num_in_false_runs = 0;
+  int num_false_runs = 0;
 };
 
 // Removes edges that the odometry chain excludes: relative rotation, and the

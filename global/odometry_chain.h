@@ -28,12 +28,9 @@ struct ChainMotion {
   // values below meaningful.
   bool has_rotation = false;
   bool has_position = false;
-  bool has_path_length = false;
   Rigid3d cam2_from_cam1;
   // As RelativePosePrior::covariance.
   Eigen::Matrix<double, 6, 6> covariance;
-  // Driven length in metres: an upper bound of the distance.
-  double path_length_m = 0.0;
 };
 
 // The priors of consecutive images composed, with their covariance
@@ -74,10 +71,8 @@ class OdometryChain {
     Matrix6d covariance = Matrix6d::Zero();
     Eigen::Matrix<double, 6, 4> systematic =
         Eigen::Matrix<double, 6, 4>::Zero();
-    double path_length_m = 0.0;
     int num_without_rotation = 0;
     int num_without_position = 0;
-    int num_without_length = 0;
   };
   void AppendPiece(image_t first, const std::map<image_t, int>& next,
                    const std::vector<RelativePosePrior>& priors);

@@ -19,6 +19,9 @@ struct RelativeTranslationOptions {
   double keypoint_sigma_px = 0.5;
   // Where the robust loss takes over, px.
   double loss_scale_px = 1.0;
+  // 1 sigma of the global rotations' errors between two images, which turn
+  // directions by this times depth over baseline.
+  double rotation_sigma_deg = 0.05;
   // Edges whose direction is less certain than this lose their translation.
   double max_direction_sigma_deg = 20.0;
   int num_threads = -1;

@@ -27,7 +27,7 @@ struct RotationAveragingOptions {
   int max_num_irls_iterations = 100;
   // Iterations stop when the mean change falls below this.
   double convergence_rad = 1e-7;
-  // Where the robust loss takes over, in degrees and at least this many sigmas.
+  // Where the robust loss takes over, degrees; never below three sigmas.
   double loss_scale_deg = 2.0;
   // Sigmas of edges below this are taken as this, so that no edge dominates.
   double min_rotation_sigma_rad = 2e-4;
