@@ -49,6 +49,8 @@ struct VisionCheck {
   Eigen::Matrix3d best_axes = Eigen::Matrix3d::Identity();
   bool is_inverted = false;  // imu_from_cam in place of cam_from_imu
   Eigen::Vector3d gyroscope_bias = Eigen::Vector3d::Zero();
+  // The only mistake is the time shift.
+  bool contradiction_is_time_shift = false;
   // Empty when vision and gyroscope agree; else one line that names the
   // mistake and what to do.
   std::string contradiction;

@@ -42,9 +42,16 @@ struct PriorEstimationOptions {
   // linear interpolation of a vehicle's motion is a guess.
   double max_imu_gap_s = 0.1;
   double max_wheel_gap_s = 0.25;
+  // Links are no longer than this: images further apart get states between.
+  double max_link_s = 1.0;
+  // Logs are used from this long before the first to this long after the last
+  // image: a standstill there tells the biases.
+  double max_lead_s = 20.0;
   // Whether two-view rotations give the first gyroscope bias when the machine
   // never stands still.
   bool use_visual_rotations = true;
+  // How well they tell it, rad/s.
+  double visual_bias_sigma = 0.002;
   // Whether vision and gyroscope are compared before anything is believed
   // (sensors/check_against_vision.h); a contradiction is an error.
   bool check_against_vision = true;

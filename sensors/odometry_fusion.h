@@ -28,15 +28,18 @@ struct OdometryFusionOptions {
   // better. 0 trusts T_imu_wheel.
   double wheel_mount_sigma_deg = 3.0;
   // Sideways and vertical speed of the wheel frame, m/s/sqrt(Hz).
-  double lateral_speed_noise = 0.02;
-  double vertical_speed_noise = 0.02;
+  // (vertical is larger: springs, and slopes that T_imu_wheel does not follow).
+  double lateral_speed_noise = 0.05;
+  double vertical_speed_noise = 0.2;
+  // Roll and pitch of a machine without IMU, rad/sqrt(s).
+  double planar_rotation_noise = 0.03;
   // A wheel interval further than this from the IMU (in sigmas) loses weight.
   double slip_threshold_sigma = 4.0;
   // Reported as slip when also the speed is off by more than this.
   double slip_min_speed_m_s = 0.2;
   // A machine at rest moves no more than this.
   double standstill_speed_sigma = 0.005;  // m/s
-  double standstill_rate_sigma = 0.0005;  // rad/s
+  double standstill_rate_sigma = 1e-4;    // rad/s
   // Speeds of an IMU without wheels stay within this: all that is known.
   double unaided_speed_sigma = 15.0;  // m/s
   int max_num_iterations = 30;
@@ -68,6 +71,10 @@ struct OdometryFusionProblem {
   std::vector<OdometryLink> links;
   Rigid3d imu_from_wheel;
   ImuNoise imu_noise;
+  // What else is known of the gyroscope's bias at the first state, e.g. from
+  // vision; a sigma of 0 takes the options'.
+  Eigen::Vector3d prior_gyroscope_bias = Eigen::Vector3d::Zero();
+  double prior_gyroscope_bias_sigma = 0.0;
   // First values, e.g. from EstimateInitialOdometry; one more than links.
   std::vector<OdometryState> initial_states;
 };

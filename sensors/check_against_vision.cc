@@ -1,0 +1,443 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "sensors/check_against_vision.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <limits>
+#include <stdexcept>
+
+#include "core/so3.h"
+
+namespace adasfm {
+namespace {
+
+// Only rotations over short times: the gyroscope's drift and the order of
+// turns do not matter there.
+constexpr double kMaxIntervalS = 1.0;
+constexpr double kMaxAngleRad = 1.0;
+// That many suffice; more would only take time.
+constexpr size_t kMaxNumRotations = 500;
+constexpr double kCoarseStepS = 0.02;
+// Another explanation must fit this much better than the calibration, and one
+// listed later this much better than one listed earlier.
+constexpr double kClearlyBetter = 0.7;
+constexpr double kTie = 0.9;
+
+std::string Format(const char* format, double a, double b = 0.0,
+                   double c = 0.0) {
+  char buffer[256];
+  std::snprintf(buffer, sizeof(buffer), format, a, b, c);
+  return buffer;
+}
+
+// The integral of the angular velocity at any time.
+class RateIntegral {
+ public:
+  explicit RateIntegral(const std::vector<ImuSample>& imu) : imu_(imu) {
+    integral_.resize(imu.size(), Eigen::Vector3d::Zero());
+    for (size_t i = 1; i < imu.size(); ++i) {
+      const double dt =
+          SecondsFromNs(imu[i].timestamp_ns - imu[i - 1].timestamp_ns);
+      integral_[i] =
+          integral_[i - 1] +
+          0.5 * dt * (imu[i - 1].angular_velocity + imu[i].angular_velocity);
+    }
+  }
+
+  bool Covers(timestamp_t time_ns) const {
+    return time_ns >= imu_.front().timestamp_ns &&
+           time_ns <= imu_.back().timestamp_ns;
+  }
+
+  Eigen::Vector3d At(timestamp_t time_ns) const {
+    const auto next =
+        std::upper_bound(imu_.begin(), imu_.end(), time_ns,
+                         [](timestamp_t time, const ImuSample& s) {
+                           return time < s.timestamp_ns;
+                         });
+    const size_t i = next - imu_.begin();
+    if (i == imu_.size()) return integral_.back();
+    const ImuSample& a = imu_[i - 1];
+    const ImuSample& b = imu_[i];
+    const double dt = SecondsFromNs(time_ns - a.timestamp_ns);
+    const double ratio = dt / SecondsFromNs(b.timestamp_ns - a.timestamp_ns);
+    return integral_[i - 1] +
+           dt * (a.angular_velocity +
+                 0.5 * ratio * (b.angular_velocity - a.angular_velocity));
+  }
+
+ private:
+  const std::vector<ImuSample>& imu_;
+  std::vector<Eigen::Vector3d> integral_;
+};
+
+double Median(std::vector<double>* values) {
+  const auto middle = values->begin() + values->size() / 2;
+  std::nth_element(values->begin(), middle, values->end());
+  return *middle;
+}
+
+// Rotation vectors of both sides over the same intervals.
+struct Comparison {
+  std::vector<Eigen::Vector3d> visual;  // in the camera frame
+  std::vector<Eigen::Vector3d> gyro;    // in the IMU frame
+  std::vector<double> dt_s;
+};
+
+struct Fit {
+  double cost = std::numeric_limits<double>::infinity();  // rad, mean
+  Eigen::Vector3d rate_offset = Eigen::Vector3d::Zero();  // rad/s, camera
+};
+
+// Mean distance between the visual rotations and the mapped gyroscope's, less
+// a constant rate (the bias): medians and plain distances, so that a few wrong
+// two-view geometries do not matter.
+Fit ComputeFit(const Comparison& data, const Eigen::Matrix3d& map) {
+  Fit fit;
+  const size_t num = data.visual.size();
+  std::vector<double> rates(num);
+  std::vector<Eigen::Vector3d> differences(num);
+  for (size_t i = 0; i < num; ++i) {
+    differences[i] = data.visual[i] - map * data.gyro[i];
+  }
+  for (int axis = 0; axis < 3; ++axis) {
+    for (size_t i = 0; i < num; ++i) {
+      rates[i] = differences[i][axis] / data.dt_s[i];
+    }
+    fit.rate_offset[axis] = Median(&rates);
+  }
+  double sum = 0.0;
+  for (size_t i = 0; i < num; ++i) {
+    sum += (differences[i] - data.dt_s[i] * fit.rate_offset).norm();
+  }
+  fit.cost = sum / std::max<size_t>(1, num);
+  return fit;
+}
+
+// Correlation per axis and of all axes together, about the means.
+double ComputeCorrelation(const Comparison& data, const Eigen::Matrix3d& map,
+                          Eigen::Vector3d* per_axis) {
+  Eigen::Vector3d mean_visual = Eigen::Vector3d::Zero();
+  Eigen::Vector3d mean_gyro = Eigen::Vector3d::Zero();
+  const double num = static_cast<double>(data.visual.size());
+  for (size_t i = 0; i < data.visual.size(); ++i) {
+    mean_visual += data.visual[i] / num;
+    mean_gyro += map * data.gyro[i] / num;
+  }
+  Eigen::Vector3d both = Eigen::Vector3d::Zero();
+  Eigen::Vector3d visual = both, gyro = both;
+  for (size_t i = 0; i < data.visual.size(); ++i) {
+    const Eigen::Vector3d a = data.visual[i] - mean_visual;
+    const Eigen::Vector3d b = map * data.gyro[i] - mean_gyro;
+    both += a.cwiseProduct(b);
+    visual += a.cwiseAbs2();
+    gyro += b.cwiseAbs2();
+  }
+  constexpr double kTiny = 1e-24;
+  if (per_axis != nullptr) {
+    *per_axis = both.cwiseQuotient(
+        (visual.cwiseProduct(gyro).cwiseSqrt().array() + kTiny).matrix());
+  }
+  return both.sum() / (std::sqrt(visual.sum() * gyro.sum()) + kTiny);
+}
+
+// One way in which the calibration may be wrong.
+struct Explanation {
+  enum Kind { kCalibrated, kDegrees, kInverted, kAxes };
+  Kind kind = kCalibrated;
+  Eigen::Matrix3d map = Eigen::Matrix3d::Identity();
+  Eigen::Matrix3d axes = Eigen::Matrix3d::Identity();
+  double shift_s = 0.0;
+  Fit fit;
+};
+
+class VisionComparer {
+ public:
+  VisionComparer(const std::vector<TimedRotation>& rotations,
+                 const std::vector<ImuSample>& imu,
+                 const SensorCalibration& calibration,
+                 const VisionCheckOptions& options)
+      : integral_(imu),
+        cam_from_imu_(calibration.cam_from_imu.rotation.toRotationMatrix()),
+        timeshift_s_(calibration.timeshift_cam_imu_s),
+        options_(options) {
+    SelectRotations(rotations);
+  }
+
+  VisionCheck Run();
+
+ private:
+  void SelectRotations(const std::vector<TimedRotation>& rotations);
+  Comparison Compare(double shift_s) const;
+  // The best shift on a coarse grid for every explanation.
+  void SearchShifts(std::vector<Explanation>* explanations) const;
+  void RefineShift(Explanation* explanation) const;
+  std::vector<Explanation> ListExplanations() const;
+  std::string Describe(const Explanation& best, const VisionCheck& check) const;
+
+  RateIntegral integral_;
+  Eigen::Matrix3d cam_from_imu_;
+  double timeshift_s_;
+  VisionCheckOptions options_;
+  std::vector<TimedRotation> rotations_;
+};
+
+void VisionComparer::SelectRotations(
+    const std::vector<TimedRotation>& rotations) {
+  std::vector<TimedRotation> usable;
+  for (const TimedRotation& rotation : rotations) {
+    const double dt = SecondsFromNs(rotation.end_ns - rotation.start_ns);
+    if (dt <= 0.0 || dt > kMaxIntervalS) continue;
+    if (LogSo3(rotation.cam2_from_cam1).norm() > kMaxAngleRad) continue;
+    usable.push_back(rotation);
+  }
+  std::stable_sort(usable.begin(), usable.end(),
+                   [](const TimedRotation& a, const TimedRotation& b) {
+                     return a.start_ns < b.start_ns;
+                   });
+  const size_t stride = usable.size() / kMaxNumRotations + 1;
+  for (size_t i = 0; i < usable.size(); i += stride) {
+    rotations_.push_back(usable[i]);
+  }
+}
+
+Comparison VisionComparer::Compare(double shift_s) const {
+  const timestamp_t shift = std::llround(1e9 * (timeshift_s_ + shift_s));
+  Comparison data;
+  for (const TimedRotation& rotation : rotations_) {
+    const timestamp_t start = rotation.start_ns + shift;
+    const timestamp_t end = rotation.end_ns + shift;
+    if (!integral_.Covers(start) || !integral_.Covers(end)) continue;
+    data.visual.push_back(LogSo3(rotation.cam2_from_cam1));
+    // cam2_from_cam1 turns against the body's motion.
+    data.gyro.push_back(integral_.At(start) - integral_.At(end));
+    data.dt_s.push_back(SecondsFromNs(end - start));
+  }
+  return data;
+}
+
+std::vector<Explanation> VisionComparer::ListExplanations() const {
+  std::vector<Explanation> list(3);
+  list[0].map = cam_from_imu_;
+  list[1].kind = Explanation::kDegrees;
+  list[1].map = DegToRad(1.0) * cam_from_imu_;
+  list[2].kind = Explanation::kInverted;
+  list[2].map = cam_from_imu_.transpose();
+  std::array<int, 3> order = {0, 1, 2};
+  do {
+    for (int signs = 0; signs < 8; ++signs) {
+      Explanation explanation;
+      explanation.kind = Explanation::kAxes;
+      explanation.axes.setZero();
+      for (int row = 0; row < 3; ++row) {
+        explanation.axes(row, order[row]) = (signs >> row) & 1 ? -1.0 : 1.0;
+      }
+      if (explanation.axes.isIdentity()) continue;
+      explanation.map = cam_from_imu_ * explanation.axes;
+      list.push_back(explanation);
+    }
+  } while (std::next_permutation(order.begin(), order.end()));
+  // Few changes first: they win ties.
+  std::stable_sort(list.begin() + 3, list.end(),
+                   [](const Explanation& a, const Explanation& b) {
+                     return a.axes.trace() > b.axes.trace();
+                   });
+  return list;
+}
+
+void VisionComparer::SearchShifts(
+    std::vector<Explanation>* explanations) const {
+  const int num_steps =
+      static_cast<int>(std::ceil(options_.max_time_shift_s / kCoarseStepS));
+  const size_t min_num =
+      std::max<size_t>(options_.min_num_rotations, rotations_.size() / 2);
+  // From no shift outwards: the nearest of equals wins.
+  for (int step = 0; step <= 2 * num_steps; ++step) {
+    const int magnitude = (step + 1) / 2;
+    const double shift =
+        kCoarseStepS * (step % 2 == 1 ? magnitude : -magnitude);
+    const Comparison data = Compare(shift);
+    if (data.visual.size() < min_num) continue;
+    for (Explanation& explanation : *explanations) {
+      const Fit fit = ComputeFit(data, explanation.map);
+      if (fit.cost < explanation.fit.cost) {
+        explanation.fit = fit;
+        explanation.shift_s = shift;
+      }
+    }
+  }
+}
+
+// Golden section about the coarse minimum.
+void VisionComparer::RefineShift(Explanation* explanation) const {
+  constexpr double kRatio = 0.6180339887498949;
+  double low = explanation->shift_s - kCoarseStepS;
+  double high = explanation->shift_s + kCoarseStepS;
+  const auto cost = [&](double shift) {
+    return ComputeFit(Compare(shift), explanation->map).cost;
+  };
+  double a = high - kRatio * (high - low), b = low + kRatio * (high - low);
+  double cost_a = cost(a), cost_b = cost(b);
+  while (high - low > 1e-4) {
+    if (cost_a < cost_b) {
+      high = b;
+      b = a;
+      cost_b = cost_a;
+      a = high - kRatio * (high - low);
+      cost_a = cost(a);
+    } else {
+      low = a;
+      a = b;
+      cost_a = cost_b;
+      b = low + kRatio * (high - low);
+      cost_b = cost(b);
+    }
+  }
+  const double shift = 0.5 * (low + high);
+  const Fit fit = ComputeFit(Compare(shift), explanation->map);
+  if (fit.cost <= explanation->fit.cost) {
+    explanation->fit = fit;
+    explanation->shift_s = shift;
+  }
+}
+
+std::string AxesToString(const Eigen::Matrix3d& axes) {
+  const char* names = "xyz";
+  std::string text;
+  for (int row = 0; row < 3; ++row) {
+    for (int column = 0; column < 3; ++column) {
+      if (axes(row, column) == 0.0) continue;
+      if (!text.empty()) text += ", ";
+      text += names[row];
+      text += axes(row, column) < 0.0 ? " = -" : " = ";
+      text += names[column];
+    }
+  }
+  return text;
+}
+
+std::string VisionComparer::Describe(const Explanation& best,
+                                     const VisionCheck& check) const {
+  const std::string figures = Format(
+      " (correlation of gyroscope and vision %.2f as calibrated, %.2f "
+      "then)",
+      check.total_correlation, check.shifted_correlation);
+  switch (best.kind) {
+    case Explanation::kCalibrated:
+      return Format(
+                 "images and IMU differ by %+.4f s more than "
+                 "timeshift_cam_imu says: set it to %.4f or let it be "
+                 "estimated",
+                 best.shift_s, timeshift_s_ + best.shift_s) +
+             figures;
+    case Explanation::kDegrees:
+      return "angular velocities look like deg/s: multiply them by pi / 180 "
+             "(rad/s are expected)" +
+             figures;
+    case Explanation::kInverted:
+      return "T_cam_imu looks inverted (it seems to be T_imu_cam): invert the "
+             "matrix" +
+             figures;
+    case Explanation::kAxes:
+      return "the IMU's axes do not fit T_cam_imu: vision fits when the log's "
+             "axes are read as " +
+             AxesToString(best.axes) + figures;
+  }
+  return "";
+}
+
+VisionCheck VisionComparer::Run() {
+  VisionCheck check;
+  const size_t min_num = options_.min_num_rotations;
+  if (rotations_.size() < min_num) return check;
+  std::vector<Explanation> explanations = ListExplanations();
+  SearchShifts(&explanations);
+  Explanation& calibrated = explanations[0];
+  if (!std::isfinite(calibrated.fit.cost)) return check;
+  RefineShift(&calibrated);
+
+  const Comparison shifted = Compare(calibrated.shift_s);
+  double turning = 0.0;
+  Eigen::Vector3d mean = Eigen::Vector3d::Zero();
+  for (const Eigen::Vector3d& v : shifted.visual) mean += v;
+  mean /= static_cast<double>(shifted.visual.size());
+  for (const Eigen::Vector3d& v : shifted.visual) {
+    turning += (v - mean).squaredNorm();
+  }
+  turning = std::sqrt(turning / shifted.visual.size());
+  if (RadToDeg(turning) < options_.min_rotation_rms_deg) return check;
+
+  check.is_conclusive = true;
+  const Comparison as_is = Compare(0.0);
+  Fit as_is_fit;
+  if (as_is.visual.size() >= min_num) {
+    check.total_correlation =
+        ComputeCorrelation(as_is, cam_from_imu_, &check.correlation);
+    as_is_fit = ComputeFit(as_is, cam_from_imu_);
+  }
+  // The first explanation that is clearly better than all before it.
+  const Explanation* best = &calibrated;
+  for (size_t i = 1; i < explanations.size(); ++i) {
+    const double bar = best == &calibrated ? kClearlyBetter : kTie;
+    if (explanations[i].fit.cost < bar * best->fit.cost) {
+      best = &explanations[i];
+    }
+  }
+  check.shifted_correlation =
+      ComputeCorrelation(Compare(best->shift_s), best->map, nullptr);
+  // The offset is that of the cameras' rotation, which turns against the body.
+  check.gyroscope_bias = cam_from_imu_.transpose() * calibrated.fit.rate_offset;
+  if (best != &calibrated &&
+      check.shifted_correlation >= options_.min_correlation) {
+    check.best_axes = best->axes;
+    check.is_inverted = best->kind == Explanation::kInverted;
+    check.contradiction = Describe(*best, check);
+    return check;
+  }
+  check.shifted_correlation =
+      ComputeCorrelation(shifted, cam_from_imu_, nullptr);
+  if (check.shifted_correlation < options_.min_correlation) {
+    if (check.total_correlation >= options_.min_correlation) return check;
+    check.contradiction = Format(
+        "vision and gyroscope contradict each other (correlation %.2f, "
+        "at the best time shift %.2f): check T_cam_imu, the clocks and "
+        "whether log and images belong together",
+        check.total_correlation, check.shifted_correlation);
+    return check;
+  }
+  check.time_shift_correction_s = calibrated.shift_s;
+  if (std::abs(calibrated.shift_s) > options_.max_accepted_shift_s &&
+      calibrated.fit.cost < kTie * as_is_fit.cost) {
+    check.contradiction = Describe(calibrated, check);
+    check.contradiction_is_time_shift = true;
+  }
+  return check;
+}
+
+}  // namespace
+
+bool VisionCheckOptions::IsValid(std::string* error) const {
+  if (max_time_shift_s > 0.0 && min_rotation_rms_deg > 0.0 &&
+      min_num_rotations > 1 && min_correlation > 0.0 && min_correlation < 1.0 &&
+      max_accepted_shift_s > 0.0) {
+    return true;
+  }
+  *error =
+      "AdaSfmVisionCheck: every option must be positive and "
+      "min_correlation below 1";
+  return false;
+}
+
+VisionCheck CheckAgainstVision(const std::vector<TimedRotation>& rotations,
+                               const std::vector<ImuSample>& imu,
+                               const SensorCalibration& calibration,
+                               const VisionCheckOptions& options) {
+  std::string error;
+  if (!options.IsValid(&error)) throw std::invalid_argument(error);
+  if (imu.size() < 2) return VisionCheck();
+  return VisionComparer(rotations, imu, calibration, options).Run();
+}
+
+}  // namespace adasfm

@@ -1,0 +1,470 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "sensors/estimate_priors.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <limits>
+#include <stdexcept>
+#include <tuple>
+
+#include "core/so3.h"
+#include "sensors/build_odometry_links.h"
+#include "sensors/check_against_vision.h"
+#include "sensors/initial_odometry.h"
+#include "sensors/log_checks.h"
+
+namespace adasfm {
+namespace {
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+constexpr double kSlipFlagWeight = 0.3;
+
+std::string Format(const char* format, double a, double b = 0.0) {
+  char buffer[256];
+  std::snprintf(buffer, sizeof(buffer), format, a, b);
+  return buffer;
+}
+
+timestamp_t NsFromSeconds(double seconds) {
+  return std::llround(1e9 * seconds);
+}
+
+// The stages of EstimatePriors with what they share.
+class PriorEstimator {
+ public:
+  PriorEstimator(const SensorCalibration& calibration,
+                 const PriorEstimationOptions& options)
+      : calibration_(calibration), options_(options) {}
+
+  StatusOr<PriorEstimate> Run(const std::vector<ImageStamp>& images,
+                              const SensorLogs& logs,
+                              const std::vector<VisualRotation>& rotations);
+
+ private:
+  void SelectLogs(const SensorLogs& logs);
+  Status SelectImages(std::vector<ImageStamp> images);
+  Status CheckVision(const std::vector<VisualRotation>& rotations);
+  void Fuse();
+  void BuildPriors();
+  RelativePosePrior BuildPrior(size_t image) const;
+  void FillSummary();
+  void PredictDrift();
+  void ListSlips();
+  ImuBias FirstBias() const;
+
+  const SensorCalibration& calibration_;
+  const PriorEstimationOptions& options_;
+  MotionLogs logs_;
+  timestamp_t timeshift_ns_ = 0;
+  std::vector<ImageStamp> all_images_;
+  std::vector<ImageStamp> images_;  // inside the logs
+  bool has_visual_bias_ = false;
+  Eigen::Vector3d visual_bias_ = Eigen::Vector3d::Zero();
+  OdometryTimeline timeline_;
+  OdometryFusionProblem problem_;
+  OdometryFusionResult fused_;
+  PriorEstimate estimate_;
+};
+
+template <typename Sample>
+void MeasureRate(const std::vector<Sample>& samples, double* rate_hz,
+                 int* num_gaps, double* max_gap_s) {
+  std::vector<timestamp_t> times;
+  times.reserve(samples.size());
+  for (const Sample& sample : samples) times.push_back(sample.timestamp_ns);
+  const double period = ComputeMedianPeriod(times);
+  if (period <= 0.0) return;
+  *rate_hz = 1.0 / period;
+  for (size_t i = 1; i < times.size(); ++i) {
+    const double gap = SecondsFromNs(times[i] - times[i - 1]);
+    if (gap <= 3.0 * period) continue;
+    ++*num_gaps;
+    *max_gap_s = std::max(*max_gap_s, gap);
+  }
+}
+
+void PriorEstimator::SelectLogs(const SensorLogs& logs) {
+  SensorSummary& summary = estimate_.summary;
+  if (calibration_.has_imu) logs_.imu = logs.imu;
+  if (calibration_.has_wheel) {
+    logs_.wheel = ComputeWheelSpeeds(logs.wheel, calibration_);
+    logs_.odometry = logs.odometry;
+  }
+  if (!calibration_.has_imu && !logs.imu.empty()) {
+    summary.warnings.push_back(
+        "the calibration has no imu0: the IMU log is not used");
+  }
+  if (!calibration_.has_wheel &&
+      !(logs.wheel.empty() && logs.odometry.empty())) {
+    summary.warnings.push_back(
+        "the calibration has no wheel0: the wheel log is not used");
+  }
+  MeasureRate(logs_.imu, &summary.imu_rate_hz, &summary.num_imu_gaps,
+              &summary.max_imu_gap_s);
+  if (logs_.odometry.empty()) {
+    MeasureRate(logs_.wheel, &summary.wheel_rate_hz, &summary.num_wheel_gaps,
+                &summary.max_wheel_gap_s);
+  } else {
+    MeasureRate(logs_.odometry, &summary.wheel_rate_hz, &summary.num_wheel_gaps,
+                &summary.max_wheel_gap_s);
+  }
+  if (summary.imu_rate_hz > 0.0 &&
+      std::abs(summary.imu_rate_hz / calibration_.imu_rate_hz - 1.0) > 0.2) {
+    summary.warnings.push_back(
+        Format("the IMU log runs at %.1f Hz where imu0/update_rate says %.1f",
+               summary.imu_rate_hz, calibration_.imu_rate_hz));
+  }
+}
+
+Status PriorEstimator::SelectImages(std::vector<ImageStamp> images) {
+  std::sort(images.begin(), images.end(),
+            [](const ImageStamp& a, const ImageStamp& b) {
+              return std::tie(a.timestamp_ns, a.image_id) <
+                     std::tie(b.timestamp_ns, b.image_id);
+            });
+  for (size_t i = 1; i < images.size(); ++i) {
+    if (images[i].timestamp_ns == images[i - 1].timestamp_ns) {
+      return Status::Error("images '" + images[i - 1].name + "' and '" +
+                           images[i].name +
+                           "' have the same time; one camera is expected");
+    }
+  }
+  all_images_ = std::move(images);
+  images_.clear();
+  const timestamp_t start = logs_.StartNs(), end = logs_.EndNs();
+  for (const ImageStamp& image : all_images_) {
+    const timestamp_t time = image.timestamp_ns + timeshift_ns_;
+    if (time >= start && time <= end) images_.push_back(image);
+  }
+  if (images_.empty()) {
+    const double first = SecondsFromNs(all_images_.front().timestamp_ns);
+    const double last = SecondsFromNs(all_images_.back().timestamp_ns);
+    return Status::Error(
+        Format("no image lies within the sensor logs: images run from %.3f to "
+               "%.3f s, ",
+               first, last) +
+        Format("logs from %.3f to %.3f s; check the clocks (units, epoch, "
+               "timeshift_cam_imu)",
+               SecondsFromNs(start), SecondsFromNs(end)));
+  }
+  return Status::Ok();
+}
+
+Status PriorEstimator::CheckVision(
+    const std::vector<VisualRotation>& rotations) {
+  if (logs_.imu.empty() || rotations.empty()) return Status::Ok();
+  std::map<image_t, timestamp_t> times;
+  for (const ImageStamp& image : all_images_) {
+    times[image.image_id] = image.timestamp_ns;
+  }
+  std::vector<TimedRotation> timed;
+  for (const VisualRotation& rotation : rotations) {
+    const auto first = times.find(rotation.image_id1);
+    const auto second = times.find(rotation.image_id2);
+    if (first == times.end() || second == times.end()) continue;
+    TimedRotation entry{first->second, second->second, rotation.cam2_from_cam1,
+                        static_cast<double>(rotation.num_inliers)};
+    if (entry.start_ns > entry.end_ns) {
+      std::swap(entry.start_ns, entry.end_ns);
+      entry.cam2_from_cam1 = entry.cam2_from_cam1.conjugate();
+    }
+    timed.push_back(entry);
+  }
+  const VisionCheck check =
+      CheckAgainstVision(timed, logs_.imu, calibration_, VisionCheckOptions());
+  SensorSummary& summary = estimate_.summary;
+  if (!check.is_conclusive) {
+    summary.warnings.push_back(
+        "the cameras turn too little to compare them with the gyroscope");
+    return Status::Ok();
+  }
+  summary.visual_timeshift_correction_s = check.time_shift_correction_s;
+  const bool only_shift = check.contradiction_is_time_shift;
+  if (options_.estimate_time_shift &&
+      (check.contradiction.empty() || only_shift)) {
+    timeshift_ns_ += NsFromSeconds(check.time_shift_correction_s);
+  } else if (!check.contradiction.empty()) {
+    if (options_.check_against_vision) {
+      return Status::Error(check.contradiction);
+    }
+    summary.warnings.push_back(check.contradiction);
+    return Status::Ok();
+  }
+  has_visual_bias_ = options_.use_visual_rotations;
+  visual_bias_ = check.gyroscope_bias;
+  return Status::Ok();
+}
+
+ImuBias PriorEstimator::FirstBias() const {
+  ImuBias bias;
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  double time = 0.0;
+  for (const OdometryLink& link : problem_.links) {
+    if (!link.is_standstill) continue;
+    sum += LogSo3(link.imu.delta_rotation);
+    time += link.dt_s;
+  }
+  if (time > 0.5) {
+    bias.gyroscope = sum / time;
+  } else if (has_visual_bias_) {
+    bias.gyroscope = visual_bias_;
+  }
+  return bias;
+}
+
+void PriorEstimator::Fuse() {
+  OdometryLinkOptions link_options;
+  link_options.max_imu_gap_s = options_.max_imu_gap_s;
+  link_options.max_wheel_gap_s = options_.max_wheel_gap_s;
+  link_options.max_link_s = options_.max_link_s;
+  link_options.max_lead_s = options_.max_lead_s;
+  link_options.lateral_speed_noise = options_.fusion.lateral_speed_noise;
+  link_options.vertical_speed_noise = options_.fusion.vertical_speed_noise;
+  std::vector<timestamp_t> times;
+  for (const ImageStamp& image : images_) {
+    times.push_back(image.timestamp_ns + timeshift_ns_);
+  }
+  timeline_ = BuildTimeline(times, logs_, link_options);
+  problem_.imu_from_wheel = calibration_.imu_from_wheel;
+  problem_.imu_noise = calibration_.imu_noise;
+  problem_.links = BuildOdometryLinks(timeline_.times_ns, logs_, calibration_,
+                                      ImuBias(), link_options);
+  const ImuBias bias = FirstBias();
+  if (bias.gyroscope != Eigen::Vector3d::Zero()) {
+    // Preintegrated about the right bias, first-order corrections stay small.
+    problem_.links = BuildOdometryLinks(timeline_.times_ns, logs_, calibration_,
+                                        bias, link_options);
+  }
+  if (has_visual_bias_) {
+    problem_.prior_gyroscope_bias = visual_bias_;
+    problem_.prior_gyroscope_bias_sigma = std::min(
+        options_.visual_bias_sigma, options_.fusion.gyroscope_bias_sigma);
+  }
+  problem_.initial_states =
+      EstimateInitialOdometry(problem_.links, problem_.imu_from_wheel,
+                              options_.fusion.gravity_m_s2, bias);
+  fused_ = FuseOdometry(problem_, options_.fusion);
+}
+
+// From image i to i + 1. Motions of the links between are composed; their
+// errors are alike (one speed, one bias), so n of them count up to n times
+// their sum of variances.
+RelativePosePrior PriorEstimator::BuildPrior(size_t image) const {
+  const size_t first = timeline_.indices[image];
+  const size_t last = timeline_.indices[image + 1];
+  Rigid3d body2_from_body1;
+  Eigen::Matrix<double, 6, 6> covariance = Eigen::Matrix<double, 6, 6>::Zero();
+  bool has_imu = true, has_wheel = true, has_yaw = true, is_slipping = false;
+  for (size_t k = first; k < last; ++k) {
+    const OdometryMotion& motion = fused_.motions[k];
+    const OdometryLink& link = problem_.links[k];
+    // An error before this link is seen from behind it.
+    Eigen::Matrix<double, 6, 6> carry = Eigen::Matrix<double, 6, 6>::Identity();
+    const Eigen::Matrix3d rotation =
+        motion.body2_from_body1.rotation.toRotationMatrix();
+    carry.topLeftCorner<3, 3>() = rotation;
+    carry.bottomRightCorner<3, 3>() = rotation;
+    Eigen::Matrix<double, 6, 6> own = Eigen::Matrix<double, 6, 6>::Identity();
+    own.bottomLeftCorner<3, 3>() =
+        -Hat(rotation * body2_from_body1.translation);
+    covariance = carry * covariance * carry.transpose() +
+                 own * motion.covariance * own.transpose();
+    body2_from_body1 = motion.body2_from_body1 * body2_from_body1;
+    has_imu &= link.has_imu;
+    has_wheel &= link.has_wheel;
+    has_yaw &=
+        link.has_wheel && (link.has_wheel_yaw || link.wheel.has_rotation);
+    is_slipping |= motion.wheel_weight < kSlipFlagWeight;
+  }
+  covariance *= static_cast<double>(last - first);
+
+  RelativePosePrior prior;
+  prior.image_id1 = images_[image].image_id;
+  prior.image_id2 = images_[image + 1].image_id;
+  prior.dt_ns = images_[image + 1].timestamp_ns - images_[image].timestamp_ns;
+  const Rigid3d& cam_from_imu = calibration_.cam_from_imu;
+  const Rigid3d imu_from_cam = cam_from_imu.Inverse();
+  prior.cam2_from_cam1 = cam_from_imu * body2_from_body1 * imu_from_cam;
+  const Eigen::Matrix3d rotation = cam_from_imu.rotation.toRotationMatrix();
+  Eigen::Matrix<double, 6, 6> map = Eigen::Matrix<double, 6, 6>::Zero();
+  map.topLeftCorner<3, 3>() = rotation;
+  map.bottomRightCorner<3, 3>() = rotation;
+  map.bottomLeftCorner<3, 3>() =
+      -rotation * Hat(body2_from_body1.rotation * imu_from_cam.translation);
+  prior.covariance = map * covariance * map.transpose();
+
+  const bool has_rotation = has_imu || has_yaw;
+  if (has_rotation) prior.flags |= kPriorRotation;
+  if (has_rotation && has_wheel) prior.flags |= kPriorDirection;
+  if (has_wheel) prior.flags |= kPriorLength;
+  if (is_slipping && has_wheel) prior.flags |= kPriorWheelSlip;
+  const auto forget = [&prior](int begin) {
+    prior.covariance.middleRows<3>(begin).setZero();
+    prior.covariance.middleCols<3>(begin).setZero();
+    prior.covariance.diagonal().segment<3>(begin).setConstant(kInfinity);
+  };
+  if (!has_rotation) forget(0);
+  if (!has_wheel) forget(3);
+  return prior;
+}
+
+void PriorEstimator::BuildPriors() {
+  const Eigen::Vector3d down(0.0, 0.0, -1.0);
+  for (size_t i = 0; i < images_.size(); ++i) {
+    const size_t index = timeline_.indices[i];
+    const bool has_imu =
+        (index > 0 && problem_.links[index - 1].has_imu) ||
+        (index < problem_.links.size() && problem_.links[index].has_imu);
+    if (has_imu) {
+      estimate_.gravity_in_cam[images_[i].image_id] =
+          calibration_.cam_from_imu.rotation *
+          (fused_.states[index].world_from_imu.conjugate() * down);
+    }
+    if (i + 1 == images_.size()) break;
+    const RelativePosePrior prior = BuildPrior(i);
+    if (prior.flags != 0) estimate_.priors.push_back(prior);
+  }
+}
+
+void PriorEstimator::ListSlips() {
+  std::vector<WheelSlip>& slips = estimate_.summary.wheel_slips;
+  size_t last_link = 0;
+  for (const auto& [link, speed_error] : fused_.slipping_links) {
+    if (slips.empty() || link > last_link + 2) slips.emplace_back();
+    WheelSlip& slip = slips.back();
+    if (slip.end_ns == 0) {
+      slip.start_ns = timeline_.times_ns[link] - timeshift_ns_;
+    }
+    slip.end_ns = timeline_.times_ns[link + 1] - timeshift_ns_;
+    if (std::abs(speed_error) > std::abs(slip.speed_error_m_s)) {
+      slip.speed_error_m_s = speed_error;
+    }
+    last_link = link;
+  }
+}
+
+// Over 100 m at the mean speed: heading by the gyroscope's noise and what is
+// left of its bias; the position by heading (its mean over the way is half of
+// its end) and scale.
+void PriorEstimator::PredictDrift() {
+  SensorSummary& summary = estimate_.summary;
+  double moving_s = 0.0;
+  for (const OdometryLink& link : problem_.links) {
+    if (link.has_wheel && !link.is_standstill) moving_s += link.dt_s;
+  }
+  if (summary.distance_m <= 0.0 || moving_s <= 0.0) return;
+  const double time = 100.0 * moving_s / summary.distance_m;
+  const double walk = calibration_.imu_noise.gyroscope_noise_density;
+  const double heading =
+      std::hypot(walk * std::sqrt(time), summary.gyroscope_bias_sigma * time);
+  if (!logs_.imu.empty()) summary.drift_per_100m_deg = RadToDeg(heading);
+  summary.drift_per_100m_m =
+      100.0 * std::hypot(0.5 * heading, summary.wheel_scale_sigma);
+}
+
+void PriorEstimator::FillSummary() {
+  SensorSummary& summary = estimate_.summary;
+  summary.num_images = static_cast<int>(all_images_.size());
+  summary.num_images_in_logs = static_cast<int>(images_.size());
+  summary.num_priors = static_cast<int>(estimate_.priors.size());
+  if (all_images_.size() > 1) {
+    summary.prior_ratio =
+        static_cast<double>(summary.num_priors) / (all_images_.size() - 1);
+  }
+  summary.timeshift_cam_imu_s = SecondsFromNs(timeshift_ns_);
+  for (const OdometryLink& link : problem_.links) {
+    if (link.is_standstill) summary.standstill_s += link.dt_s;
+  }
+  for (size_t k = 0; k < problem_.links.size(); ++k) {
+    if (!problem_.links[k].has_wheel) continue;
+    summary.distance_m += fused_.motions[k].body2_from_body1.translation.norm();
+  }
+  if (!logs_.imu.empty()) {
+    for (const OdometryState& state : fused_.states) {
+      summary.gyroscope_bias += state.bias.gyroscope / fused_.states.size();
+      summary.accelerometer_bias +=
+          state.bias.accelerometer / fused_.states.size();
+    }
+    summary.gyroscope_bias_sigma = fused_.gyroscope_bias_sigma;
+    summary.accelerometer_bias_sigma = fused_.accelerometer_bias_sigma;
+    const auto first = estimate_.gravity_in_cam.find(images_[0].image_id);
+    if (first != estimate_.gravity_in_cam.end()) {
+      summary.first_gravity_in_cam = first->second;
+    }
+  }
+  if (!(logs_.wheel.empty() && logs_.odometry.empty())) {
+    summary.wheel_scale = fused_.wheel_scale;
+    summary.wheel_scale_sigma = fused_.wheel_scale_sigma;
+  }
+  if (!fused_.converged) {
+    summary.warnings.push_back(
+        "the smoother did not settle: sensors contradict each other; check "
+        "T_cam_imu, T_imu_wheel and the noise figures");
+  }
+  PredictDrift();
+  ListSlips();
+}
+
+StatusOr<PriorEstimate> PriorEstimator::Run(
+    const std::vector<ImageStamp>& images, const SensorLogs& logs,
+    const std::vector<VisualRotation>& rotations) {
+  if (images.empty()) return Status::Error("no image has a time");
+  SelectLogs(logs);
+  if (logs_.IsEmpty()) {
+    return Status::Error(
+        "no sensor log: give an IMU or a wheel log, and its section in the "
+        "calibration");
+  }
+  timeshift_ns_ = NsFromSeconds(calibration_.timeshift_cam_imu_s);
+  // 1. Images inside the logs.
+  Status status = SelectImages(images);
+  if (!status.ok()) return status;
+  // 2. Vision against the gyroscope; it may move the time shift.
+  const timestamp_t calibrated_shift = timeshift_ns_;
+  status = CheckVision(rotations);
+  if (status.ok() && timeshift_ns_ != calibrated_shift) {
+    status = SelectImages(images);
+  }
+  if (!status.ok()) return status;
+  // 3. and 4. Preintegration and smoother.
+  Fuse();
+  // 5. Camera frames and figures.
+  BuildPriors();
+  FillSummary();
+  return std::move(estimate_);
+}
+
+}  // namespace
+
+bool PriorEstimationOptions::IsValid(std::string* error) const {
+  const std::pair<const char*, double> positive[] = {
+      {"max_imu_gap_s", max_imu_gap_s},
+      {"max_wheel_gap_s", max_wheel_gap_s},
+      {"max_link_s", max_link_s},
+      {"visual_bias_sigma", visual_bias_sigma}};
+  for (const auto& [name, value] : positive) {
+    if (value > 0.0) continue;
+    *error = "AdaSfmPriors." + std::string(name) + " is " +
+             std::to_string(value) + "; it must be positive";
+    return false;
+  }
+  if (!(max_lead_s >= 0.0)) {
+    *error = "AdaSfmPriors.max_lead_s must not be negative";
+    return false;
+  }
+  return fusion.IsValid(error);
+}
+
+StatusOr<PriorEstimate> EstimatePriors(
+    const std::vector<ImageStamp>& images, const SensorLogs& logs,
+    const SensorCalibration& calibration,
+    const std::vector<VisualRotation>& visual_rotations,
+    const PriorEstimationOptions& options) {
+  std::string error;
+  if (!options.IsValid(&error)) throw std::invalid_argument(error);
+  return PriorEstimator(calibration, options)
+      .Run(images, logs, visual_rotations);
+}
+
+}  // namespace adasfm
