@@ -7,6 +7,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include "core/so3.h"
 #include "global/filter_edges_by_rotation.h"
 
 namespace adasfm {
@@ -47,16 +48,34 @@ class CoarsePoseEstimator {
       edge.removal = EdgeRemoval::kFewInliers;
       ++num_removed;
     }
+    chain_ = OdometryChain(priors_, options_.chain);
     if (options_.relative_poses.enabled) {
-      RefineRelativePoses(options_.relative_poses, correspondences_, &graph_);
+      RefineRelativePoses(options_.relative_poses, correspondences_,
+                          PredictRotations(), &graph_);
     }
     EndStep("relative poses", std::to_string(graph_.edges.size()) + " pairs, " +
                                   std::to_string(num_removed) +
                                   " with few inliers removed");
   }
 
+  std::vector<std::optional<RotationPrediction>> PredictRotations() const {
+    const double floor_rad =
+        DegToRad(options_.min_predicted_rotation_sigma_deg);
+    std::vector<std::optional<RotationPrediction>> predictions;
+    for (const ViewGraphEdge& edge : graph_.edges) {
+      predictions.emplace_back();
+      if (!chain_.IsConnected(edge.image_id1, edge.image_id2)) continue;
+      const ChainMotion motion = chain_.Motion(edge.image_id1, edge.image_id2);
+      if (!motion.has_rotation) continue;
+      predictions.back() = RotationPrediction{
+          motion.cam2_from_cam1.rotation,
+          motion.covariance.topLeftCorner<3, 3>() +
+              floor_rad * floor_rad * Eigen::Matrix3d::Identity()};
+    }
+    return predictions;
+  }
+
   void FilterLoops() {
-    chain_ = OdometryChain(priors_, options_.chain);
     if (chain_.empty() || !options_.loops.enabled) {
       EndStep("loop gating",
               chain_.empty() ? "skipped: no odometry" : "switched off");

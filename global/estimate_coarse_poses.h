@@ -34,6 +34,9 @@ struct CoarsePoseOptions {
   AugmentationOptions augmentation;
   TranslationAveragingOptions positions;
   PositionFilterOptions position_filter;
+  // Least error granted to the odometry's rotation between two cameras (their
+  // calibration, rolling shutter), added to its covariance.
+  double min_predicted_rotation_sigma_deg = 0.05;
   // Edges with fewer inliers take no part.
   int min_num_inliers = 15;
   // Priors shorter than this (standstill) say nothing about depths.

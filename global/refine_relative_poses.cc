@@ -3,12 +3,14 @@
 
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
+#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 
 #include "core/parallel.h"
 #include "core/so3.h"
 #include "global/epipolar.h"
+#include "global/translation_direction.h"
 
 namespace adasfm {
 namespace {
@@ -53,12 +55,69 @@ NormalEquations Accumulate(const EdgeBearings& edge, double loss_scale_px,
   return sums;
 }
 
-void SetSigmas(const NormalEquations& sums, double keypoint_sigma_px,
-               ViewGraphEdge* edge) {
-  const double freedom = std::max(1.0, sums.sum_weights - 5.0);
-  const double variance = std::max(std::pow(keypoint_sigma_px, 2),
-                                   sums.sum_weighted_squares / freedom);
-  const Eigen::SelfAdjointEigenSolver<Matrix5d> eigen(sums.matrix);
+// A prediction in the units of the cost: px^2 per rad^2.
+struct WeightedPrediction {
+  Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();
+  Eigen::Matrix3d information = Eigen::Matrix3d::Zero();
+};
+
+// A local optimum.
+struct RelativePose {
+  Eigen::Matrix3d rotation;
+  Eigen::Vector3d translation;
+  NormalEquations sums;
+};
+
+void Evaluate(const EdgeBearings& bearings, double loss_scale_px,
+              const WeightedPrediction& prediction, RelativePose* pose) {
+  pose->sums =
+      Accumulate(bearings, loss_scale_px, pose->rotation, pose->translation);
+  const Eigen::Vector3d error = LogSo3(Eigen::Quaterniond(
+      Eigen::Matrix3d(pose->rotation * prediction.rotation.transpose())));
+  pose->sums.matrix.topLeftCorner<3, 3>() += prediction.information;
+  pose->sums.gradient.head<3>() += prediction.information * error;
+  pose->sums.cost += error.dot(prediction.information * error);
+}
+
+RelativePose Descend(const RelativePoseRefinementOptions& options,
+                     const EdgeBearings& bearings,
+                     const WeightedPrediction& prediction, RelativePose pose) {
+  Evaluate(bearings, options.loss_scale_px, prediction, &pose);
+  double damping = 1e-4;
+  for (int i = 0; i < options.max_num_iterations; ++i) {
+    Matrix5d damped = pose.sums.matrix;
+    damped.diagonal() *= 1.0 + damping;
+    damped.diagonal().array() += 1e-9 * damped.trace();
+    const Vector5d step = -damped.ldlt().solve(pose.sums.gradient);
+    if (!step.allFinite()) break;
+    RelativePose next;
+    next.rotation = ExpSo3(step.head<3>()).toRotationMatrix() * pose.rotation;
+    next.translation =
+        (pose.translation + TangentBasis(pose.translation) * step.tail<2>())
+            .normalized();
+    Evaluate(bearings, options.loss_scale_px, prediction, &next);
+    if (next.sums.cost <= pose.sums.cost) {
+      const bool is_done =
+          pose.sums.cost - next.sums.cost < 1e-5 * pose.sums.cost;
+      pose = next;
+      damping = std::max(1e-9, 0.1 * damping);
+      if (is_done) break;
+    } else {
+      damping = std::max(1e-3, 10.0 * damping);
+    }
+  }
+  return pose;
+}
+
+// The variance of a distance in px^2.
+double Variance(const NormalEquations& sums, double keypoint_sigma_px) {
+  return std::max(
+      keypoint_sigma_px * keypoint_sigma_px,
+      sums.sum_weighted_squares / std::max(1.0, sums.sum_weights - 5.0));
+}
+
+void SetSigmas(const RelativePose& pose, double variance, ViewGraphEdge* edge) {
+  const Eigen::SelfAdjointEigenSolver<Matrix5d> eigen(pose.sums.matrix);
   // What the matches do not determine is uncertain by a radian, not by
   // infinity.
   const Vector5d inverse =
@@ -73,44 +132,51 @@ void SetSigmas(const NormalEquations& sums, double keypoint_sigma_px,
           1));
 }
 
+// The optimum that takes the prediction into account.
+RelativePose DescendFromPrediction(const RelativePoseRefinementOptions& options,
+                                   const EdgeBearings& bearings,
+                                   const RotationPrediction& prediction,
+                                   double variance,
+                                   const Eigen::Vector3d& direction) {
+  WeightedPrediction weighted;
+  weighted.rotation = prediction.cam2_from_cam1.toRotationMatrix();
+  weighted.information = variance * prediction.covariance.inverse();
+  DirectionSearch search;
+  search.loss_scale_px = options.loss_scale_px;
+  RelativePose pose;
+  pose.rotation = weighted.rotation;
+  pose.translation =
+      EstimateTranslationDirection(
+          search, BuildTranslationProblem(bearings, pose.rotation), direction)
+          .direction;
+  return Descend(options, bearings, weighted, pose);
+}
+
 void RefineEdge(const RelativePoseRefinementOptions& options,
-                const EdgeBearings& bearings, ViewGraphEdge* edge) {
-  Eigen::Matrix3d rotation = edge->cam2_from_cam1.rotation.toRotationMatrix();
-  Eigen::Vector3d translation = edge->cam2_from_cam1.translation.normalized();
-  NormalEquations sums =
-      Accumulate(bearings, options.loss_scale_px, rotation, translation);
-  double damping = 1e-4;
-  for (int i = 0; i < options.max_num_iterations; ++i) {
-    Matrix5d damped = sums.matrix;
-    damped.diagonal() *= 1.0 + damping;
-    damped.diagonal().array() += 1e-9 * sums.matrix.trace();
-    const Vector5d step = -damped.ldlt().solve(sums.gradient);
-    if (!step.allFinite()) break;
-    const Eigen::Matrix3d new_rotation =
-        ExpSo3(step.head<3>()).toRotationMatrix() * rotation;
-    const Eigen::Vector3d new_translation =
-        (translation + TangentBasis(translation) * step.tail<2>()).normalized();
-    const NormalEquations new_sums = Accumulate(bearings, options.loss_scale_px,
-                                                new_rotation, new_translation);
-    if (new_sums.cost <= sums.cost) {
-      const bool is_done = sums.cost - new_sums.cost < 1e-5 * sums.cost;
-      rotation = new_rotation;
-      translation = new_translation;
-      sums = new_sums;
-      damping = std::max(1e-9, 0.1 * damping);
-      if (is_done) break;
-    } else {
-      damping = std::max(1e-3, 10.0 * damping);
+                const EdgeBearings& bearings,
+                const std::optional<RotationPrediction>& prediction,
+                ViewGraphEdge* edge) {
+  RelativePose pose;
+  pose.rotation = edge->cam2_from_cam1.rotation.toRotationMatrix();
+  pose.translation = edge->cam2_from_cam1.translation.normalized();
+  pose = Descend(options, bearings, WeightedPrediction(), pose);
+  const double variance = Variance(pose.sums, options.keypoint_sigma_px);
+  if (prediction.has_value()) {
+    const RelativePose predicted = DescendFromPrediction(
+        options, bearings, *prediction, variance, pose.translation);
+    if (predicted.sums.cost <
+        pose.sums.cost + options.max_prediction_cost * variance) {
+      pose = predicted;
     }
   }
-  if (!rotation.allFinite() || !translation.allFinite()) return;
+  if (!pose.rotation.allFinite() || !pose.translation.allFinite()) return;
   if (!IsInFrontByVote(bearings.bearings1, bearings.bearings2,
                        std::vector<double>(bearings.bearings1.size(), 1.0),
-                       rotation, translation)) {
-    translation = -translation;
+                       pose.rotation, pose.translation)) {
+    pose.translation = -pose.translation;
   }
-  edge->cam2_from_cam1 = Rigid3d(rotation, translation);
-  SetSigmas(sums, options.keypoint_sigma_px, edge);
+  edge->cam2_from_cam1 = Rigid3d(pose.rotation, pose.translation);
+  SetSigmas(pose, variance, edge);
 }
 
 }  // namespace
@@ -131,9 +197,11 @@ bool RelativePoseRefinementOptions::IsValid(std::string* error) const {
   return true;
 }
 
-void RefineRelativePoses(const RelativePoseRefinementOptions& options,
-                         const GlobalCorrespondences& correspondences,
-                         ViewGraph* graph) {
+void RefineRelativePoses(
+    const RelativePoseRefinementOptions& options,
+    const GlobalCorrespondences& correspondences,
+    const std::vector<std::optional<RotationPrediction>>& predictions,
+    ViewGraph* graph) {
   constexpr int kMinNumMatches = 8;
   ParallelFor(options.num_threads, graph->edges.size(), [&](size_t e) {
     ViewGraphEdge& edge = graph->edges[e];
@@ -146,7 +214,7 @@ void RefineRelativePoses(const RelativePoseRefinementOptions& options,
                SelectEdgeBearings(correspondences.bearings.at(edge.image_id1),
                                   correspondences.bearings.at(edge.image_id2),
                                   matches->second, options.max_num_matches),
-               &edge);
+               predictions.empty() ? std::nullopt : predictions.at(e), &edge);
   });
 }
 
