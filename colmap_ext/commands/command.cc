@@ -158,4 +158,22 @@ Status PrepareOutputFolder(const std::string& path) {
   return Status::Ok();
 }
 
+Status WriteTextFile(const std::string& path, const std::string& text) {
+  const std::string temporary = path + ".tmp";
+  {
+    std::ofstream file(temporary, std::ios::binary);
+    file << text;
+    file.close();
+    if (file) {
+      std::error_code error;
+      fs::rename(temporary, path, error);
+      if (!error) return Status::Ok();
+    }
+  }
+  std::error_code ignored;
+  fs::remove(temporary, ignored);
+  return Status::Error("cannot write " + path +
+                       "; choose a path in a folder that is writable");
+}
+
 }  // namespace adasfm

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <boost/program_options.hpp>
+#include <sstream>
 #include <string>
 
 #include "core/status.h"
@@ -81,6 +82,17 @@ Status CheckOptions(const Options& options) {
 // cannot be written to.
 Status PrepareOutputFolder(const std::string& path);
 
+// Writes a file under a temporary name and renames it when it is complete.
+Status WriteTextFile(const std::string& path, const std::string& text);
+
+// A value as the help shows it.
+template <typename T>
+std::string OptionText(const T& value) {
+  std::ostringstream text;
+  text << value;
+  return text.str();
+}
+
 template <typename T>
 void CommandOptions::AddRequired(const std::string& name, T* value,
                                  const std::string& help) {
@@ -92,10 +104,10 @@ void CommandOptions::AddRequired(const std::string& name, T* value,
 template <typename T>
 void CommandOptions::AddDefault(const std::string& name, T* value,
                                 const std::string& help) {
-  options_.add_options()(
-      name.c_str(),
-      boost::program_options::value<T>(value)->default_value(*value),
-      help.c_str());
+  options_.add_options()(name.c_str(),
+                         boost::program_options::value<T>(value)->default_value(
+                             *value, OptionText(*value)),
+                         help.c_str());
 }
 
 }  // namespace adasfm

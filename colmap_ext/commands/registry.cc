@@ -4,7 +4,12 @@
 namespace adasfm {
 
 const std::vector<Command>& Commands() {
-  static const std::vector<Command> commands = {};
+  static const std::vector<Command> commands = {
+      {"adasfm_evaluator", "compares a model with the ground truth",
+       RunAdasfmEvaluator},
+      {"adasfm_restorer", "undoes what adasfm_global rewrote in the database",
+       RunAdasfmRestorer},
+  };
   return commands;
 }
 

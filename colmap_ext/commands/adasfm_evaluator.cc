@@ -1,0 +1,86 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <fstream>
+#include <iostream>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "colmap_ext/commands/registry.h"
+#include "colmap_ext/evaluation.h"
+#include "colmap_ext/host/model.h"
+
+namespace adasfm {
+namespace {
+
+struct LargestModel {
+  colmap::Reconstruction reconstruction;
+  int num_models = 0;
+};
+
+StatusOr<LargestModel> ReadLargestModel(const std::string& path) {
+  const std::vector<std::string> folders = FindModels(path);
+  if (folders.empty()) {
+    return Status::Error("there is no COLMAP model in " + path +
+                         "; check --input_path");
+  }
+  std::optional<LargestModel> largest;
+  for (const std::string& folder : folders) {
+    StatusOr<colmap::Reconstruction> model = ReadModel(folder);
+    if (!model.ok()) return model.status();
+    if (!largest.has_value() ||
+        model->NumRegImages() > largest->reconstruction.NumRegImages()) {
+      largest = LargestModel{std::move(model).value(), 0};
+    }
+  }
+  largest->num_models = folders.size();
+  return *std::move(largest);
+}
+
+}  // namespace
+
+Status RunAdasfmEvaluator(int argc, char** argv) {
+  std::string input_path;
+  std::string ground_truth_path;
+  std::string json_path;
+  GroundTruthOptions options;
+  CommandOptions command("adasfm_evaluator",
+                         "Compares a model with the ground truth.");
+  command.AddRequired("input_path", &input_path,
+                      "model folder, or a folder of models, of which the "
+                      "largest is compared");
+  command.AddRequired("ground_truth_path", &ground_truth_path,
+                      "true poses: a COLMAP model, a TUM trajectory, or lines "
+                      "`name qw qx qy qz tx ty tz` (cam_from_world)");
+  command.AddDefault("json_path", &json_path,
+                     "file for the figures as JSON; none when empty");
+  command.AddDefault("image_times_path", &options.image_times_path,
+                     "times of the images, for a trajectory; when empty, the "
+                     "names' digits are nanoseconds");
+  command.AddDefault("max_time_gap_s", &options.max_time_gap_s,
+                     "a trajectory is interpolated between poses at most this "
+                     "far apart [s]");
+  const Status parsed = command.Parse(argc, argv);
+  if (!parsed.ok() || command.HelpShown()) return parsed;
+  const Status valid = CheckOptions(options);
+  if (!valid.ok()) return valid;
+
+  StatusOr<LargestModel> model = ReadLargestModel(input_path);
+  if (!model.ok()) return model.status();
+  std::vector<std::string> image_names;
+  for (const auto& [name, pose] : PosesOfModel(model->reconstruction)) {
+    image_names.push_back(name);
+  }
+  const StatusOr<NamedPoses> truth =
+      ReadGroundTruth(ground_truth_path, image_names, options);
+  if (!truth.ok()) return truth.status();
+  StatusOr<Evaluation> evaluation =
+      EvaluateModel(model->reconstruction, *truth);
+  if (!evaluation.ok()) return evaluation.status();
+  evaluation->num_models = model->num_models;
+  std::cout << FormatEvaluation(*evaluation) << std::flush;
+  if (json_path.empty()) return Status::Ok();
+  return WriteTextFile(json_path, EvaluationToJson(*evaluation) + "\n");
+}
+
+}  // namespace adasfm

@@ -1,0 +1,159 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <filesystem>
+#include <iostream>
+#include <opencv2/imgcodecs.hpp>
+#include <set>
+#include <stdexcept>
+#include <string>
+
+#include "colmap_ext/commands/command.h"
+#include "colmap_ext/commands/registry.h"
+#include "colmap_ext/write_synthetic_world.h"
+#include "synthetic/render_world.h"
+
+namespace adasfm {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct SynthesizerOptions {
+  std::string output_path;
+  std::string camera_model = "PINHOLE";
+  std::string trajectory = "town";
+  bool render = false;
+  SyntheticWorldOptions world;
+};
+
+void AddOptions(SynthesizerOptions* options, CommandOptions* command) {
+  SyntheticWorldOptions* world = &options->world;
+  command->AddRequired("output_path", &options->output_path,
+                       "folder for the world");
+  command->AddDefault("num_images", &world->num_images, "images of the drive");
+  command->AddDefault("seed", &world->seed, "equal seeds give equal worlds");
+  command->AddDefault("spacing", &world->spacing_m,
+                      "mean distance between images [m]");
+  command->AddDefault("trajectory", &options->trajectory,
+                      "town (bends and revisits) or straight");
+  command->AddDefault("camera_model", &options->camera_model,
+                      "PINHOLE or OPENCV_FISHEYE");
+  command->AddDefault("image_width", &world->image_width, "[px]");
+  command->AddDefault("image_height", &world->image_height, "[px]");
+  command->AddDefault("num_keypoints", &world->num_keypoints_per_image,
+                      "keypoints per image of the database");
+  command->AddDefault("pixel_noise", &world->pixel_noise_px,
+                      "noise of keypoints, 1 sigma [px]");
+  command->AddDefault("outlier_ratio", &world->outlier_match_ratio,
+                      "share of raw matches that are wrong");
+  command->AddDefault("num_neighbors", &world->num_sequential_neighbors,
+                      "images matched with so many of the next ones");
+  command->AddDefault("alias_ratio", &world->alias_pair_ratio,
+                      "share of pairs that join look-alike places");
+  command->AddDefault("num_blackouts", &world->num_blackouts,
+                      "intervals without texture");
+  command->AddDefault("blackout_images", &world->blackout_num_images,
+                      "images of each such interval");
+  command->AddDefault("wheel_slips", &world->num_wheel_slips,
+                      "intervals in which the wheels slip");
+  command->AddDefault("wheel_scale", &world->wheel_scale,
+                      "true speed per logged speed");
+  command->AddDefault("wheel_noise", &world->wheel_speed_noise,
+                      "noise of the wheel speeds, 1 sigma [m/s]");
+  command->AddDefault("standstill", &world->standstill_s,
+                      "time at rest at the start [s]");
+  command->AddDefault("timeshift_cam_imu", &world->timeshift_cam_imu_s,
+                      "IMU time minus camera time [s]");
+  command->AddDefault("render", &options->render,
+                      "1: photos in images/ instead of a database");
+}
+
+Status Translate(SynthesizerOptions* options) {
+  if (options->trajectory == "straight") {
+    options->world.trajectory = SyntheticTrajectory::kStraight;
+  } else if (options->trajectory != "town") {
+    return Status::Error("trajectory = " + options->trajectory +
+                         ", but it must be town or straight");
+  }
+  if (options->camera_model == "OPENCV_FISHEYE") {
+    options->world.camera_model = SyntheticCameraModel::kFisheye;
+  } else if (options->camera_model != "PINHOLE") {
+    return Status::Error("camera_model = " + options->camera_model +
+                         ", but it must be PINHOLE or OPENCV_FISHEYE");
+  }
+  return CheckOptions(options->world);
+}
+
+// Photos of another world in the folder would end up in the user's model.
+Status CheckPhotoFolder(const SyntheticWorld& world, const fs::path& folder) {
+  std::set<std::string> names;
+  for (const SyntheticImage& image : world.images) names.insert(image.name);
+  for (const fs::directory_entry& entry : fs::directory_iterator(folder)) {
+    if (names.count(entry.path().filename().string()) == 0) {
+      return Status::Error(
+          "the folder " + folder.string() + " holds other files, as " +
+          entry.path().filename().string() + "; choose an empty output folder");
+    }
+  }
+  return Status::Ok();
+}
+
+Status WritePhotos(const SyntheticWorld& world, const fs::path& folder) {
+  Status status = PrepareOutputFolder(folder.string());
+  if (status.ok()) status = CheckPhotoFolder(world, folder);
+  if (!status.ok()) return status;
+  WorldRenderer renderer(world);
+  for (size_t i = 0; i < world.images.size(); ++i) {
+    const fs::path path = folder / world.images[i].name;
+    bool written = false;
+    try {
+      written = cv::imwrite(path.string(), renderer.Render(i));
+    } catch (const cv::Exception&) {
+      // OpenCV reports a full disk either way.
+    }
+    if (!written) {
+      return Status::Error("cannot write " + path.string() +
+                           "; check the free space");
+    }
+    if ((i + 1) % 25 == 0 || i + 1 == world.images.size()) {
+      std::cout << "Rendered " << i + 1 << " of " << world.images.size()
+                << " photos" << std::endl;
+    }
+  }
+  return Status::Ok();
+}
+
+}  // namespace
+
+Status RunAdasfmSynthesizer(int argc, char** argv) {
+  SynthesizerOptions options;
+  CommandOptions command(
+      "adasfm_synthesizer",
+      "Makes a drive through a town with ground truth: IMU and wheel logs, and "
+      "a database with verified matches or photos.");
+  AddOptions(&options, &command);
+  Status status = command.Parse(argc, argv);
+  if (!status.ok() || command.HelpShown()) return status;
+  status = Translate(&options);
+  if (status.ok()) status = PrepareOutputFolder(options.output_path);
+  if (!status.ok()) return status;
+
+  SyntheticWorld world;
+  try {
+    world = BuildSyntheticWorld(options.world);
+  } catch (const std::invalid_argument& error) {
+    return Status::Error(error.what());
+  }
+  status = WriteSyntheticLogs(world, options.output_path);
+  if (!status.ok()) return status;
+  const fs::path folder(options.output_path);
+  status = options.render ? WritePhotos(world, folder / "images")
+                          : WriteSyntheticDatabase(
+                                world, (folder / "database.db").string());
+  if (!status.ok()) return status;
+  std::cout << "Wrote " << world.images.size() << " images, "
+            << world.pairs.size() << " matched pairs and "
+            << world.imu_samples.size() << " IMU samples to "
+            << options.output_path << std::endl;
+  return Status::Ok();
+}
+
+}  // namespace adasfm

@@ -1,0 +1,334 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "colmap_ext/evaluation.h"
+
+#include <base/projection.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdarg>
+#include <cstdio>
+#include <nlohmann/json.hpp>
+#include <utility>
+
+#include "core/random.h"
+#include "core/sim3d.h"
+#include "core/so3.h"
+
+namespace adasfm {
+namespace {
+
+constexpr double kAucThresholdsDeg[] = {0.1, 0.5, 1.0, 3.0, 5.0, 10.0, 20.0};
+
+// All pairs up to here (2,000 images); beyond, as many at random, which settles
+// a percentage to 0.1.
+constexpr size_t kMaxNumAucPairs = 2000000;
+
+constexpr int kNumTrimmedRefits = 5;
+constexpr double kTrimFactor = 3.0;
+constexpr double kMinTrimThreshold = 1e-6;
+
+struct PosePair {
+  Rigid3d cam_from_world;
+  Rigid3d true_cam_from_world;
+};
+
+double Median(std::vector<double> values) {
+  const size_t middle = values.size() / 2;
+  std::nth_element(values.begin(), values.begin() + middle, values.end());
+  if (values.size() % 2 == 1) return values[middle];
+  return 0.5 * (values[middle] +
+                *std::max_element(values.begin(), values.begin() + middle));
+}
+
+double Mean(const std::vector<double>& values) {
+  double sum = 0.0;
+  for (const double value : values) sum += value;
+  return sum / values.size();
+}
+
+std::vector<double> ComputeDistances(const std::vector<PosePair>& poses,
+                                     const Sim3d& true_from_model) {
+  std::vector<double> distances;
+  distances.reserve(poses.size());
+  for (const PosePair& pose : poses) {
+    distances.push_back(
+        (true_from_model * pose.cam_from_world.TargetOriginInSource() -
+         pose.true_cam_from_world.TargetOriginInSource())
+            .norm());
+  }
+  return distances;
+}
+
+// Least squares over the poses nearer than the threshold.
+bool Align(const std::vector<PosePair>& poses,
+           const std::vector<double>& distances, double threshold,
+           const AlignmentOptions& options, Sim3d* true_from_model) {
+  std::vector<Eigen::Vector3d> centers;
+  std::vector<Eigen::Vector3d> true_centers;
+  for (size_t i = 0; i < poses.size(); ++i) {
+    if (!(distances[i] < threshold)) continue;
+    centers.push_back(poses[i].cam_from_world.TargetOriginInSource());
+    true_centers.push_back(poses[i].true_cam_from_world.TargetOriginInSource());
+  }
+  return EstimateSim3d(centers, true_centers, options, true_from_model);
+}
+
+AlignmentErrors ComputeErrors(const std::vector<PosePair>& poses,
+                              const Sim3d& true_from_model) {
+  const std::vector<double> distances =
+      ComputeDistances(poses, true_from_model);
+  std::vector<double> angles_deg;
+  double sum_squares = 0.0;
+  for (size_t i = 0; i < poses.size(); ++i) {
+    const Rigid3d aligned =
+        TransformCamFromWorld(true_from_model, poses[i].cam_from_world);
+    angles_deg.push_back(RadToDeg(AngleBetweenRad(
+        aligned.rotation, poses[i].true_cam_from_world.rotation)));
+    sum_squares += distances[i] * distances[i];
+  }
+  AlignmentErrors errors;
+  errors.scale = true_from_model.scale;
+  errors.translation_rmse_m = std::sqrt(sum_squares / poses.size());
+  errors.translation_mean_m = Mean(distances);
+  errors.translation_median_m = Median(distances);
+  errors.translation_max_m =
+      *std::max_element(distances.begin(), distances.end());
+  errors.rotation_mean_deg = Mean(angles_deg);
+  errors.rotation_median_deg = Median(angles_deg);
+  return errors;
+}
+
+// False when the positions do not determine the alignment.
+bool AlignAndCompare(const std::vector<PosePair>& poses,
+                     const AlignmentOptions& options,
+                     AlignmentErrors* least_squares, AlignmentErrors* robust) {
+  Sim3d true_from_model;
+  if (!Align(poses, std::vector<double>(poses.size(), 0.0), 1.0, options,
+             &true_from_model)) {
+    return false;
+  }
+  *least_squares = ComputeErrors(poses, true_from_model);
+  for (int i = 0; i < kNumTrimmedRefits; ++i) {
+    const std::vector<double> distances =
+        ComputeDistances(poses, true_from_model);
+    const double threshold =
+        std::max(kTrimFactor * Median(distances), kMinTrimThreshold);
+    if (!Align(poses, distances, threshold, options, &true_from_model)) break;
+  }
+  *robust = ComputeErrors(poses, true_from_model);
+  return true;
+}
+
+// Sums over pairs of the area that one error leaves under the recall curve.
+class AucCounter {
+ public:
+  void Add(double error_deg) {
+    ++count_;
+    for (size_t k = 0; k < std::size(kAucThresholdsDeg); ++k) {
+      sums_[k] += std::max(0.0, 1.0 - error_deg / kAucThresholdsDeg[k]);
+    }
+  }
+  double Percent(size_t k) const {
+    return count_ == 0 ? 0.0 : 100.0 * sums_[k] / count_;
+  }
+
+ private:
+  int64_t count_ = 0;
+  double sums_[std::size(kAucThresholdsDeg)] = {};
+};
+
+std::vector<RelativePoseAuc> ComputeAuc(const std::vector<PosePair>& poses) {
+  AucCounter rotations;
+  AucCounter directions;
+  const auto add = [&](const PosePair& a, const PosePair& b) {
+    const Rigid3d relative =
+        ComputeCam2FromCam1(a.cam_from_world, b.cam_from_world);
+    const Rigid3d true_relative =
+        ComputeCam2FromCam1(a.true_cam_from_world, b.true_cam_from_world);
+    rotations.Add(
+        RadToDeg(AngleBetweenRad(relative.rotation, true_relative.rotation)));
+    // Without a true baseline there is no direction to be right or wrong.
+    if (true_relative.translation.isZero()) return;
+    directions.Add(relative.translation.isZero()
+                       ? 180.0
+                       : RadToDeg(AngleBetweenRad(relative.translation,
+                                                  true_relative.translation)));
+  };
+  const size_t n = poses.size();
+  if (n * (n - 1) / 2 <= kMaxNumAucPairs) {
+    for (size_t i = 0; i < n; ++i) {
+      for (size_t j = i + 1; j < n; ++j) add(poses[i], poses[j]);
+    }
+  } else {
+    Random random(1);
+    for (size_t k = 0; k < kMaxNumAucPairs; ++k) {
+      const size_t i = random.UniformInt(0, n - 1);
+      const size_t j = random.UniformInt(0, n - 2);
+      add(poses[i], poses[j < i ? j : j + 1]);
+    }
+  }
+  std::vector<RelativePoseAuc> auc;
+  for (size_t k = 0; k < std::size(kAucThresholdsDeg); ++k) {
+    auc.push_back(
+        {kAucThresholdsDeg[k], rotations.Percent(k), directions.Percent(k)});
+  }
+  return auc;
+}
+
+// COLMAP's error of a point: the mean over its observations.
+double MeanError(const colmap::Reconstruction& reconstruction,
+                 const colmap::Point3D& point) {
+  double sum_px = 0.0;
+  for (const colmap::TrackElement& element : point.Track().Elements()) {
+    const colmap::Image& image = reconstruction.Image(element.image_id);
+    sum_px += std::sqrt(colmap::CalculateSquaredReprojectionError(
+        image.Point2D(element.point2D_idx).XY(), point.XYZ(), image.Qvec(),
+        image.Tvec(), reconstruction.Camera(image.CameraId())));
+  }
+  return sum_px / point.Track().Length();
+}
+
+std::string Format(const char* format, ...) {
+  va_list arguments;
+  va_start(arguments, format);
+  char buffer[256];
+  std::vsnprintf(buffer, sizeof(buffer), format, arguments);
+  va_end(arguments);
+  return buffer;
+}
+
+std::string FormatErrors(const char* name, const AlignmentErrors& errors) {
+  return Format("%-20s %9.5f %9.4f %9.4f %9.4f %9.4f %9.4f %9.4f\n", name,
+                errors.scale, errors.translation_rmse_m,
+                errors.translation_mean_m, errors.translation_median_m,
+                errors.translation_max_m, errors.rotation_mean_deg,
+                errors.rotation_median_deg);
+}
+
+nlohmann::ordered_json ErrorsToJson(const AlignmentErrors& errors) {
+  return {{"scale", errors.scale},
+          {"translation_rmse_m", errors.translation_rmse_m},
+          {"translation_mean_m", errors.translation_mean_m},
+          {"translation_median_m", errors.translation_median_m},
+          {"translation_max_m", errors.translation_max_m},
+          {"rotation_mean_deg", errors.rotation_mean_deg},
+          {"rotation_median_deg", errors.rotation_median_deg}};
+}
+
+}  // namespace
+
+StatusOr<Evaluation> EvaluatePoses(const NamedPoses& cams_from_world,
+                                   const NamedPoses& true_cams_from_world) {
+  std::vector<PosePair> poses;
+  for (const auto& [name, cam_from_world] : cams_from_world) {
+    const auto truth = true_cams_from_world.find(name);
+    if (truth == true_cams_from_world.end()) continue;
+    poses.push_back({cam_from_world, truth->second});
+  }
+  Evaluation evaluation;
+  evaluation.num_images = cams_from_world.size();
+  evaluation.num_true_images = true_cams_from_world.size();
+  evaluation.num_common_images = poses.size();
+  if (poses.size() < 3) {
+    return Status::Error(
+        "the model and the ground truth have only " +
+        std::to_string(poses.size()) +
+        " images in common, of 3 that are needed; compare the image names");
+  }
+  AlignmentOptions metric;
+  metric.estimate_scale = false;
+  if (!AlignAndCompare(poses, AlignmentOptions(),
+                       &evaluation.sim3_least_squares, &evaluation.sim3) ||
+      !AlignAndCompare(poses, metric, &evaluation.se3_least_squares,
+                       &evaluation.se3)) {
+    return Status::Error(
+        "the images in common with the ground truth lie all in one place, so "
+        "the model cannot be aligned to it");
+  }
+  evaluation.relative_pose_auc = ComputeAuc(poses);
+  return evaluation;
+}
+
+NamedPoses PosesOfModel(const colmap::Reconstruction& reconstruction) {
+  NamedPoses poses;
+  for (const image_t image_id : reconstruction.RegImageIds()) {
+    const colmap::Image& image = reconstruction.Image(image_id);
+    const Eigen::Vector4d& qvec = image.Qvec();
+    poses[image.Name()] = Rigid3d(
+        Eigen::Quaterniond(qvec(0), qvec(1), qvec(2), qvec(3)), image.Tvec());
+  }
+  return poses;
+}
+
+StatusOr<Evaluation> EvaluateModel(const colmap::Reconstruction& reconstruction,
+                                   const NamedPoses& true_cams_from_world) {
+  StatusOr<Evaluation> evaluation =
+      EvaluatePoses(PosesOfModel(reconstruction), true_cams_from_world);
+  if (!evaluation.ok()) return evaluation;
+  int64_t num_observations = 0;
+  double sum_squares = 0.0;
+  for (const auto& [point3D_id, point] : reconstruction.Points3D()) {
+    const double error_px =
+        point.HasError() ? point.Error() : MeanError(reconstruction, point);
+    num_observations += point.Track().Length();
+    sum_squares += error_px * error_px * point.Track().Length();
+  }
+  evaluation->num_points = reconstruction.NumPoints3D();
+  if (num_observations > 0) {
+    evaluation->mean_track_length =
+        static_cast<double>(num_observations) / evaluation->num_points;
+    evaluation->rmse_px = std::sqrt(sum_squares / num_observations);
+  }
+  return evaluation;
+}
+
+std::string FormatEvaluation(const Evaluation& evaluation) {
+  std::string text;
+  text += Format("models              %d%s\n", evaluation.num_models,
+                 evaluation.num_models > 1 ? " (the largest is compared)" : "");
+  text += Format("images              %d, ground truth %d, in both %d\n",
+                 evaluation.num_images, evaluation.num_true_images,
+                 evaluation.num_common_images);
+  text += Format("points              %lld\n",
+                 static_cast<long long>(evaluation.num_points));
+  text += Format("mean track length   %.2f\n", evaluation.mean_track_length);
+  text += Format("RMSE                %.3f px\n\n", evaluation.rmse_px);
+  text +=
+      Format("%-20s %9s %9s %9s %9s %9s %9s %9s\n", "alignment", "scale",
+             "RMSE m", "mean m", "median m", "max m", "mean deg", "med. deg");
+  text += FormatErrors("Sim3, robust", evaluation.sim3);
+  text += FormatErrors("Sim3, least squares", evaluation.sim3_least_squares);
+  text += FormatErrors("SE3, robust", evaluation.se3);
+  text += FormatErrors("SE3, least squares", evaluation.se3_least_squares);
+  text += "\nrelative poses, area under the recall curve in percent\n";
+  text += Format("%-10s %9s %9s\n", "up to deg", "R", "t");
+  for (const RelativePoseAuc& auc : evaluation.relative_pose_auc) {
+    text += Format("%-10g %9.2f %9.2f\n", auc.threshold_deg,
+                   auc.rotation_percent, auc.translation_percent);
+  }
+  return text;
+}
+
+std::string EvaluationToJson(const Evaluation& evaluation) {
+  nlohmann::ordered_json json = {
+      {"num_models", evaluation.num_models},
+      {"num_images", evaluation.num_images},
+      {"num_true_images", evaluation.num_true_images},
+      {"num_common_images", evaluation.num_common_images},
+      {"num_points", evaluation.num_points},
+      {"mean_track_length", evaluation.mean_track_length},
+      {"rmse_px", evaluation.rmse_px},
+      {"sim3", ErrorsToJson(evaluation.sim3)},
+      {"sim3_least_squares", ErrorsToJson(evaluation.sim3_least_squares)},
+      {"se3", ErrorsToJson(evaluation.se3)},
+      {"se3_least_squares", ErrorsToJson(evaluation.se3_least_squares)}};
+  for (const RelativePoseAuc& auc : evaluation.relative_pose_auc) {
+    json["relative_pose_auc"].push_back(
+        {{"threshold_deg", auc.threshold_deg},
+         {"rotation_percent", auc.rotation_percent},
+         {"translation_percent", auc.translation_percent}});
+  }
+  return json.dump(2);
+}
+
+}  // namespace adasfm

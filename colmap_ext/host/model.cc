@@ -1,0 +1,167 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "colmap_ext/host/model.h"
+
+#include <base/camera_models.h>
+
+#include <algorithm>
+#include <cstdint>
+#include <filesystem>
+#include <fstream>
+
+namespace adasfm {
+namespace {
+
+namespace fs = std::filesystem;
+
+// Walks through a binary file without believing its counts.
+class BinaryWalker {
+ public:
+  explicit BinaryWalker(const std::string& path)
+      : file_(path, std::ios::binary) {
+    std::error_code error;
+    const uintmax_t size = fs::file_size(path, error);
+    if (!error) num_bytes_left_ = size;
+  }
+
+  // False at the end of the file, and from then on.
+  bool Skip(uint64_t num_bytes) {
+    if (!Take(num_bytes)) return false;
+    file_.ignore(num_bytes);
+    return static_cast<bool>(file_);
+  }
+
+  bool SkipArray(uint64_t count, uint64_t element_num_bytes) {
+    return count <= num_bytes_left_ / element_num_bytes &&
+           Skip(count * element_num_bytes);
+  }
+
+  template <typename T>
+  bool Read(T* value) {
+    return Take(sizeof(T)) &&
+           file_.read(reinterpret_cast<char*>(value), sizeof(T));
+  }
+
+  bool SkipName() {
+    char c = 1;
+    while (c != '\0') {
+      if (!Read(&c)) return false;
+    }
+    return true;
+  }
+
+  bool AtEnd() const { return num_bytes_left_ == 0; }
+
+ private:
+  bool Take(uint64_t num_bytes) {
+    if (num_bytes > num_bytes_left_) return false;
+    num_bytes_left_ -= num_bytes;
+    return true;
+  }
+
+  std::ifstream file_;
+  uint64_t num_bytes_left_ = 0;
+};
+
+bool IsCamerasFile(const std::string& path) {
+  BinaryWalker walker(path);
+  uint64_t count = 0;
+  if (!walker.Read(&count)) return false;
+  for (uint64_t i = 0; i < count; ++i) {
+    int32_t model_id = 0;
+    if (!walker.Skip(4) || !walker.Read(&model_id) ||
+        !colmap::ExistsCameraModelWithId(model_id) || !walker.Skip(16) ||
+        !walker.SkipArray(colmap::CameraModelNumParams(model_id), 8)) {
+      return false;
+    }
+  }
+  return walker.AtEnd();
+}
+
+bool IsImagesFile(const std::string& path) {
+  BinaryWalker walker(path);
+  uint64_t count = 0;
+  if (!walker.Read(&count)) return false;
+  for (uint64_t i = 0; i < count; ++i) {
+    uint64_t num_points = 0;
+    // Id, pose, camera id; name; points.
+    if (!walker.Skip(4 + 7 * 8 + 4) || !walker.SkipName() ||
+        !walker.Read(&num_points) || !walker.SkipArray(num_points, 24)) {
+      return false;
+    }
+  }
+  return walker.AtEnd();
+}
+
+bool IsPointsFile(const std::string& path) {
+  BinaryWalker walker(path);
+  uint64_t count = 0;
+  if (!walker.Read(&count)) return false;
+  for (uint64_t i = 0; i < count; ++i) {
+    uint64_t track_length = 0;
+    // Id, position, colour, error; track.
+    if (!walker.Skip(8 + 3 * 8 + 3 + 8) || !walker.Read(&track_length) ||
+        !walker.SkipArray(track_length, 8)) {
+      return false;
+    }
+  }
+  return walker.AtEnd();
+}
+
+bool HasFiles(const std::string& path, const std::string& extension) {
+  std::error_code error;
+  for (const char* name : {"cameras", "images", "points3D"}) {
+    if (!fs::is_regular_file(fs::path(path) / (name + extension), error)) {
+      return false;
+    }
+  }
+  return true;
+}
+
+}  // namespace
+
+std::vector<std::string> FindModels(const std::string& path) {
+  const auto has_model = [](const std::string& folder) {
+    return HasFiles(folder, ".bin") || HasFiles(folder, ".txt");
+  };
+  if (has_model(path)) return {path};
+  std::vector<std::string> models;
+  std::error_code error;
+  for (const fs::directory_entry& entry : fs::directory_iterator(path, error)) {
+    const std::string folder = entry.path().string();
+    if (has_model(folder)) models.push_back(folder);
+  }
+  std::sort(models.begin(), models.end());
+  return models;
+}
+
+StatusOr<colmap::Reconstruction> ReadModel(const std::string& path) {
+  const bool is_binary = HasFiles(path, ".bin");
+  if (!is_binary && !HasFiles(path, ".txt")) {
+    return Status::Error("there is no COLMAP model in " + path +
+                         " (cameras, images and points3D as .bin or .txt); "
+                         "check the path");
+  }
+  if (is_binary) {
+    const fs::path folder(path);
+    const std::pair<std::string, bool (*)(const std::string&)> files[] = {
+        {(folder / "cameras.bin").string(), IsCamerasFile},
+        {(folder / "images.bin").string(), IsImagesFile},
+        {(folder / "points3D.bin").string(), IsPointsFile}};
+    for (const auto& [file, is_valid] : files) {
+      if (is_valid(file)) continue;
+      return Status::Error(file +
+                           " is cut short or not COLMAP's; make the model "
+                           "again");
+    }
+  }
+  colmap::Reconstruction reconstruction;
+  try {
+    reconstruction.Read(path);
+  } catch (const std::exception& error) {
+    return Status::Error("cannot read the model in " + path + ": " +
+                         error.what() + "; make the model again");
+  }
+  return reconstruction;
+}
+
+}  // namespace adasfm

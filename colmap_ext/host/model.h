@@ -1,0 +1,22 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <base/reconstruction.h>
+
+#include <string>
+#include <vector>
+
+#include "core/status.h"
+
+namespace adasfm {
+
+// The model folders at a path: the path itself when it holds a model, else
+// those of its subfolders that do, sorted by name.
+std::vector<std::string> FindModels(const std::string& path);
+
+// Reads a binary or text model. Files that are missing, cut short or otherwise
+// malformed are an error; COLMAP's own reader would end the process, or never
+// return.
+StatusOr<colmap::Reconstruction> ReadModel(const std::string& path);
+
+}  // namespace adasfm
