@@ -321,6 +321,28 @@ TEST(AdjustBundleTest, EverySizeOfSolverGivesTheSame) {
   EXPECT_NEAR(costs[2], costs[0], 1e-2 * costs[0]);
 }
 
+TEST(AdjustBundleTest, ThreadsChangeNothing) {
+  BundleWorldOptions world;
+  world.num_images = 40;
+  world.pixel_noise_px = 0.5;
+  std::vector<colmap::Reconstruction> results;
+  for (const int num_threads : {1, 2, 3}) {
+    results.push_back(BuildBundleWorld(world));
+    PerturbBundleWorld(2e-3, 0.05, 1, &results.back());
+    PriorBundleAdjustmentOptions options;
+    options.num_threads = num_threads;
+    ASSERT_TRUE(
+        AdjustBundle(options, ProblemOfAll(results.back()), &results.back())
+            .success);
+  }
+  for (const image_t id : results[0].RegImageIds()) {
+    for (const size_t i : {1, 2}) {
+      EXPECT_EQ(results[i].Image(id).Qvec(), results[0].Image(id).Qvec());
+      EXPECT_EQ(results[i].Image(id).Tvec(), results[0].Image(id).Tvec());
+    }
+  }
+}
+
 TEST(PosePriorEdgeFromPriorTest, TakesWhatTheFlagsClaim) {
   RelativePosePrior prior;
   prior.image_id1 = 1;
