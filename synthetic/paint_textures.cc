@@ -10,10 +10,14 @@ namespace {
 
 cv::Scalar Gray(double value) { return cv::Scalar(value, value, value); }
 
+// A colour of a brightness between low and high, with a tint as paint and stone
+// have it.
 cv::Scalar RandomColor(double low, double high, Random* random) {
-  const double b = random->Uniform(low, high);
-  const double g = random->Uniform(low, high);
-  return cv::Scalar(b, g, random->Uniform(low, high));
+  const double brightness = random->Uniform(low, high);
+  const double warmth = random->Uniform(-12.0, 25.0);
+  const double green = random->Uniform(-8.0, 8.0);
+  return cv::Scalar(brightness - warmth, brightness + green,
+                    brightness + warmth);
 }
 
 // Adds noise of one grain size to all channels.

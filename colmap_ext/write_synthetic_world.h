@@ -1,0 +1,26 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+// COLMAP specialises vectors of Eigen's types: before anything that uses them.
+#include <util/alignment.h>
+
+#include <string>
+
+#include "core/status.h"
+#include "synthetic/synthetic_world.h"
+
+namespace adasfm {
+
+// Writes the world as a COLMAP database at `path`: the camera with its focal
+// length marked as known, images, keypoints, raw matches and two-view
+// geometries (CALIBRATED, with E and pose). An older file there is replaced
+// when the new one is complete.
+Status WriteSyntheticDatabase(const SyntheticWorld& world,
+                              const std::string& path);
+
+// Writes imu.csv, wheel.csv, times.csv, sensors.yaml and gt.txt into the
+// folder, in the formats that the importer and the evaluator read.
+Status WriteSyntheticLogs(const SyntheticWorld& world,
+                          const std::string& folder);
+
+}  // namespace adasfm
