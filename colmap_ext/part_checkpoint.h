@@ -1,0 +1,46 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <base/reconstruction.h>
+
+#include <set>
+#include <string>
+
+#include "core/status.h"
+#include "core/types.h"
+
+namespace adasfm {
+
+// What is said about one part.
+struct PartReport {
+  int part_index = 0;
+  // Empty for a part that was reconstructed; otherwise why it was not.
+  std::string failure;
+  int num_images = 0;
+  int num_registered = 0;
+  int num_points = 0;
+  int num_registered_by_global_pose = 0;
+  int num_global_adjustments = 0;
+  double mean_reproj_error_px = 0.0;
+  double seconds = 0.0;
+  // Set when the first try threw.
+  std::string retry_reason;
+  std::set<image_t> prior_only_images;
+};
+
+// A part's folder: part.json and, unless the part failed, the model's three
+// files. It appears under its name when all of it is on the disk.
+Status WritePartCheckpoint(const std::string& path,
+                           const std::string& fingerprint,
+                           const PartReport& report,
+                           const colmap::Reconstruction* reconstruction);
+
+// An error when the folder is missing, damaged or of another fingerprint.
+StatusOr<PartReport> ReadPartReport(const std::string& path,
+                                    const std::string& fingerprint);
+
+// The model of a part whose report has no failure.
+void ReadPartModel(const std::string& path,
+                   colmap::Reconstruction* reconstruction);
+
+}  // namespace adasfm
