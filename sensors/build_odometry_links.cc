@@ -15,10 +15,12 @@ constexpr double kMaxFilledGapS = 600.0;
 // A standstill: half the window, and what an idling engine may add to the
 // sensors' own noise.
 constexpr double kHalfWindowS = 0.5;
-constexpr double kIdleRate = 0.005;  // rad/s
-constexpr double kIdleForce = 0.05;  // m/s^2
-constexpr double kMaxBias = 0.03;    // rad/s
-constexpr double kIdleSpeed = 0.02;  // m/s
+constexpr double kIdleRate = 0.005;       // rad/s
+constexpr double kIdleForce = 0.05;       // m/s^2
+constexpr double kIdleRateDrift = 0.002;  // rad/s
+constexpr double kIdleForceDrift = 0.03;  // m/s^2
+constexpr double kMaxBias = 0.03;         // rad/s
+constexpr double kIdleSpeed = 0.02;       // m/s
 
 timestamp_t NsFromSeconds(double seconds) {
   return std::llround(1e9 * seconds);
@@ -55,6 +57,31 @@ void AppendFilled(timestamp_t end_ns, timestamp_t max_step_ns,
     }
   }
   times->push_back(end_ns);
+}
+
+struct SampleMoments {
+  Eigen::Vector3d mean_rate = Eigen::Vector3d::Zero();
+  Eigen::Vector3d mean_force = Eigen::Vector3d::Zero();
+  double rate_sigma = 0.0;  // of one axis
+  double force_sigma = 0.0;
+};
+
+SampleMoments ComputeMoments(std::vector<ImuSample>::const_iterator first,
+                             std::vector<ImuSample>::const_iterator last) {
+  SampleMoments moments;
+  const double count = std::max<double>(1.0, last - first);
+  for (auto it = first; it != last; ++it) {
+    moments.mean_rate += it->angular_velocity / count;
+    moments.mean_force += it->specific_force / count;
+  }
+  double rate_sum = 0.0, force_sum = 0.0;
+  for (auto it = first; it != last; ++it) {
+    rate_sum += (it->angular_velocity - moments.mean_rate).squaredNorm();
+    force_sum += (it->specific_force - moments.mean_force).squaredNorm();
+  }
+  moments.rate_sigma = std::sqrt(rate_sum / (3.0 * count));
+  moments.force_sigma = std::sqrt(force_sum / (3.0 * count));
+  return moments;
 }
 
 bool WheelsStandStill(const std::vector<WheelSpeed>& speeds,
@@ -182,37 +209,41 @@ OdometryTimeline BuildTimeline(const std::vector<timestamp_t>& times_ns,
   return timeline;
 }
 
-bool IsStandstill(const MotionLogs& logs, timestamp_t time_ns,
-                  const ImuNoise& noise, double imu_rate_hz) {
+StandstillKind FindStandstill(const MotionLogs& logs, timestamp_t time_ns,
+                              const ImuNoise& noise, double imu_rate_hz) {
   const timestamp_t half = NsFromSeconds(kHalfWindowS);
   const timestamp_t start = time_ns - half, end = time_ns + half;
   const auto first = FirstNotBefore(logs.imu, start);
   const auto last = FirstNotBefore(logs.imu, end);
   // Half a window is enough at the log's ends.
-  if ((last - first) < kHalfWindowS * imu_rate_hz) return false;
-  if (!logs.wheel.empty() && !WheelsStandStill(logs.wheel, start, end)) {
-    return false;
+  if ((last - first) < kHalfWindowS * imu_rate_hz) return StandstillKind::kNone;
+  const bool has_wheel = !logs.wheel.empty();
+  if (has_wheel && !WheelsStandStill(logs.wheel, start, end)) {
+    return StandstillKind::kNone;
   }
-  const double count = static_cast<double>(last - first);
-  Eigen::Vector3d mean_rate = Eigen::Vector3d::Zero();
-  Eigen::Vector3d mean_force = Eigen::Vector3d::Zero();
-  for (auto it = first; it != last; ++it) {
-    mean_rate += it->angular_velocity / count;
-    mean_force += it->specific_force / count;
-  }
-  if (mean_rate.norm() > kMaxBias) return false;
-  double rate_sum = 0.0, force_sum = 0.0;
-  for (auto it = first; it != last; ++it) {
-    rate_sum += (it->angular_velocity - mean_rate).squaredNorm();
-    force_sum += (it->specific_force - mean_force).squaredNorm();
-  }
+  const SampleMoments all = ComputeMoments(first, last);
+  // An idling engine shakes, but its means stay; those of a machine that
+  // creeps or rocks do not.
+  const auto middle = first + (last - first) / 2;
+  const SampleMoments head = ComputeMoments(first, middle);
+  const SampleMoments tail = ComputeMoments(middle, last);
   const double root_rate = std::sqrt(imu_rate_hz);
-  const double rate_sigma = std::sqrt(rate_sum / (3.0 * count));
-  const double force_sigma = std::sqrt(force_sum / (3.0 * count));
-  return rate_sigma <
-             kIdleRate + 1.5 * noise.gyroscope_noise_density * root_rate &&
-         force_sigma <
-             kIdleForce + 1.5 * noise.accelerometer_noise_density * root_rate;
+  const double root_half = 3.0 * std::sqrt(2.0 / kHalfWindowS);
+  const bool turns =
+      all.mean_rate.norm() > kMaxBias ||
+      (head.mean_rate - tail.mean_rate).norm() >
+          kIdleRateDrift + root_half * noise.gyroscope_noise_density ||
+      all.rate_sigma >
+          kIdleRate + 1.5 * noise.gyroscope_noise_density * root_rate;
+  const bool moves =
+      (head.mean_force - tail.mean_force).norm() >
+          kIdleForceDrift + root_half * noise.accelerometer_noise_density ||
+      all.force_sigma >
+          kIdleForce + 1.5 * noise.accelerometer_noise_density * root_rate;
+  if (turns) return StandstillKind::kNone;
+  if (!moves) return StandstillKind::kAtRest;
+  // Wheels that do not turn keep the heading even when the machine rocks.
+  return has_wheel ? StandstillKind::kNoTurn : StandstillKind::kNone;
 }
 
 std::vector<OdometryLink> BuildOdometryLinks(
@@ -236,8 +267,8 @@ std::vector<OdometryLink> BuildOdometryLinks(
       link.has_imu = true;
       link.imu = PreintegrateImu(logs.imu, start, end, bias,
                                  calibration.imu_noise, &profile);
-      link.is_standstill = IsStandstill(logs, (start + end) / 2,
-                                        calibration.imu_noise, imu_rate_hz);
+      link.standstill = FindStandstill(logs, (start + end) / 2,
+                                       calibration.imu_noise, imu_rate_hz);
     }
     if (CoversInterval(logs.odometry, start, end, options.max_wheel_gap_s)) {
       link.has_wheel = true;

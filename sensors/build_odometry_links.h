@@ -27,7 +27,7 @@ struct MotionLogs {
 struct OdometryLinkOptions {
   double max_imu_gap_s = 0.1;
   double max_wheel_gap_s = 0.25;
-  double max_link_s = 1.0;
+  double max_link_s = 0.5;
   double max_lead_s = 20.0;
   double lateral_speed_noise = 0.05;  // m/s/sqrt(Hz)
   double vertical_speed_noise = 0.2;  // m/s/sqrt(Hz)
@@ -46,10 +46,10 @@ OdometryTimeline BuildTimeline(const std::vector<timestamp_t>& times_ns,
                                const MotionLogs& logs,
                                const OdometryLinkOptions& options);
 
-// Whether the machine stands still in the second around a time: the IMU shows
-// noise only, and the wheels (if any) do not turn.
-bool IsStandstill(const MotionLogs& logs, timestamp_t time_ns,
-                  const ImuNoise& noise, double imu_rate_hz);
+// Whether the machine stands still in the second around a time: the wheels (if
+// any) do not turn and the IMU shows noise only.
+StandstillKind FindStandstill(const MotionLogs& logs, timestamp_t time_ns,
+                              const ImuNoise& noise, double imu_rate_hz);
 
 // One link between each two successive times. bias is subtracted from the IMU.
 std::vector<OdometryLink> BuildOdometryLinks(

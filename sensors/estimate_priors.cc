@@ -201,7 +201,7 @@ ImuBias PriorEstimator::FirstBias() const {
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();
   double time = 0.0;
   for (const OdometryLink& link : problem_.links) {
-    if (!link.is_standstill) continue;
+    if (link.standstill == StandstillKind::kNone) continue;
     sum += LogSo3(link.imu.delta_rotation);
     time += link.dt_s;
   }
@@ -331,6 +331,11 @@ void PriorEstimator::ListSlips() {
   std::vector<WheelSlip>& slips = estimate_.summary.wheel_slips;
   size_t last_link = 0;
   for (const auto& [link, speed_error] : fused_.slipping_links) {
+    // What happened before the first image or after the last is of no use.
+    if (link + 1 <= timeline_.indices.front() ||
+        link >= timeline_.indices.back()) {
+      continue;
+    }
     if (slips.empty() || link > last_link + 2) slips.emplace_back();
     WheelSlip& slip = slips.back();
     if (slip.end_ns == 0) {
@@ -351,7 +356,8 @@ void PriorEstimator::PredictDrift() {
   SensorSummary& summary = estimate_.summary;
   double moving_s = 0.0;
   for (const OdometryLink& link : problem_.links) {
-    if (link.has_wheel && !link.is_standstill) moving_s += link.dt_s;
+    if (link.has_wheel && link.standstill == StandstillKind::kNone)
+      moving_s += link.dt_s;
   }
   if (summary.distance_m <= 0.0 || moving_s <= 0.0) return;
   const double time = 100.0 * moving_s / summary.distance_m;
@@ -374,7 +380,8 @@ void PriorEstimator::FillSummary() {
   }
   summary.timeshift_cam_imu_s = SecondsFromNs(timeshift_ns_);
   for (const OdometryLink& link : problem_.links) {
-    if (link.is_standstill) summary.standstill_s += link.dt_s;
+    if (link.standstill != StandstillKind::kNone)
+      summary.standstill_s += link.dt_s;
   }
   for (size_t k = 0; k < problem_.links.size(); ++k) {
     if (!problem_.links[k].has_wheel) continue;

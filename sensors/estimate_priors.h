@@ -43,7 +43,7 @@ struct PriorEstimationOptions {
   double max_imu_gap_s = 0.1;
   double max_wheel_gap_s = 0.25;
   // Links are no longer than this: images further apart get states between.
-  double max_link_s = 1.0;
+  double max_link_s = 0.5;
   // Logs are used from this long before the first to this long after the last
   // image: a standstill there tells the biases.
   double max_lead_s = 20.0;

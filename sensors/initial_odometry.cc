@@ -27,7 +27,8 @@ Eigen::Quaterniond LinkRotation(const OdometryLink& link) {
 // The body's mean velocity over a link, in its frame at the start.
 Eigen::Vector3d MeanVelocity(const OdometryLink& link,
                              const Rigid3d& imu_from_wheel) {
-  if (!link.has_wheel || link.is_standstill || link.dt_s <= 0.0) {
+  if (!link.has_wheel || link.standstill == StandstillKind::kAtRest ||
+      link.dt_s <= 0.0) {
     return Eigen::Vector3d::Zero();
   }
   const Eigen::Vector3d& lever = imu_from_wheel.translation;

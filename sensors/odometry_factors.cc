@@ -255,6 +255,7 @@ void LinkBuilder::AddStandstill() {
   const double angle = options.standstill_rate_sigma * dt;
   AddRotationResidual(Eigen::Quaterniond::Identity(),
                       angle * angle * Eigen::Matrix3d::Identity());
+  if (link_.standstill != StandstillKind::kAtRest) return;
   AddVector(kSecond + ChainState::kStep, second_.step_in_previous,
             options.standstill_speed_sigma * dt);
   AddVector(kFirst + ChainState::kVelocity, first_.state.velocity_in_imu,
@@ -337,7 +338,7 @@ LinkResiduals ComputeLinkResiduals(const LinkContext& context,
   if (link.has_imu) builder.AddImu();
   builder.AddBiasWalk();
   if (link.has_wheel) builder.AddWheel(wheel_weight);
-  if (link.is_standstill) builder.AddStandstill();
+  if (link.standstill != StandstillKind::kNone) builder.AddStandstill();
   builder.AddWeakPriors();
   return builder.Finish();
 }

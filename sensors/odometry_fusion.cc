@@ -17,7 +17,11 @@ constexpr double kFirstTiltSigma = 1.0;    // rad
 constexpr double kFirstSpeedSigma = 50.0;  // m/s
 // Slip thresholds start high and come down, so that links are judged by a
 // solution that is nearly right already.
-constexpr double kFirstThresholdFactor = 16.0;
+constexpr double kFirstThresholdFactor = 8.0;
+// Wheels that leave this much force unexplained at the start are slipping or
+// stuck there: no machine's gravity is off so far.
+constexpr double kMaxFirstForceError = 1.5;  // m/s^2
+constexpr double kFirstSlipWeight = 1e-4;
 constexpr double kConvergedStep = 1e-5;  // of a sigma-free unit: rad, m/s, m
 constexpr double kSlipWeight = 0.3;
 
@@ -41,6 +45,7 @@ class Smoother {
   OdometryFusionResult Run();
 
  private:
+  void SetFirstWeights();
   Eigen::Vector3d InitialStep(size_t k) const;
   LinkResiduals Residuals(size_t k) const {
     return ComputeLinkResiduals(context_, problem_.links[k], states_[k],
@@ -72,6 +77,28 @@ Eigen::Vector3d Smoother::InitialStep(size_t k) const {
       globals_.Forward(problem_.imu_from_wheel.rotation, nullptr);
   return link.wheel.displacement_map * forward + lever -
          link.wheel.profile_rotation * lever;
+}
+
+// The first solution would be pulled far off by grossly wrong wheels: those
+// whose first speeds leave a force that is not gravity, and their neighbours.
+void Smoother::SetFirstWeights() {
+  const size_t num_links = problem_.links.size();
+  for (size_t k = 0; k < num_links; ++k) {
+    const OdometryLink& link = problem_.links[k];
+    if (!link.has_imu || !link.has_wheel || link.dt_s <= 0.0) continue;
+    const OdometryState& first = states_[k].state;
+    const Eigen::Vector3d force =
+        (link.imu.delta_rotation * states_[k + 1].state.velocity_in_imu -
+         first.velocity_in_imu - link.imu.delta_velocity) /
+        link.dt_s;
+    const Eigen::Vector3d expected =
+        first.world_from_imu.conjugate() *
+        Eigen::Vector3d(0.0, 0.0, -options_.gravity_m_s2);
+    if ((force - expected).norm() < kMaxFirstForceError) continue;
+    for (size_t i = k > 0 ? k - 1 : 0; i < std::min(num_links, k + 2); ++i) {
+      if (problem_.links[i].has_wheel) weights_[i] = kFirstSlipWeight;
+    }
+  }
 }
 
 LinkEquations Smoother::Equations(size_t k) const {
@@ -236,9 +263,19 @@ void Smoother::FillResult(OdometryFusionResult* result) const {
 OdometryFusionResult Smoother::Run() {
   OdometryFusionResult result;
   double factor = kFirstThresholdFactor;
+  SetFirstWeights();
   while (result.num_iterations < options_.max_num_iterations) {
     ++result.num_iterations;
     const double change = Step();
+      int nw = 0;
+      for (double w : weights_) nw += w < 0.3;
+      fprintf(stderr,
+              "it %d cost %g change %g factor %g damp %g slip %d globals %g %g "
+              "%g %g %g\n",
+              result.num_iterations, Cost(), change, factor, damping_, nw,
+              globals_.values[0], globals_.values[1], globals_.values[2],
+              globals_.values[3] * 57.3, globals_.values[4] * 57.3);
+    }
     if (factor == 1.0 && change < kConvergedStep) {
       result.converged = true;
       break;

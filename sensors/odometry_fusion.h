@@ -19,14 +19,14 @@ struct OdometryFusionOptions {
   double gyroscope_bias_sigma = 0.02;     // rad/s
   double accelerometer_bias_sigma = 0.3;  // m/s^2
   // Tyres wear, loads change: the wheels' scale before any data.
-  double wheel_scale_sigma = 0.03;
+  double wheel_scale_sigma = 0.01;
   // The same for the effective track width (skid steering changes it much)
   // and for the difference of the wheels, as a curvature in 1/m.
   double wheel_track_sigma = 0.1;
   double wheel_curvature_sigma = 0.01;
   // The direction of driving against T_imu_wheel: mounts are rarely measured
   // better. 0 trusts T_imu_wheel.
-  double wheel_mount_sigma_deg = 3.0;
+  double wheel_mount_sigma_deg = 2.0;
   // Sideways and vertical speed of the wheel frame, m/s/sqrt(Hz).
   // (vertical is larger: springs, and slopes that T_imu_wheel does not follow).
   double lateral_speed_noise = 0.05;
@@ -54,6 +54,12 @@ struct OdometryState {
   ImuBias bias;
 };
 
+enum class StandstillKind {
+  kNone,
+  kNoTurn,  // it may rock, but keeps its attitude
+  kAtRest,
+};
+
 // What is known between two successive states.
 struct OdometryLink {
   double dt_s = 0.0;
@@ -63,7 +69,7 @@ struct OdometryLink {
   WheelMotion wheel;
   // The wheels see no turn (WheelType::kSpeed).
   bool has_wheel_yaw = false;
-  bool is_standstill = false;
+  StandstillKind standstill = StandstillKind::kNone;
 };
 
 struct OdometryFusionProblem {
