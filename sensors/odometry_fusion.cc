@@ -267,14 +267,6 @@ OdometryFusionResult Smoother::Run() {
   while (result.num_iterations < options_.max_num_iterations) {
     ++result.num_iterations;
     const double change = Step();
-      int nw = 0;
-      for (double w : weights_) nw += w < 0.3;
-      fprintf(stderr,
-              "it %d cost %g change %g factor %g damp %g slip %d globals %g %g "
-              "%g %g %g\n",
-              result.num_iterations, Cost(), change, factor, damping_, nw,
-              globals_.values[0], globals_.values[1], globals_.values[2],
-              globals_.values[3] * 57.3, globals_.values[4] * 57.3);
     }
     if (factor == 1.0 && change < kConvergedStep) {
       result.converged = true;
