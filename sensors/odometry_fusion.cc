@@ -267,7 +267,6 @@ OdometryFusionResult Smoother::Run() {
   while (result.num_iterations < options_.max_num_iterations) {
     ++result.num_iterations;
     const double change = Step();
-    }
     if (factor == 1.0 && change < kConvergedStep) {
       result.converged = true;
       break;
