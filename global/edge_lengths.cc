@@ -14,10 +14,23 @@
 namespace adasfm {
 namespace {
 
-double Median(std::vector<double>* values) {
-  const size_t middle = values->size() / 2;
-  std::nth_element(values->begin(), values->begin() + middle, values->end());
-  return (*values)[middle];
+struct WeightedValue {
+  double value = 0.0;
+  double weight = 0.0;
+};
+
+double WeightedMedian(std::vector<WeightedValue>* values) {
+  std::sort(values->begin(), values->end(),
+            [](const WeightedValue& a, const WeightedValue& b) {
+              return a.value < b.value;
+            });
+  double half = 0.0;
+  for (const WeightedValue& value : *values) half += 0.5 * value.weight;
+  for (const WeightedValue& value : *values) {
+    half -= value.weight;
+    if (half <= 0.0) return value.value;
+  }
+  return values->back().value;
 }
 
 // A match as depths in units of the edge's length.
@@ -26,12 +39,15 @@ struct DepthPair {
   point2D_t index2 = 0;
   double log_depth1 = 0.0;
   double log_depth2 = 0.0;
+  // Inverse variance of a log depth, up to a factor: the squared parallax.
+  double weight = 0.0;
 };
 
 // One depth measurement of a keypoint: log depth = log length(edge) + offset.
 struct DepthLink {
   int edge = 0;
   double offset = 0.0;
+  double weight = 0.0;
 };
 
 std::vector<DepthPair> ComputeDepthPairs(
@@ -55,9 +71,10 @@ std::vector<DepthPair> ComputeDepthPairs(
     if (depth1 <= 0.0 || depth2 <= 0.0 || sin_parallax < min_sin_parallax) {
       continue;
     }
-    candidates.push_back({-sin_parallax,
-                          {match.point2D_idx1, match.point2D_idx2,
-                           std::log(depth1), std::log(depth2)}});
+    candidates.push_back(
+        {-sin_parallax,
+         {match.point2D_idx1, match.point2D_idx2, std::log(depth1),
+          std::log(depth2), sin_parallax * sin_parallax}});
   }
   std::stable_sort(
       candidates.begin(), candidates.end(),
@@ -103,8 +120,10 @@ class LengthPropagator {
     links_.resize(keypoint_begin_.back());
     for (size_t e = 0; e < num_edges; ++e) {
       for (const DepthPair& pair : depth_pairs_[e]) {
-        links_[Keypoint1(e, pair)].push_back({int(e), pair.log_depth1});
-        links_[Keypoint2(e, pair)].push_back({int(e), pair.log_depth2});
+        links_[Keypoint1(e, pair)].push_back(
+            {int(e), pair.log_depth1, pair.weight});
+        links_[Keypoint2(e, pair)].push_back(
+            {int(e), pair.log_depth2, pair.weight});
       }
     }
     log_lengths_.assign(num_edges, 0.0);
@@ -175,35 +194,37 @@ class LengthPropagator {
 
   // The log depth of a keypoint by the other edges of known length.
   bool LogDepth(size_t keypoint, size_t except_edge, double* log_depth) const {
-    std::vector<double> values;
+    std::vector<WeightedValue> values;
     for (const DepthLink& link : links_[keypoint]) {
       if (link.edge == except_edge || !is_known_[link.edge]) continue;
-      values.push_back(log_lengths_[link.edge] + link.offset);
+      values.push_back({log_lengths_[link.edge] + link.offset, link.weight});
     }
     if (values.empty()) return false;
-    *log_depth = Median(&values);
+    *log_depth = WeightedMedian(&values);
     return true;
   }
 
   bool UpdateLength(size_t e) {
-    std::vector<double> values;
+    std::vector<WeightedValue> values;
     for (const DepthPair& pair : depth_pairs_[e]) {
       double log_depth;
       if (LogDepth(Keypoint1(e, pair), e, &log_depth)) {
-        values.push_back(log_depth - pair.log_depth1);
+        values.push_back({log_depth - pair.log_depth1, pair.weight});
       }
       if (LogDepth(Keypoint2(e, pair), e, &log_depth)) {
-        values.push_back(log_depth - pair.log_depth2);
+        values.push_back({log_depth - pair.log_depth2, pair.weight});
       }
     }
     if (values.size() < options_.min_num_shared) return false;
-    const double median = Median(&values);
-    const double count = values.size();
-    for (double& value : values) value = std::abs(value - median);
+    const double median = WeightedMedian(&values);
+    for (WeightedValue& value : values) {
+      value.value = std::abs(value.value - median);
+    }
     log_lengths_[e] = median;
     // 1.4826 takes a median deviation to a normal's sigma, sqrt(pi / 2) the
     // mean's error to the median's.
-    log_sigmas_[e] = 1.4826 * 1.2533 * Median(&values) / std::sqrt(count);
+    log_sigmas_[e] = 1.4826 * 1.2533 * WeightedMedian(&values) /
+                     std::sqrt(static_cast<double>(values.size()));
     is_known_[e] = true;
     return true;
   }

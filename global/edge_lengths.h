@@ -16,7 +16,7 @@ struct EdgeLengthOptions {
   // Matches with rays closer than this say nothing about depth.
   double min_parallax_deg = 1.0;
   // Matches used per edge, those with the largest parallax.
-  int max_num_matches = 60;
+  int max_num_matches = 300;
   // Keypoints with known depth that an edge must share.
   int min_num_shared = 5;
   // Passes over all edges after the first.

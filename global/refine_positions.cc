@@ -24,7 +24,7 @@ EdgeTerm ComputeTerm(const TranslationAveragingOptions& options,
   // which damps the step and fixes the scale.
   constexpr double kFreeLengthSigma = 1.0;
   const double along = edge.direction.dot(difference);
-  const bool is_free = edge.kind == PositionEdge::kFree;
+  const bool is_free = edge.kind == PositionEdge::kFree || edge.is_redundant;
   const double length =
       std::max(min_length, is_free ? std::abs(along) : edge.length);
   const double across_sigma = length * edge.direction_sigma;

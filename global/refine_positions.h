@@ -23,6 +23,8 @@ struct PositionEdge {
   double direction_sigma = 0.05;
   double length = 1.0;
   double length_sigma = 0.0;
+  // The length only helps to start; the refinement takes it for free.
+  bool is_redundant = false;
 };
 
 // Moves centres to the robust optimum of

@@ -3,6 +3,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
+#include <numeric>
 
 #include "core/so3.h"
 #include "global/laplacian_solver.h"
@@ -18,6 +20,25 @@ double MedianOf(std::vector<double> values) {
   const size_t middle = values.size() / 2;
   std::nth_element(values.begin(), values.begin() + middle, values.end());
   return values[middle];
+}
+
+// Where sensors tie both ends of an edge together, its length from shared
+// points was derived from theirs: counting it again, with errors that all such
+// edges share, would let many weak lengths outvote the sensors' scale.
+void MarkRedundantLengths(int num_nodes, std::vector<PositionEdge>* edges) {
+  std::vector<int> parent(num_nodes);
+  std::iota(parent.begin(), parent.end(), 0);
+  const auto find = [&parent](int i) {
+    while (parent[i] != i) i = parent[i] = parent[parent[i]];
+    return i;
+  };
+  for (const PositionEdge& edge : *edges) {
+    if (edge.kind == PositionEdge::kFixed) parent[find(edge.i)] = find(edge.j);
+  }
+  for (PositionEdge& edge : *edges) {
+    edge.is_redundant =
+        edge.kind == PositionEdge::kSoft && find(edge.i) == find(edge.j);
+  }
 }
 
 std::vector<PositionEdge> CollectEdges(
@@ -55,6 +76,7 @@ std::vector<PositionEdge> CollectEdges(
     }
     edges.push_back(collected);
   }
+  MarkRedundantLengths(graph.images.size(), &edges);
   return edges;
 }
 
@@ -232,7 +254,12 @@ GlobalPositions EstimateGlobalPositions(
   if (centers.rows() == 0 && !solver.Run(true, &centers, &result)) {
     return result;
   }
-  if (!solver.Run(false, &centers, &result)) return result;
+  // Without metres, freeing all lengths at once lets weak parts of the graph
+  // shrink; the refinement frees them as far as their sigmas say.
+  if ((result.metric || !options.refine) &&
+      !solver.Run(false, &centers, &result)) {
+    return result;
+  }
   if (options.refine) {
     const bool converged = RefinePositions(options, edges, &centers, &result);
     result.converged = converged;

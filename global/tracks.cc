@@ -1,0 +1,168 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "global/tracks.h"
+
+#include <algorithm>
+#include <numeric>
+#include <utility>
+
+namespace adasfm {
+namespace {
+
+// Union-find whose sets know their images, so that no set holds two keypoints
+// of one image.
+class KeypointSets {
+ public:
+  explicit KeypointSets(std::vector<TrackElement> keypoints)
+      : keypoints_(std::move(keypoints)),
+        parent_(keypoints_.size()),
+        images_(keypoints_.size()) {
+    std::iota(parent_.begin(), parent_.end(), 0);
+    for (size_t k = 0; k < keypoints_.size(); ++k) {
+      images_[k] = {keypoints_[k].image_id};
+    }
+  }
+
+  int IndexOf(const TrackElement& keypoint) const {
+    return std::lower_bound(keypoints_.begin(), keypoints_.end(), keypoint) -
+           keypoints_.begin();
+  }
+
+  void JoinIfConsistent(int a, int b) {
+    a = Find(a);
+    b = Find(b);
+    if (a == b || ShareImage(images_[a], images_[b])) return;
+    if (images_[a].size() < images_[b].size()) std::swap(a, b);
+    parent_[b] = a;
+    std::vector<image_t> merged;
+    merged.reserve(images_[a].size() + images_[b].size());
+    std::merge(images_[a].begin(), images_[a].end(), images_[b].begin(),
+               images_[b].end(), std::back_inserter(merged));
+    images_[a] = std::move(merged);
+    images_[b] = {};
+  }
+
+  // Sets of at least min_length, in order of their first keypoint.
+  std::vector<Track> Collect(int min_length) {
+    std::vector<int> track_of(keypoints_.size(), -1);
+    std::vector<Track> tracks;
+    for (size_t k = 0; k < keypoints_.size(); ++k) {
+      const int root = Find(k);
+      if (images_[root].size() < min_length) continue;
+      if (track_of[root] < 0) {
+        track_of[root] = tracks.size();
+        tracks.emplace_back();
+      }
+      tracks[track_of[root]].push_back(keypoints_[k]);
+    }
+    return tracks;
+  }
+
+ private:
+  int Find(int k) {
+    while (parent_[k] != k) k = parent_[k] = parent_[parent_[k]];
+    return k;
+  }
+
+  static bool ShareImage(const std::vector<image_t>& a,
+                         const std::vector<image_t>& b) {
+    auto i = a.begin();
+    auto j = b.begin();
+    while (i != a.end() && j != b.end()) {
+      if (*i == *j) return true;
+      if (*i < *j) {
+        ++i;
+      } else {
+        ++j;
+      }
+    }
+    return false;
+  }
+
+  std::vector<TrackElement> keypoints_;  // sorted
+  std::vector<int> parent_;
+  std::vector<std::vector<image_t>> images_;  // sorted; of roots
+};
+
+std::vector<TrackElement> CollectKeypoints(
+    const std::map<ImagePair, std::vector<FeatureMatch>>& matches) {
+  std::vector<TrackElement> keypoints;
+  for (const auto& [pair, pair_matches] : matches) {
+    for (const FeatureMatch& match : pair_matches) {
+      keypoints.push_back({pair.image_id1, match.point2D_idx1});
+      keypoints.push_back({pair.image_id2, match.point2D_idx2});
+    }
+  }
+  std::sort(keypoints.begin(), keypoints.end());
+  keypoints.erase(std::unique(keypoints.begin(), keypoints.end()),
+                  keypoints.end());
+  return keypoints;
+}
+
+// Longest first; a track is kept while one of its images still needs it.
+std::vector<Track> SelectTracks(const TrackOptions& options,
+                                std::vector<Track> tracks) {
+  std::stable_sort(
+      tracks.begin(), tracks.end(),
+      [](const Track& a, const Track& b) { return a.size() > b.size(); });
+  std::map<image_t, int> num_tracks;
+  std::vector<Track> selected;
+  for (Track& track : tracks) {
+    if (options.max_num_tracks >= 0 &&
+        selected.size() >= options.max_num_tracks) {
+      break;
+    }
+    const bool is_needed = std::any_of(
+        track.begin(), track.end(), [&](const TrackElement& element) {
+          return num_tracks[element.image_id] <
+                 options.min_num_tracks_per_image;
+        });
+    if (!is_needed) continue;
+    for (const TrackElement& element : track) ++num_tracks[element.image_id];
+    selected.push_back(std::move(track));
+  }
+  return selected;
+}
+
+}  // namespace
+
+bool TrackOptions::IsValid(std::string* error) const {
+  if (min_track_length < 2) {
+    *error = "min_track_length = " + std::to_string(min_track_length) +
+             " must be >= 2";
+    return false;
+  }
+  if (min_num_tracks_per_image < 1) {
+    *error = "min_num_tracks_per_image = " +
+             std::to_string(min_num_tracks_per_image) + " must be >= 1";
+    return false;
+  }
+  if (max_num_tracks < -1) {
+    *error =
+        "max_num_tracks = " + std::to_string(max_num_tracks) + " must be >= -1";
+    return false;
+  }
+  return true;
+}
+
+std::vector<Track> BuildTracks(
+    const TrackOptions& options,
+    const std::map<ImagePair, std::vector<FeatureMatch>>& matches) {
+  KeypointSets sets(CollectKeypoints(matches));
+  std::vector<const std::pair<const ImagePair, std::vector<FeatureMatch>>*>
+      pairs;
+  for (const auto& pair : matches) pairs.push_back(&pair);
+  std::stable_sort(pairs.begin(), pairs.end(),
+                   [](const auto* a, const auto* b) {
+                     return a->second.size() > b->second.size();
+                   });
+  for (const auto* pair : pairs) {
+    for (const FeatureMatch& match : pair->second) {
+      sets.JoinIfConsistent(
+          sets.IndexOf({pair->first.image_id1, match.point2D_idx1}),
+          sets.IndexOf({pair->first.image_id2, match.point2D_idx2}));
+    }
+  }
+  return SelectTracks(options, sets.Collect(options.min_track_length));
+}
+
+}  // namespace adasfm
