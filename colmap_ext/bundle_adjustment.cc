@@ -2,16 +2,21 @@
 #include "colmap_ext/bundle_adjustment.h"
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <sstream>
 #include <stdexcept>
 
-#include "colmap_ext/bundle_data.h"
-#include "colmap_ext/bundle_solver.h"
+#include "colmap_ext/bundle_problem.h"
+#include "core/parallel.h"
 
 namespace adasfm {
 namespace {
+
+// The length of a scale that nothing measures is held to this share of itself;
+// no residual pulls against it, so the value is not a weight.
+constexpr double kGaugeLengthRatio = 1e-3;
+// Problems with fewer residuals are solved faster by one thread.
+constexpr int kMinNumResidualsForThreads = 20000;
 
 bool CheckPositive(const char* name, double value, std::string* error) {
   if (std::isfinite(value) && value > 0.0) return true;
@@ -25,6 +30,44 @@ bool HasLengths(const std::vector<PosePriorEdge>& priors) {
   return std::any_of(priors.begin(), priors.end(), [](const auto& edge) {
     return std::isfinite(edge.length_sigma_m);
   });
+}
+
+// Holds the degrees of freedom that the data leave open (see AdjustBundle).
+void FixGauge(bool has_lengths, BundleProblem* problem) {
+  const std::vector<image_t> constant_images = problem->ConstantImages();
+  if (constant_images.empty()) problem->FixFirstPose();
+  if (has_lengths || constant_images.size() >= 2) return;
+  problem->FixDistanceToFarthestPose(kGaugeLengthRatio);
+}
+
+ceres::Solver::Options SolverOptions(
+    const PriorBundleAdjustmentOptions& options, BundleProblem* problem) {
+  ceres::Solver::Options solver;
+  solver.max_num_iterations = options.max_num_iterations;
+  solver.function_tolerance = options.function_tolerance;
+  // The cost alone decides: gradients and steps have no common unit here.
+  solver.gradient_tolerance = 1e-12;
+  solver.parameter_tolerance = 1e-12;
+  solver.logging_type = ceres::SILENT;
+  solver.num_threads = problem->NumResiduals() < kMinNumResidualsForThreads
+                           ? 1
+                           : EffectiveNumThreads(options.num_threads);
+  solver.max_linear_solver_iterations = 200;
+  solver.max_num_consecutive_invalid_steps = 10;
+  const int num_images = problem->NumImages();
+  const bool has_points = problem->NumPoints() > 0;
+  if (num_images <= options.max_num_images_dense && has_points) {
+    solver.linear_solver_type = ceres::DENSE_SCHUR;
+  } else if (!has_points) {
+    solver.linear_solver_type = ceres::SPARSE_NORMAL_CHOLESKY;
+  } else if (num_images <= options.max_num_images_sparse) {
+    solver.linear_solver_type = ceres::SPARSE_SCHUR;
+  } else {
+    solver.linear_solver_type = ceres::ITERATIVE_SCHUR;
+    solver.preconditioner_type = ceres::SCHUR_JACOBI;
+  }
+  if (has_points) solver.linear_solver_ordering = problem->Ordering();
+  return solver;
 }
 
 }  // namespace
@@ -96,28 +139,30 @@ PriorBundleAdjustmentSummary AdjustBundle(
   std::string error;
   if (!options.IsValid(&error)) throw std::invalid_argument(error);
 
-  const auto start = std::chrono::steady_clock::now();
   PriorBundleAdjustmentSummary summary;
-  BundleData data(options, problem, *reconstruction);
-  summary.num_images = data.NumFreeImages();
-  summary.num_points = static_cast<int>(data.points.size());
-  summary.num_residuals = data.NumResiduals();
-  if (summary.num_images == 0 || summary.num_residuals == 0) {
+  BundleProblem bundle(options, problem, *reconstruction);
+  summary.num_images = bundle.NumImages();
+  summary.num_points = bundle.NumPoints();
+  summary.num_residuals = bundle.NumResiduals();
+  if (bundle.NumImages() == 0 || bundle.NumResiduals() == 0) {
     summary.message = "nothing to adjust";
     return summary;
   }
-  data.FixGauge(HasLengths(problem.priors));
-  if (options.refine_focal_length || options.refine_principal_point ||
-      options.refine_extra_params) {
-    SolveBundleWithCameras(options, &data, reconstruction, &summary);
-  } else {
-    SolveBundle(options, &data, &summary);
-  }
-  summary.success = summary.success && data.IsFinite();
-  if (summary.success) data.WriteTo(reconstruction);
-  summary.seconds =
-      std::chrono::duration<double>(std::chrono::steady_clock::now() - start)
-          .count();
+  FixGauge(HasLengths(problem.priors), &bundle);
+
+  ceres::Solver::Summary solver_summary;
+  ceres::Solve(SolverOptions(options, &bundle), bundle.CeresProblem(),
+               &solver_summary);
+  summary.num_iterations = solver_summary.num_successful_steps +
+                           solver_summary.num_unsuccessful_steps;
+  summary.initial_cost = solver_summary.initial_cost;
+  summary.final_cost = solver_summary.final_cost;
+  summary.seconds = solver_summary.total_time_in_seconds;
+  summary.message = solver_summary.message;
+  summary.success = solver_summary.IsSolutionUsable() &&
+                    std::isfinite(solver_summary.final_cost) &&
+                    bundle.IsFinite();
+  if (summary.success) bundle.WriteTo(reconstruction);
   return summary;
 }
 

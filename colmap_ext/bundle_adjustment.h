@@ -53,8 +53,8 @@ struct PriorBundleAdjustmentOptions {
   // Relative change of the cost at which the adjustment has converged.
   double function_tolerance = 1e-5;
   int num_threads = -1;
-  // Up to this many images the reduced camera system is factorised, beyond that
-  // solved iteratively; with intrinsics, up to the first number densely.
+  // Up to this many images the reduced camera system is solved densely, up to
+  // the second number by sparse Cholesky, beyond that iteratively.
   int max_num_images_dense = 50;
   int max_num_images_sparse = 4000;
 

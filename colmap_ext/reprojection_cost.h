@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <ceres/cost_function.h>
 #include <ceres/rotation.h>
+#include <ceres/sized_cost_function.h>
 
 #include <Eigen/Core>
 
@@ -23,49 +25,66 @@ inline constexpr double kMinProjectionDepth = 1e-6;
 // project: a constant, so that steps are judged by it but not drawn by it.
 inline constexpr double kBehindCameraResidual = 1e3;
 
-// r = W (pi(R (X - C)) - x), x and W of the keypoint, in sigmas; unknowns are
-// the pose's six parameters and X in the world. The pose must be up to date.
-class ReprojectionCost {
+// r = W (pi(R (X - C)) - x), x and W of the keypoint, in sigmas.
+// Parameters: AdjustedPose::parameters (6), X in the world (3). The pose is
+// read from the object, which must be up to date.
+class ReprojectionCost final : public ceres::SizedCostFunction<2, 6, 3> {
  public:
   ReprojectionCost(const NormalizedKeypoint& keypoint, const AdjustedPose* pose)
-      : keypoint_(keypoint), pose_(*pose) {}
+      : keypoint_(keypoint), pose_(pose) {}
 
-  // Both Jacobians or none.
-  void Evaluate(const Eigen::Vector3d& point, Eigen::Vector2d* residual,
-                Eigen::Matrix<double, 2, 6>* from_pose,
-                Eigen::Matrix<double, 2, 3>* from_point) const {
-    const Eigen::Vector3d x_in_cam = pose_.rotation * (point - pose_.center);
+  bool Evaluate(double const* const* parameters, double* residuals,
+                double** jacobians) const final {
+    const Eigen::Map<const Eigen::Vector3d> point(parameters[1]);
+    const Eigen::Vector3d x_in_cam = pose_->rotation * (point - pose_->center);
+    Eigen::Map<Eigen::Vector2d> residual(residuals);
     if (!(x_in_cam.z() > kMinProjectionDepth)) {
-      residual->setConstant(kBehindCameraResidual);
-      if (from_pose != nullptr) from_pose->setZero();
-      if (from_point != nullptr) from_point->setZero();
-      return;
+      residual.setConstant(kBehindCameraResidual);
+      SetZero(jacobians);
+      return true;
     }
     const double inverse_depth = 1.0 / x_in_cam.z();
     const Eigen::Vector2d projected = x_in_cam.head<2>() * inverse_depth;
     const Eigen::Matrix2d& whitened = keypoint_.whitened_from_normalized;
-    *residual = whitened * (projected - keypoint_.normalized);
-    if (from_pose == nullptr) return;
+    residual = whitened * (projected - keypoint_.normalized);
+    if (jacobians == nullptr) return true;
 
-    Eigen::Matrix<double, 2, 3> from_cam;
-    from_cam.leftCols<2>() = whitened * inverse_depth;
-    from_cam.col(2) = whitened * projected * -inverse_depth;
-    *from_point = from_cam * pose_.rotation;
-    // dx = -Hat(x) Jl dw - R dc; a row n of -n Hat(x) is (x cross n)^T.
-    Eigen::Matrix<double, 2, 3> from_turn;
-    from_turn.row(0) = x_in_cam.cross(from_cam.row(0).transpose());
-    from_turn.row(1) = x_in_cam.cross(from_cam.row(1).transpose());
-    from_pose->leftCols<3>().noalias() = from_turn * pose_.left_jacobian;
-    from_pose->rightCols<3>() = -*from_point;
+    Eigen::Matrix<double, 2, 3> residual_from_cam;
+    residual_from_cam.leftCols<2>() = whitened * inverse_depth;
+    residual_from_cam.col(2) = whitened * projected * -inverse_depth;
+    const Eigen::Matrix<double, 2, 3> residual_from_world =
+        residual_from_cam * pose_->rotation;
+    if (jacobians[0] != nullptr) {
+      // dx = -Hat(x) Jl dw - R dc; a row n of -Hat(x) is (x cross n)^T.
+      Eigen::Map<Eigen::Matrix<double, 2, 6, Eigen::RowMajor>> jacobian(
+          jacobians[0]);
+      Eigen::Matrix<double, 2, 3> from_turn;
+      from_turn.row(0) = x_in_cam.cross(residual_from_cam.row(0).transpose());
+      from_turn.row(1) = x_in_cam.cross(residual_from_cam.row(1).transpose());
+      jacobian.leftCols<3>().noalias() = from_turn * pose_->left_jacobian;
+      jacobian.rightCols<3>() = -residual_from_world;
+    }
+    if (jacobians[1] != nullptr) {
+      Eigen::Map<Eigen::Matrix<double, 2, 3, Eigen::RowMajor>> jacobian(
+          jacobians[1]);
+      jacobian = residual_from_world;
+    }
+    return true;
   }
 
  private:
-  const NormalizedKeypoint& keypoint_;
-  const AdjustedPose& pose_;
+  static void SetZero(double** jacobians) {
+    if (jacobians == nullptr) return;
+    if (jacobians[0] != nullptr) std::fill_n(jacobians[0], 12, 0.0);
+    if (jacobians[1] != nullptr) std::fill_n(jacobians[1], 6, 0.0);
+  }
+
+  NormalizedKeypoint keypoint_;
+  const AdjustedPose* pose_;
 };
 
-// The same with the camera's intrinsics as a third unknown, for automatic
-// differentiation by Ceres: r = (project(R (X - C)) - keypoint) / sigma.
+// The same with the camera's intrinsics as third parameter, for automatic
+// differentiation: r = (project(R (X - C)) - keypoint) / sigma.
 template <typename CameraModel>
 class CameraReprojectionCost {
  public:
