@@ -8,6 +8,7 @@
 
 #include "core/parallel.h"
 #include "core/so3.h"
+#include "synthetic/pair_candidates.h"
 #include "synthetic/two_view_refinement.h"
 
 namespace adasfm {
@@ -17,30 +18,10 @@ namespace {
 constexpr int kMinNumInliers = 15;
 constexpr double kMaxEpipolarErrorPx = 4.0;
 // A feature is recognised between views that do not differ by more.
-constexpr double kMaxViewAngle = DegToRad(35.0);
 constexpr double kMaxScaleRatio = 2.2;
 constexpr double kMatchRate = 0.85;
 // Look-alike facades are not equal in all details.
 constexpr double kAliasMatchRate = 0.4;
-// Images count as taken on another visit when the car has driven this far
-// between them.
-constexpr double kRevisitDistance = 75.0;
-constexpr double kRevisitRadius = 15.0;
-constexpr size_t kMaxNumRevisitsPerImage = 10;
-// Look-alike images are this close to each other, relative to their facades,
-// and at least that far apart in truth.
-constexpr double kMaxAliasOffset = 8.0;
-constexpr double kMinAliasDistance = 45.0;
-constexpr size_t kNumAliasNeighbors = 5;
-constexpr size_t kAliasRunLength = 14;
-
-struct Candidate {
-  int first, second;
-  bool is_alias = false;
-  // Where camera 2 seems to be: its pose relative to the landmarks that look
-  // like those which camera 1 sees. The true one unless is_alias.
-  Rigid3d apparent_cam2_from_world;
-};
 
 class Matcher {
  public:
@@ -60,7 +41,7 @@ class Matcher {
   }
 
   // Nothing when too few matches survive verification.
-  std::optional<SyntheticPair> Match(const Candidate& candidate) const {
+  std::optional<SyntheticPair> Match(const PairCandidate& candidate) const {
     const SyntheticImage& image1 = world_.images[candidate.first];
     const SyntheticImage& image2 = world_.images[candidate.second];
     if (image1.keypoints.empty() || image2.keypoints.empty()) return {};
@@ -99,7 +80,7 @@ class Matcher {
   }
 
  private:
-  std::vector<FeatureMatch> MatchLandmarks(const Candidate& candidate,
+  std::vector<FeatureMatch> MatchLandmarks(const PairCandidate& candidate,
                                            Random* random) const {
     std::vector<FeatureMatch> matches;
     const auto& index1 = indices_[candidate.first];
@@ -134,7 +115,7 @@ class Matcher {
   }
 
   // Joins keypoints at random that have no match yet.
-  void AddOutliers(const Candidate& candidate, Random* random,
+  void AddOutliers(const PairCandidate& candidate, Random* random,
                    std::vector<FeatureMatch>* matches) const {
     std::vector<bool> used1(indices_[candidate.first].size(), false);
     std::vector<bool> used2(indices_[candidate.second].size(), false);
@@ -166,137 +147,8 @@ class Matcher {
   std::vector<std::vector<Bearing>> bearings_;
 };
 
-Candidate TrueCandidate(const SyntheticWorld& world, int first, int second) {
-  return {first, second, false, world.images[second].cam_from_world};
-}
-
-std::vector<Candidate> FindSequentialPairs(const SyntheticWorld& world) {
-  std::vector<Candidate> candidates;
-  const int num_images = static_cast<int>(world.images.size());
-  for (int i = 0; i < num_images; ++i) {
-    const int end =
-        std::min(num_images, i + world.options.num_sequential_neighbors + 1);
-    for (int j = i + 1; j < end; ++j) {
-      candidates.push_back(TrueCandidate(world, i, j));
-    }
-  }
-  return candidates;
-}
-
-// Images that stand close together and look the same way, on another visit:
-// the nearest earlier ones of each image.
-std::vector<Candidate> FindRevisits(const SyntheticWorld& world,
-                                    const std::vector<double>& arc_lengths_m) {
-  std::map<std::pair<int, int>, std::vector<int>> cells;
-  const auto cell = [](const Eigen::Vector3d& center) {
-    return std::make_pair<int, int>(std::floor(center.x() / kRevisitRadius),
-                                    std::floor(center.y() / kRevisitRadius));
-  };
-  std::vector<Candidate> candidates;
-  for (size_t i = 0; i < world.images.size(); ++i) {
-    const Rigid3d& pose = world.images[i].cam_from_world;
-    const Eigen::Vector3d center = pose.TargetOriginInSource();
-    const auto [column, row] = cell(center);
-    std::vector<std::pair<double, int>> near;
-    for (int dx = -1; dx <= 1; ++dx) {
-      for (int dy = -1; dy <= 1; ++dy) {
-        for (const int j : cells[{column + dx, row + dy}]) {
-          const Rigid3d& other = world.images[j].cam_from_world;
-          const double distance =
-              (center - other.TargetOriginInSource()).norm();
-          if (arc_lengths_m[i] - arc_lengths_m[j] > kRevisitDistance &&
-              distance < kRevisitRadius &&
-              AngleBetweenRad(pose.rotation, other.rotation) < kMaxViewAngle) {
-            near.emplace_back(distance, j);
-          }
-        }
-      }
-    }
-    std::sort(near.begin(), near.end());
-    if (near.size() > kMaxNumRevisitsPerImage) {
-      near.resize(kMaxNumRevisitsPerImage);
-    }
-    for (const auto& [distance, j] : near) {
-      candidates.push_back(TrueCandidate(world, j, static_cast<int>(i)));
-    }
-    cells[{column, row}].push_back(static_cast<int>(i));
-  }
-  return candidates;
-}
-
-// The images in a street, driven in the street's direction: (u, image).
-std::vector<std::pair<double, int>> ImagesInStreet(const SyntheticWorld& world,
-                                                   const Street& street) {
-  std::vector<std::pair<double, int>> images;
-  for (size_t i = 0; i < world.images.size(); ++i) {
-    const Rigid3d& pose = world.images[i].cam_from_world;
-    const Eigen::Vector3d uvz =
-        street.LocalFromWorld(pose.TargetOriginInSource());
-    const Eigen::Vector3d forward =
-        pose.rotation.conjugate() * Eigen::Vector3d::UnitZ();
-    if (uvz.x() > -10.0 && uvz.x() < kBlockSize && std::abs(uvz.y()) < 3.0 &&
-        forward.head<2>().dot(street.Direction()) > 0.9) {
-      images.emplace_back(uvz.x(), static_cast<int>(i));
-    }
-  }
-  return images;
-}
-
-// The pose that camera sees itself in when it takes the street for its twin.
-Rigid3d MoveToTwin(const Rigid3d& cam_from_world, const Street& street,
-                   const Street& twin) {
-  const Eigen::Vector3d center = twin.WorldFromLocal(
-      street.LocalFromWorld(cam_from_world.TargetOriginInSource()));
-  const Eigen::Vector2d from = street.Direction();
-  const Eigen::Vector2d to = twin.Direction();
-  const double turn =
-      std::atan2(from.x() * to.y() - from.y() * to.x(), from.dot(to));
-  const Eigen::Quaterniond street_from_twin(
-      Eigen::AngleAxisd(-turn, Eigen::Vector3d::UnitZ()));
-  return CamFromWorldWithCenter(cam_from_world.rotation * street_from_twin,
-                                center);
-}
-
-// Candidates of one pair of twins, a run of neighbouring images first.
-void FindAliases(const SyntheticWorld& world, const Street& street,
-                 const Street& twin, Random* random,
-                 std::vector<Candidate>* run, std::vector<Candidate>* rest) {
-  const auto here = ImagesInStreet(world, street);
-  const auto there = ImagesInStreet(world, twin);
-  if (here.empty() || there.empty()) return;
-  const size_t begin = random->UniformInt(
-      0, std::max<int64_t>(0, here.size() - kAliasRunLength));
-  for (size_t k = 0; k < here.size(); ++k) {
-    const auto& [u, image] = here[k];
-    std::vector<std::pair<double, int>> near;
-    for (const auto& [other_u, other] : there) {
-      const double distance =
-          (world.images[image].cam_from_world.TargetOriginInSource() -
-           world.images[other].cam_from_world.TargetOriginInSource())
-              .norm();
-      if (std::abs(other_u - u) < kMaxAliasOffset &&
-          distance > kMinAliasDistance) {
-        near.emplace_back(std::abs(other_u - u), other);
-      }
-    }
-    std::sort(near.begin(), near.end());
-    for (size_t rank = 0; rank < near.size(); ++rank) {
-      const int other = near[rank].second;
-      // Camera 1 is the earlier image, and camera 2 sees itself in its street.
-      Candidate candidate{std::min(image, other), std::max(image, other), true,
-                          Rigid3d()};
-      const bool is_first_here = candidate.first == image;
-      candidate.apparent_cam2_from_world = MoveToTwin(
-          world.images[candidate.second].cam_from_world,
-          is_first_here ? twin : street, is_first_here ? street : twin);
-      const bool in_run = k >= begin && k < begin + kAliasRunLength &&
-                          rank < kNumAliasNeighbors;
-      (in_run ? run : rest)->push_back(candidate);
-    }
-  }
-}
-
-void MatchAll(const Matcher& matcher, const std::vector<Candidate>& candidates,
+void MatchAll(const Matcher& matcher,
+              const std::vector<PairCandidate>& candidates,
               std::map<ImagePair, SyntheticPair>* pairs) {
   std::vector<std::optional<SyntheticPair>> matched(candidates.size());
   ParallelFor(-1, candidates.size(),
@@ -316,16 +168,8 @@ void MatchAliases(const Matcher& matcher, const StreetGrid& grid,
   const int num_wanted =
       static_cast<int>(std::lround(ratio / (1.0 - ratio) * pairs->size()));
   Random random = MakeRandom(world.options.seed, 11);
-  std::vector<Candidate> runs, rest;
-  for (size_t i = 0; i < grid.streets.size(); ++i) {
-    const int twin = grid.streets[i].twin;
-    if (twin < static_cast<int>(i)) continue;
-    FindAliases(world, grid.streets[i], grid.streets[twin], &random, &runs,
-                &rest);
-  }
-  runs.insert(runs.end(), rest.begin(), rest.end());
   int num_found = 0;
-  for (const Candidate& candidate : runs) {
+  for (const PairCandidate& candidate : FindAliases(grid, world, &random)) {
     if (num_found >= num_wanted) return;
     std::optional<SyntheticPair> pair = matcher.Match(candidate);
     if (!pair) continue;
@@ -340,8 +184,9 @@ void MatchImages(const StreetGrid& grid, const LandmarkMap& map,
                  const std::vector<double>& arc_lengths_m,
                  SyntheticWorld* world) {
   const Matcher matcher(map, *world);
-  std::vector<Candidate> candidates = FindSequentialPairs(*world);
-  const std::vector<Candidate> revisits = FindRevisits(*world, arc_lengths_m);
+  std::vector<PairCandidate> candidates = FindSequentialPairs(*world);
+  const std::vector<PairCandidate> revisits =
+      FindRevisits(*world, arc_lengths_m);
   candidates.insert(candidates.end(), revisits.begin(), revisits.end());
   std::map<ImagePair, SyntheticPair> pairs;
   MatchAll(matcher, candidates, &pairs);

@@ -1,0 +1,169 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "synthetic/pair_candidates.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+
+namespace adasfm {
+namespace {
+
+// Images count as taken on another visit when the car has driven this far
+// between them.
+constexpr double kRevisitDistance = 75.0;
+constexpr double kRevisitRadius = 15.0;
+constexpr size_t kMaxNumRevisitsPerImage = 10;
+// Look-alike images are this close to each other, relative to their facades,
+// and at least that far apart in truth.
+constexpr double kMaxAliasOffset = 8.0;
+constexpr double kMinAliasDistance = 45.0;
+constexpr size_t kNumAliasNeighbors = 5;
+constexpr size_t kAliasRunLength = 14;
+
+PairCandidate TrueCandidate(const SyntheticWorld& world, int first,
+                            int second) {
+  return {first, second, false, world.images[second].cam_from_world};
+}
+
+// The images in a street, driven in the street's direction: (u, image).
+std::vector<std::pair<double, int>> ImagesInStreet(const SyntheticWorld& world,
+                                                   const Street& street) {
+  std::vector<std::pair<double, int>> images;
+  for (size_t i = 0; i < world.images.size(); ++i) {
+    const Rigid3d& pose = world.images[i].cam_from_world;
+    const Eigen::Vector3d uvz =
+        street.LocalFromWorld(pose.TargetOriginInSource());
+    const Eigen::Vector3d forward =
+        pose.rotation.conjugate() * Eigen::Vector3d::UnitZ();
+    if (uvz.x() > -10.0 && uvz.x() < kBlockSize && std::abs(uvz.y()) < 3.0 &&
+        forward.head<2>().dot(street.Direction()) > 0.9) {
+      images.emplace_back(uvz.x(), static_cast<int>(i));
+    }
+  }
+  return images;
+}
+
+// The pose that camera sees itself in when it takes the street for its twin.
+Rigid3d MoveToTwin(const Rigid3d& cam_from_world, const Street& street,
+                   const Street& twin) {
+  const Eigen::Vector3d center = twin.WorldFromLocal(
+      street.LocalFromWorld(cam_from_world.TargetOriginInSource()));
+  const Eigen::Vector2d from = street.Direction();
+  const Eigen::Vector2d to = twin.Direction();
+  const double turn =
+      std::atan2(from.x() * to.y() - from.y() * to.x(), from.dot(to));
+  const Eigen::Quaterniond street_from_twin(
+      Eigen::AngleAxisd(-turn, Eigen::Vector3d::UnitZ()));
+  return CamFromWorldWithCenter(cam_from_world.rotation * street_from_twin,
+                                center);
+}
+
+// Candidates of one pair of twins, a run of neighbouring images first.
+void FindTwinAliases(const SyntheticWorld& world, const Street& street,
+                     const Street& twin, Random* random,
+                     std::vector<PairCandidate>* run,
+                     std::vector<PairCandidate>* rest) {
+  const auto here = ImagesInStreet(world, street);
+  const auto there = ImagesInStreet(world, twin);
+  if (here.empty() || there.empty()) return;
+  const size_t begin = random->UniformInt(
+      0, std::max<int64_t>(0, here.size() - kAliasRunLength));
+  for (size_t k = 0; k < here.size(); ++k) {
+    const auto& [u, image] = here[k];
+    std::vector<std::pair<double, int>> near;
+    for (const auto& [other_u, other] : there) {
+      const double distance =
+          (world.images[image].cam_from_world.TargetOriginInSource() -
+           world.images[other].cam_from_world.TargetOriginInSource())
+              .norm();
+      if (std::abs(other_u - u) < kMaxAliasOffset &&
+          distance > kMinAliasDistance) {
+        near.emplace_back(std::abs(other_u - u), other);
+      }
+    }
+    std::sort(near.begin(), near.end());
+    for (size_t rank = 0; rank < near.size(); ++rank) {
+      const int other = near[rank].second;
+      // Camera 1 is the earlier image, and camera 2 sees itself in its street.
+      PairCandidate candidate{std::min(image, other), std::max(image, other),
+                              true, Rigid3d()};
+      const bool is_first_here = candidate.first == image;
+      candidate.apparent_cam2_from_world = MoveToTwin(
+          world.images[candidate.second].cam_from_world,
+          is_first_here ? twin : street, is_first_here ? street : twin);
+      const bool in_run = k >= begin && k < begin + kAliasRunLength &&
+                          rank < kNumAliasNeighbors;
+      (in_run ? run : rest)->push_back(candidate);
+    }
+  }
+}
+
+}  // namespace
+
+std::vector<PairCandidate> FindSequentialPairs(const SyntheticWorld& world) {
+  std::vector<PairCandidate> candidates;
+  const int num_images = static_cast<int>(world.images.size());
+  for (int i = 0; i < num_images; ++i) {
+    const int end =
+        std::min(num_images, i + world.options.num_sequential_neighbors + 1);
+    for (int j = i + 1; j < end; ++j) {
+      candidates.push_back(TrueCandidate(world, i, j));
+    }
+  }
+  return candidates;
+}
+
+std::vector<PairCandidate> FindRevisits(
+    const SyntheticWorld& world, const std::vector<double>& arc_lengths_m) {
+  std::map<std::pair<int, int>, std::vector<int>> cells;
+  const auto cell = [](const Eigen::Vector3d& center) {
+    return std::make_pair<int, int>(std::floor(center.x() / kRevisitRadius),
+                                    std::floor(center.y() / kRevisitRadius));
+  };
+  std::vector<PairCandidate> candidates;
+  for (size_t i = 0; i < world.images.size(); ++i) {
+    const Rigid3d& pose = world.images[i].cam_from_world;
+    const Eigen::Vector3d center = pose.TargetOriginInSource();
+    const auto [column, row] = cell(center);
+    std::vector<std::pair<double, int>> near;
+    for (int dx = -1; dx <= 1; ++dx) {
+      for (int dy = -1; dy <= 1; ++dy) {
+        for (const int j : cells[{column + dx, row + dy}]) {
+          const Rigid3d& other = world.images[j].cam_from_world;
+          const double distance =
+              (center - other.TargetOriginInSource()).norm();
+          if (arc_lengths_m[i] - arc_lengths_m[j] > kRevisitDistance &&
+              distance < kRevisitRadius &&
+              AngleBetweenRad(pose.rotation, other.rotation) < kMaxViewAngle) {
+            near.emplace_back(distance, j);
+          }
+        }
+      }
+    }
+    std::sort(near.begin(), near.end());
+    if (near.size() > kMaxNumRevisitsPerImage) {
+      near.resize(kMaxNumRevisitsPerImage);
+    }
+    for (const auto& [distance, j] : near) {
+      candidates.push_back(TrueCandidate(world, j, static_cast<int>(i)));
+    }
+    cells[{column, row}].push_back(static_cast<int>(i));
+  }
+  return candidates;
+}
+
+std::vector<PairCandidate> FindAliases(const StreetGrid& grid,
+                                       const SyntheticWorld& world,
+                                       Random* random) {
+  std::vector<PairCandidate> runs, rest;
+  for (size_t i = 0; i < grid.streets.size(); ++i) {
+    const int twin = grid.streets[i].twin;
+    if (twin < static_cast<int>(i)) continue;
+    FindTwinAliases(world, grid.streets[i], grid.streets[twin], random, &runs,
+                    &rest);
+  }
+  runs.insert(runs.end(), rest.begin(), rest.end());
+  return runs;
+}
+
+}  // namespace adasfm

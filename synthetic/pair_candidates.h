@@ -1,0 +1,40 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <vector>
+
+#include "core/random.h"
+#include "core/rigid3d.h"
+#include "core/so3.h"
+#include "synthetic/street_grid.h"
+#include "synthetic/synthetic_world.h"
+
+namespace adasfm {
+
+// A feature is recognised between views that do not differ by more.
+inline constexpr double kMaxViewAngle = DegToRad(35.0);
+
+// Two images that may match, by index; the first is the earlier one.
+struct PairCandidate {
+  int first, second;
+  bool is_alias = false;
+  // Where camera 2 seems to be: its pose relative to the landmarks that look
+  // like those which camera 1 sees. The true one unless is_alias.
+  Rigid3d apparent_cam2_from_world;
+};
+
+// Each image with the next ones.
+std::vector<PairCandidate> FindSequentialPairs(const SyntheticWorld& world);
+
+// Images that stand close together and look the same way on another visit:
+// the nearest earlier ones of each image.
+std::vector<PairCandidate> FindRevisits(
+    const SyntheticWorld& world, const std::vector<double>& arc_lengths_m);
+
+// Images at corresponding places of twin streets: of each pair of twins first
+// a run of neighbouring images, and after all runs the rest.
+std::vector<PairCandidate> FindAliases(const StreetGrid& grid,
+                                       const SyntheticWorld& world,
+                                       Random* random);
+
+}  // namespace adasfm
