@@ -7,8 +7,16 @@ const std::vector<Command>& Commands() {
   static const std::vector<Command> commands = {
       {"adasfm_evaluator", "compares a model with the ground truth",
        RunAdasfmEvaluator},
+      {"adasfm_mapper",
+       "parallel incremental SfM steered by the coarse model, merged into one",
+       RunAdasfmMapper},
+      {"adasfm_prior_importer",
+       "turns IMU and wheel logs into priors in the database",
+       RunAdasfmPriorImporter},
       {"adasfm_restorer", "undoes what adasfm_global rewrote in the database",
        RunAdasfmRestorer},
+      {"adasfm_synthesizer", "makes a drive with ground truth",
+       RunAdasfmSynthesizer},
   };
   return commands;
 }

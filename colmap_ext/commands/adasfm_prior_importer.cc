@@ -1,0 +1,130 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <iostream>
+#include <string>
+
+#include "colmap_ext/commands/registry.h"
+#include "colmap_ext/prior_importer.h"
+#include "colmap_ext/prior_tables.h"
+
+namespace adasfm {
+namespace {
+
+void AddPathOptions(PriorImportPaths* paths, CommandOptions* command) {
+  command->AddRequired("database_path", &paths->database_path,
+                       "COLMAP database with the images");
+  command->AddRequired("sensors_path", &paths->sensors_path,
+                       "YAML file with the calibration of the sensors");
+  command->AddDefault("image_times_path", &paths->image_times_path,
+                      "times of the images: EuRoC data.csv, 4Seasons times.txt "
+                      "or TUM rgb.txt; when empty, the names' digits are "
+                      "nanoseconds");
+  command->AddDefault("imu_path", &paths->imu_path,
+                      "IMU log: EuRoC CSV, 4Seasons imu.txt or a KITTI oxts "
+                      "folder; none when empty");
+  command->AddDefault("wheel_path", &paths->wheel_path,
+                      "wheel log, told apart by its header line, or a TUM "
+                      "odometry trajectory; none when empty");
+}
+
+void AddFusionOptions(OdometryFusionOptions* fusion, CommandOptions* command) {
+  const auto add = [command](const char* name, auto* value, const char* help) {
+    command->AddDefault(std::string("AdaSfmPriors.") + name, value, help);
+  };
+  add("gravity_m_s2", &fusion->gravity_m_s2, "the Earth's pull [m/s^2]");
+  add("gyroscope_bias_sigma", &fusion->gyroscope_bias_sigma,
+      "gyroscope bias before any data, 1 sigma [rad/s]");
+  add("accelerometer_bias_sigma", &fusion->accelerometer_bias_sigma,
+      "accelerometer bias before any data, 1 sigma [m/s^2]");
+  add("wheel_scale_sigma", &fusion->wheel_scale_sigma,
+      "scale of the wheels before any data, 1 sigma [1 = 100 %]");
+  add("wheel_track_sigma", &fusion->wheel_track_sigma,
+      "scale of the track width before any data, 1 sigma [1 = 100 %]");
+  add("wheel_curvature_sigma", &fusion->wheel_curvature_sigma,
+      "difference of the wheels before any data, 1 sigma [1/m]");
+  add("wheel_mount_sigma_deg", &fusion->wheel_mount_sigma_deg,
+      "driving direction against T_imu_wheel, 1 sigma [deg]; 0 trusts it");
+  add("lateral_speed_noise", &fusion->lateral_speed_noise,
+      "sideways speed of the wheel frame [m/s/sqrt(Hz)]");
+  add("vertical_speed_noise", &fusion->vertical_speed_noise,
+      "vertical speed of the wheel frame [m/s/sqrt(Hz)]");
+  add("slip_threshold_sigma", &fusion->slip_threshold_sigma,
+      "wheels further than this from the IMU lose weight [sigma]");
+  add("slip_min_speed_m_s", &fusion->slip_min_speed_m_s,
+      "slip is reported beyond this error of the speed [m/s]");
+  add("standstill_speed_sigma", &fusion->standstill_speed_sigma,
+      "speed of a machine at rest, 1 sigma [m/s]");
+  add("standstill_rate_sigma", &fusion->standstill_rate_sigma,
+      "angular rate of a machine at rest, 1 sigma [rad/s]");
+  add("unaided_speed_sigma", &fusion->unaided_speed_sigma,
+      "speed of an IMU without wheels, 1 sigma [m/s]");
+  add("max_num_iterations", &fusion->max_num_iterations,
+      "iterations of the smoother");
+}
+
+void AddOptions(PriorImportOptions* options, CommandOptions* command) {
+  PriorEstimationOptions* estimation = &options->estimation;
+  const auto add = [command](const char* name, auto* value, const char* help) {
+    command->AddDefault(std::string("AdaSfmPriors.") + name, value, help);
+  };
+  add("max_imu_gap_s", &estimation->max_imu_gap_s,
+      "longest gap of the IMU log to bridge [s]");
+  add("max_wheel_gap_s", &estimation->max_wheel_gap_s,
+      "longest gap of the wheel log to bridge [s]");
+  add("max_link_s", &estimation->max_link_s,
+      "images further apart get states between them [s]");
+  add("max_lead_s", &estimation->max_lead_s,
+      "logs are used from this long before the first image on [s]");
+  add("use_visual_rotations", &estimation->use_visual_rotations,
+      "two-view rotations give the first gyroscope bias when the machine never "
+      "stands still (0 or 1)");
+  add("visual_bias_sigma", &estimation->visual_bias_sigma,
+      "how well they give it, 1 sigma [rad/s]");
+  add("estimate_time_shift", &estimation->estimate_time_shift,
+      "add the time shift that vision and gyroscope agree on to the "
+      "calibration's (0 or 1)");
+  add("max_visual_gap", &options->max_visual_gap,
+      "two-view rotations are taken from images at most this many apart");
+  AddFusionOptions(&estimation->fusion, command);
+}
+
+}  // namespace
+
+Status RunAdasfmPriorImporter(int argc, char** argv) {
+  PriorImportPaths paths;
+  PriorImportOptions options;
+  bool force = false;
+  std::string summary_path;
+  CommandOptions command(
+      "adasfm_prior_importer",
+      "Turns IMU and wheel logs into relative pose priors in the database.");
+  AddPathOptions(&paths, &command);
+  command.AddDefault("force", &force,
+                     "import although vision and gyroscope contradict each "
+                     "other (0 or 1)");
+  command.AddDefault("summary_path", &summary_path,
+                     "file for the summary as JSON; when empty, the database's "
+                     "path with .priors.json");
+  AddOptions(&options, &command);
+  const Status parsed = command.Parse(argc, argv);
+  if (!parsed.ok() || command.HelpShown()) return parsed;
+  const Status valid = CheckOptions(options);
+  if (!valid.ok()) return valid;
+  options.estimation.check_against_vision = !force;
+  if (summary_path.empty()) summary_path = paths.database_path + ".priors.json";
+
+  const StatusOr<PriorImport> import = ComputePriorImport(paths, options);
+  if (!import.ok()) return import.status();
+  // The database comes last: an error before leaves it as it was.
+  Status status =
+      WriteTextFile(summary_path, PriorImportToJson(*import) + "\n");
+  if (status.ok()) {
+    status = WritePriorTables(paths.database_path, import->tables);
+  }
+  if (!status.ok()) return status;
+  std::cout << FormatPriorImport(*import) << "Priors written to "
+            << paths.database_path << ", summary to " << summary_path
+            << std::endl;
+  return Status::Ok();
+}
+
+}  // namespace adasfm
