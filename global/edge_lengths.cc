@@ -137,6 +137,15 @@ class LengthPropagator {
     log_sigmas_[e] = log_sigma;
     is_known_[e] = is_fixed_[e] = true;
   }
+  // A length at which the edge's points have the same median depth as those of
+  // all seeds.
+  void Seed(size_t e) {
+    std::vector<WeightedValue> log_depths;
+    for (const DepthPair& pair : depth_pairs_[e]) {
+      log_depths.push_back({pair.log_depth1, 1.0});
+    }
+    Fix(e, -WeightedMedian(&log_depths), options_.max_log_sigma);
+  }
   bool IsKnown(size_t e) const { return is_known_[e]; }
   size_t NumDepthPairs(size_t e) const { return depth_pairs_[e].size(); }
 
@@ -220,11 +229,13 @@ class LengthPropagator {
     for (WeightedValue& value : values) {
       value.value = std::abs(value.value - median);
     }
-    log_lengths_[e] = median;
     // 1.4826 takes a median deviation to a normal's sigma, sqrt(pi / 2) the
     // mean's error to the median's.
-    log_sigmas_[e] = 1.4826 * 1.2533 * WeightedMedian(&values) /
-                     std::sqrt(static_cast<double>(values.size()));
+    const double log_sigma = 1.4826 * 1.2533 * WeightedMedian(&values) /
+                             std::sqrt(static_cast<double>(values.size()));
+    if (!(log_sigma <= options_.max_log_sigma)) return false;
+    log_lengths_[e] = median;
+    log_sigmas_[e] = log_sigma;
     is_known_[e] = true;
     return true;
   }
@@ -240,6 +251,24 @@ class LengthPropagator {
   std::vector<bool> is_fixed_;
 };
 
+// Starts every part of the graph that shares too few points with the others,
+// the edges with most matches first. Their units are tied by the depth of the
+// scene: its median is taken to be the same everywhere.
+void SeedParts(const EdgeLengthOptions& options, size_t num_edges,
+               LengthPropagator* propagator) {
+  std::vector<int> order(num_edges);
+  std::iota(order.begin(), order.end(), 0);
+  std::stable_sort(order.begin(), order.end(), [propagator](int a, int b) {
+    return propagator->NumDepthPairs(a) > propagator->NumDepthPairs(b);
+  });
+  for (const int e : order) {
+    if (propagator->NumDepthPairs(e) < options.min_num_shared) break;
+    if (propagator->IsKnown(e)) continue;
+    propagator->Seed(e);
+    propagator->Spread();
+  }
+}
+
 }  // namespace
 
 bool EdgeLengthOptions::IsValid(std::string* error) const {
@@ -248,11 +277,12 @@ bool EdgeLengthOptions::IsValid(std::string* error) const {
              " must be > 0";
     return false;
   }
-  if (max_num_matches < 1 || min_num_shared < 1 || num_sweeps < 0) {
+  if (max_num_matches < 1 || min_num_shared < 1 || num_sweeps < 0 ||
+      !(max_log_sigma > 0.0)) {
     *error = "max_num_matches = " + std::to_string(max_num_matches) +
              " and min_num_shared = " + std::to_string(min_num_shared) +
-             " must be >= 1, num_sweeps = " + std::to_string(num_sweeps) +
-             " >= 0";
+             " must be >= 1, max_log_sigma > 0, num_sweeps = " +
+             std::to_string(num_sweeps) + " >= 0";
     return false;
   }
   return true;
@@ -273,22 +303,7 @@ EdgeLengths EstimateEdgeLengths(
     result.metric = true;
   }
   propagator.Spread();
-  if (!result.metric) {
-    // The unit is the length of the edge with most matches; what shares no
-    // points with its part of the graph stays unknown.
-    std::vector<int> order(num_edges);
-    std::iota(order.begin(), order.end(), 0);
-    std::stable_sort(order.begin(), order.end(), [&propagator](int a, int b) {
-      return propagator.NumDepthPairs(a) > propagator.NumDepthPairs(b);
-    });
-    for (const int e : order) {
-      if (propagator.IsKnown(e)) continue;
-      if (propagator.NumDepthPairs(e) < options.min_num_shared) break;
-      propagator.Fix(e, 0.0, 0.0);
-      propagator.Spread();
-      break;
-    }
-  }
+  if (!result.metric) SeedParts(options, num_edges, &propagator);
   for (int i = 0; i < options.num_sweeps; ++i) propagator.Sweep();
   result.lengths.resize(num_edges);
   for (size_t e = 0; e < num_edges; ++e) {

@@ -19,6 +19,9 @@ struct EdgeLengthOptions {
   int max_num_matches = 300;
   // Keypoints with known depth that an edge must share.
   int min_num_shared = 5;
+  // Lengths less certain than this (1 sigma of their logarithm) are not
+  // learned.
+  double max_log_sigma = 0.2;
   // Passes over all edges after the first.
   int num_sweeps = 3;
   int num_threads = -1;
@@ -42,9 +45,9 @@ struct EdgeLengths {
 
 // How long the visual edges are, through the points that they share: a keypoint
 // has one depth in its image, and each edge sees it as a multiple of its own
-// length. Metric lengths of the priors start it; without any the edge with most
-// matches has length 1. So collinear centres, which directions alone leave
-// free, become solvable. known_lengths_m: of sensor edges.
+// length. Metric lengths of the priors start it; without any
+// the depth of the scene sets the unit. So collinear centres, which directions
+// alone leave free, become solvable. known_lengths_m: of sensor edges.
 EdgeLengths EstimateEdgeLengths(
     const EdgeLengthOptions& options, const ViewGraph& graph,
     const std::map<ImagePair, double>& known_lengths_m,

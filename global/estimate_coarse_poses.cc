@@ -32,6 +32,7 @@ class CoarsePoseEstimator {
     FilterLoops();
     EstimateRotations();
     FilterByRotation();
+    if (options_.num_rotation_rounds > 1) RepeatRotations();
     EstimateTranslations();
     EstimatePositions();
     result_.graph = std::move(graph_);
@@ -128,6 +129,48 @@ class CoarsePoseEstimator {
     EndStep("rotation filter", std::to_string(num_removed) + " removed, " +
                                    std::to_string(num_added) +
                                    " sensor edges added");
+  }
+
+  // Global rotations tell the two optima of nearly planar pairs apart, as
+  // odometry does for the others.
+  void RepeatRotations() {
+    for (int round = 1; round < options_.num_rotation_rounds; ++round) {
+      const auto predictions = PredictFromRotations();
+      if (std::none_of(predictions.begin(), predictions.end(),
+                       [](const auto& p) { return p.has_value(); })) {
+        return;
+      }
+      for (ViewGraphEdge& edge : graph_.edges) {
+        if (edge.removal == EdgeRemoval::kRotation) {
+          edge.removal = EdgeRemoval::kKept;
+        }
+      }
+      if (options_.relative_poses.enabled) {
+        RefineRelativePoses(options_.relative_poses, correspondences_,
+                            predictions, &graph_);
+      }
+      EstimateRotations();
+      FilterByRotation();
+    }
+  }
+
+  // For pairs that odometry does not predict.
+  std::vector<std::optional<RotationPrediction>> PredictFromRotations() const {
+    const double sigma_rad = DegToRad(options_.global_rotation_sigma_deg);
+    std::vector<std::optional<RotationPrediction>> predictions;
+    for (const ViewGraphEdge& edge : graph_.edges) {
+      predictions.emplace_back();
+      const auto rotation1 = rotations_.find(edge.image_id1);
+      const auto rotation2 = rotations_.find(edge.image_id2);
+      if (rotation1 == rotations_.end() || rotation2 == rotations_.end() ||
+          chain_.IsConnected(edge.image_id1, edge.image_id2)) {
+        continue;
+      }
+      predictions.back() = RotationPrediction{
+          rotation2->second * rotation1->second.conjugate(),
+          sigma_rad * sigma_rad * Eigen::Matrix3d::Identity()};
+    }
+    return predictions;
   }
 
   void EstimateTranslations() {

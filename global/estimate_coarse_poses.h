@@ -37,6 +37,11 @@ struct CoarsePoseOptions {
   // Least error granted to the odometry's rotation between two cameras (their
   // calibration, rolling shutter), added to its covariance.
   double min_predicted_rotation_sigma_deg = 0.05;
+  // Rounds of relative poses and rotation averaging for pairs that odometry
+  // does not predict: each takes the global rotations of the last as prediction
+  // with this sigma.
+  int num_rotation_rounds = 2;
+  double global_rotation_sigma_deg = 1.0;
   // Edges with fewer inliers take no part.
   int min_num_inliers = 15;
   // Priors shorter than this (standstill) say nothing about depths.
