@@ -15,8 +15,9 @@ namespace adasfm {
 struct OdometryFusionOptions {
   // The Earth's pull varies by 0.5 %; the accelerometer bias takes the rest.
   double gravity_m_s2 = 9.81;
-  // What is believed of biases before any data: a phone's IMU at power-on.
-  double gyroscope_bias_sigma = 0.02;     // rad/s
+  // What is believed of biases before any data: MEMS with a factory
+  // calibration.
+  double gyroscope_bias_sigma = 0.005;    // rad/s
   double accelerometer_bias_sigma = 0.3;  // m/s^2
   // Tyres wear, loads change: the wheels' scale before any data.
   double wheel_scale_sigma = 0.01;

@@ -1,0 +1,389 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/random.h"
+#include "core/so3.h"
+#include "dataset.h"
+#include "synthetic/synthetic_world.h"
+
+namespace adasfm {
+namespace {
+
+SyntheticWorldOptions SmallWorld(uint64_t seed, int num_images = 80) {
+  SyntheticWorldOptions options;
+  options.num_images = num_images;
+  options.seed = seed;
+  // Only the logs matter here.
+  options.num_keypoints_per_image = 8;
+  options.num_sequential_neighbors = 1;
+  return options;
+}
+
+Dataset ToDataset(const SyntheticWorld& world) {
+  Dataset data;
+  SensorCalibration& calibration = data.calibration;
+  calibration.cam_from_imu = world.cam_from_imu;
+  calibration.timeshift_cam_imu_s = world.options.timeshift_cam_imu_s;
+  calibration.has_imu = true;
+  calibration.imu_noise = world.options.imu_noise;
+  calibration.imu_rate_hz = world.options.imu_rate_hz;
+  calibration.has_wheel = true;
+  calibration.wheel_type = WheelType::kDifferential;
+  calibration.track_width_m = world.track_width_m;
+  calibration.wheel_speed_noise = world.options.wheel_speed_noise;
+  calibration.imu_from_wheel = world.imu_from_wheel;
+  data.logs.imu = world.imu_samples;
+  data.logs.wheel = world.wheel_samples;
+  for (const SyntheticImage& image : world.images) {
+    data.images.push_back({image.image_id, image.name, image.timestamp_ns});
+    data.cams_from_world[image.image_id] = image.cam_from_world;
+  }
+  return data;
+}
+
+PriorEstimate Estimate(const Dataset& data) {
+  const StatusOr<PriorEstimate> estimate =
+      EstimatePriors(data.images, data.logs, data.calibration, {}, {});
+  if (!estimate.ok()) throw std::runtime_error(estimate.status().message());
+  return *estimate;
+}
+
+std::vector<VisualRotation> SimulateVision(const SyntheticWorld& world,
+                                           uint64_t seed) {
+  Random random(seed);
+  std::vector<VisualRotation> rotations;
+  for (size_t i = 0; i + 1 < world.images.size(); ++i) {
+    const SyntheticImage& first = world.images[i];
+    const SyntheticImage& second = world.images[i + 1];
+    const Eigen::Quaterniond truth =
+        ComputeCam2FromCam1(first.cam_from_world, second.cam_from_world)
+            .rotation;
+    rotations.push_back({first.image_id, second.image_id,
+                         ExpSo3(random.GaussianVector(1e-3)) * truth, 100});
+  }
+  return rotations;
+}
+
+TEST(SyntheticPriors, ErrorsMatchTheirCovarianceOverTwentySeeds) {
+  double chi2 = 0.0;
+  constexpr int kNumSeeds = 20;
+  for (int seed = 1; seed <= kNumSeeds; ++seed) {
+    SyntheticWorldOptions options = SmallWorld(seed);
+    options.wheel_scale = seed % 2 == 0 ? 1.01 : 0.995;
+    const SyntheticWorld world = BuildSyntheticWorld(options);
+    const Dataset data = ToDataset(world);
+    const PriorEstimate estimate = Estimate(data);
+    EXPECT_EQ(estimate.summary.num_priors, options.num_images - 1);
+    chi2 += ComputePairErrors(estimate, data.cams_from_world).chi2 / kNumSeeds;
+    EXPECT_NEAR(estimate.summary.wheel_scale, options.wheel_scale,
+                4.0 * estimate.summary.wheel_scale_sigma);
+    EXPECT_TRUE(estimate.summary.warnings.empty());
+  }
+  RecordProperty("chi2", std::to_string(chi2));
+  EXPECT_GT(chi2, 0.8);
+  EXPECT_LT(chi2, 1.25);
+}
+
+TEST(SyntheticPriors, LongerDrivesTellTheWheelScale) {
+  double squares = 0.0;
+  for (const uint64_t seed : {1, 2, 3, 4, 5}) {
+    SyntheticWorldOptions options = SmallWorld(seed, 250);
+    options.wheel_scale = 1.02;
+    const Dataset data = ToDataset(BuildSyntheticWorld(options));
+    const double error = Estimate(data).summary.wheel_scale - 1.02;
+    squares += error * error / 5.0;
+  }
+  EXPECT_LT(std::sqrt(squares), 0.003);
+}
+
+TEST(SyntheticPriors, StartsWithoutStandstill) {
+  for (const uint64_t seed : {1, 2, 3}) {
+    SyntheticWorldOptions options = SmallWorld(seed);
+    const SyntheticWorld world = BuildSyntheticWorld(options);
+    Dataset data = ToDataset(world);
+    // Cut everything before the first image.
+    const timestamp_t start = data.images.front().timestamp_ns;
+    while (data.logs.imu.front().timestamp_ns < start - 20'000'000) {
+      data.logs.imu.erase(data.logs.imu.begin());
+    }
+    const StatusOr<PriorEstimate> estimate =
+        EstimatePriors(data.images, data.logs, data.calibration,
+                       SimulateVision(world, seed), {});
+    ASSERT_TRUE(estimate.ok()) << estimate.status().message();
+    EXPECT_EQ(estimate->summary.standstill_s, 0.0);
+    // Vision tells the gyroscope's bias to 1e-3 rad over 79 pairs of 0.2 s.
+    EXPECT_LT((estimate->summary.gyroscope_bias - world.true_gyro_bias).norm(),
+              0.004);
+    const PairErrors errors =
+        ComputePairErrors(*estimate, data.cams_from_world);
+    EXPECT_GT(errors.chi2, 0.4);
+    EXPECT_LT(errors.chi2, 2.0);
+  }
+}
+
+TEST(SyntheticPriors, SlipsAreFoundAndTheLengthStays) {
+  for (const uint64_t seed : {3, 4, 5}) {
+    SyntheticWorldOptions options = SmallWorld(seed, 150);
+    options.num_wheel_slips = 2;
+    const SyntheticWorld world = BuildSyntheticWorld(options);
+    const Dataset data = ToDataset(world);
+    const PriorEstimate estimate = Estimate(data);
+    for (const auto& [start, end] : world.wheel_slips) {
+      double overlap = 0.0;
+      for (const WheelSlip& slip : estimate.summary.wheel_slips) {
+        overlap += std::max(0.0, SecondsFromNs(std::min(end, slip.end_ns) -
+                                               std::max(start, slip.start_ns)));
+      }
+      EXPECT_GT(overlap, 0.7 * SecondsFromNs(end - start)) << "seed " << seed;
+    }
+    const PairErrors errors = ComputePairErrors(estimate, data.cams_from_world);
+    EXPECT_NEAR(errors.length_ratio, 1.0, 0.01) << "seed " << seed;
+  }
+}
+
+TEST(SyntheticPriors, GravityPointsDown) {
+  const SyntheticWorld world = BuildSyntheticWorld(SmallWorld(6));
+  const Dataset data = ToDataset(world);
+  const PriorEstimate estimate = Estimate(data);
+  for (const auto& [image_id, gravity] : estimate.gravity_in_cam) {
+    const Eigen::Vector3d truth =
+        data.cams_from_world.at(image_id).rotation * -Eigen::Vector3d::UnitZ();
+    // The accelerometer's bias of 0.03 m/s^2 is 0.2 deg of tilt.
+    EXPECT_LT(RadToDeg(AngleBetweenRad(gravity, truth)), 1.0);
+  }
+  EXPECT_EQ(estimate.gravity_in_cam.size(), data.images.size());
+}
+
+TEST(SyntheticPriors, ImuAloneClaimsRotationOnly) {
+  Dataset data = ToDataset(BuildSyntheticWorld(SmallWorld(7)));
+  data.calibration.has_wheel = false;
+  data.logs.wheel.clear();
+  const PriorEstimate estimate = Estimate(data);
+  ASSERT_EQ(estimate.priors.size(), data.images.size() - 1);
+  for (const RelativePosePrior& prior : estimate.priors) {
+    EXPECT_EQ(prior.flags, static_cast<uint32_t>(kPriorRotation));
+    EXPECT_TRUE(std::isinf(prior.covariance(3, 3)));
+    EXPECT_TRUE(std::isfinite(prior.covariance(0, 0)));
+  }
+  const PairErrors errors = ComputePairErrors(estimate, data.cams_from_world);
+  EXPECT_LT(errors.rotation_rms_deg, 0.05);
+  EXPECT_FALSE(estimate.gravity_in_cam.empty());
+}
+
+TEST(SyntheticPriors, SpeedAloneClaimsLengthOnly) {
+  Dataset data = ToDataset(BuildSyntheticWorld(SmallWorld(8)));
+  data.calibration.has_imu = false;
+  data.calibration.wheel_type = WheelType::kSpeed;
+  data.logs.imu.clear();
+  for (WheelSample& sample : data.logs.wheel) {
+    sample.first = 0.5 * (sample.first + sample.second);
+  }
+  const PriorEstimate estimate = Estimate(data);
+  ASSERT_EQ(estimate.priors.size(), data.images.size() - 1);
+  double length = 0.0, true_length = 0.0;
+  for (const RelativePosePrior& prior : estimate.priors) {
+    EXPECT_EQ(prior.flags, static_cast<uint32_t>(kPriorLength));
+    EXPECT_TRUE(std::isinf(prior.covariance(0, 0)));
+    length += prior.cam2_from_cam1.translation.norm();
+    true_length += ComputeCam2FromCam1(data.cams_from_world.at(prior.image_id1),
+                                       data.cams_from_world.at(prior.image_id2))
+                       .translation.norm();
+  }
+  EXPECT_TRUE(estimate.gravity_in_cam.empty());
+  // Bends move the camera beside the wheels' axis.
+  EXPECT_NEAR(length / true_length, 1.0, 0.03);
+}
+
+TEST(SyntheticPriors, WheelsAloneGivePlanarMotion) {
+  Dataset data = ToDataset(BuildSyntheticWorld(SmallWorld(9)));
+  data.calibration.has_imu = false;
+  data.logs.imu.clear();
+  const PriorEstimate estimate = Estimate(data);
+  for (const RelativePosePrior& prior : estimate.priors) {
+    EXPECT_TRUE(prior.HasRotation() && prior.HasDirection() &&
+                prior.HasLength());
+  }
+  const PairErrors errors = ComputePairErrors(estimate, data.cams_from_world);
+  EXPECT_NEAR(errors.length_ratio, 1.0, 0.01);
+  EXPECT_LT(errors.rotation_rms_deg, 1.5);
+}
+
+TEST(SyntheticPriors, TrajectoryAloneGivesEverything) {
+  const SyntheticWorld world = BuildSyntheticWorld(SmallWorld(10));
+  Dataset data = ToDataset(world);
+  data.logs = SensorLogs();
+  data.calibration.has_imu = false;
+  data.calibration.wheel_type = WheelType::kOdometry;
+  for (const SyntheticImage& image : world.images) {
+    const Rigid3d world_from_body = image.cam_from_world.Inverse() *
+                                    world.cam_from_imu * world.imu_from_wheel;
+    data.logs.odometry.push_back({image.timestamp_ns, world_from_body});
+  }
+  const PriorEstimate estimate = Estimate(data);
+  const PairErrors errors = ComputePairErrors(estimate, data.cams_from_world);
+  EXPECT_EQ(estimate.summary.num_priors, 79);
+  EXPECT_LT(errors.rotation_rms_deg, 0.05);
+  EXPECT_LT(errors.translation_rms_m, 0.005);
+}
+
+TEST(SyntheticPriors, ImagesOutsideTheLogsAreCounted) {
+  Dataset data = ToDataset(BuildSyntheticWorld(SmallWorld(11)));
+  data.images.push_back(
+      {1000, "late.png",
+       data.images.back().timestamp_ns + timestamp_t{100'000'000'000}});
+  const PriorEstimate estimate = Estimate(data);
+  EXPECT_EQ(estimate.summary.num_images, 81);
+  EXPECT_EQ(estimate.summary.num_images_in_logs, 80);
+  EXPECT_EQ(estimate.summary.num_priors, 79);
+}
+
+TEST(SyntheticPriors, NoOverlapIsAnError) {
+  Dataset data = ToDataset(BuildSyntheticWorld(SmallWorld(12)));
+  for (ImageStamp& image : data.images) {
+    image.timestamp_ns += 1'000'000'000'000;
+  }
+  const StatusOr<PriorEstimate> estimate =
+      EstimatePriors(data.images, data.logs, data.calibration, {}, {});
+  ASSERT_FALSE(estimate.ok());
+  EXPECT_NE(estimate.status().message().find("no image lies within"),
+            std::string::npos);
+}
+
+TEST(SyntheticPriors, AGapInTheImuCostsItsPairsOnly) {
+  Dataset data = ToDataset(BuildSyntheticWorld(SmallWorld(13)));
+  data.calibration.has_wheel = false;
+  data.logs.wheel.clear();
+  const timestamp_t start = data.images[30].timestamp_ns + 10'000'000;
+  const timestamp_t end = data.images[33].timestamp_ns - 10'000'000;
+  std::vector<ImuSample> kept;
+  for (const ImuSample& sample : data.logs.imu) {
+    if (sample.timestamp_ns < start || sample.timestamp_ns > end) {
+      kept.push_back(sample);
+    }
+  }
+  data.logs.imu = kept;
+  const PriorEstimate estimate = Estimate(data);
+  EXPECT_EQ(estimate.summary.num_priors, 76);
+  EXPECT_LT(ComputePairErrors(estimate, data.cams_from_world).rotation_rms_deg,
+            0.05);
+}
+
+TEST(SyntheticPriors, SameInputSameResult) {
+  const Dataset data = ToDataset(BuildSyntheticWorld(SmallWorld(14)));
+  const PriorEstimate a = Estimate(data), b = Estimate(data);
+  for (size_t i = 0; i < a.priors.size(); ++i) {
+    EXPECT_EQ(a.priors[i].covariance, b.priors[i].covariance);
+    EXPECT_EQ(a.priors[i].cam2_from_cam1.translation,
+              b.priors[i].cam2_from_cam1.translation);
+  }
+}
+
+// What users get wrong, and the words that must be in the answer.
+struct Mistake {
+  const char* name;
+  void (*make)(Dataset*);
+  const char* words;
+};
+
+class Mistakes : public testing::TestWithParam<Mistake> {};
+
+TEST_P(Mistakes, AreNamed) {
+  for (const uint64_t seed : {1, 2, 3}) {
+    const SyntheticWorld world = BuildSyntheticWorld(SmallWorld(seed, 120));
+    Dataset data = ToDataset(world);
+    GetParam().make(&data);
+    const std::vector<VisualRotation> vision = SimulateVision(world, seed);
+    const StatusOr<PriorEstimate> estimate =
+        EstimatePriors(data.images, data.logs, data.calibration, vision, {});
+    ASSERT_FALSE(estimate.ok()) << GetParam().name;
+    EXPECT_NE(estimate.status().message().find(GetParam().words),
+              std::string::npos)
+        << estimate.status().message();
+    // The user may insist.
+    PriorEstimationOptions options;
+    options.check_against_vision = false;
+    EXPECT_TRUE(EstimatePriors(data.images, data.logs, data.calibration, vision,
+                               options)
+                    .ok());
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Table, Mistakes,
+    testing::Values(Mistake{"SwappedAxes",
+                            [](Dataset* data) {
+                              for (ImuSample& s : data->logs.imu) {
+                                std::swap(s.angular_velocity.y(),
+                                          s.angular_velocity.z());
+                                std::swap(s.specific_force.y(),
+                                          s.specific_force.z());
+                              }
+                            },
+                            "axes"},
+                    Mistake{"InvertedExtrinsics",
+                            [](Dataset* data) {
+                              data->calibration.cam_from_imu =
+                                  data->calibration.cam_from_imu.Inverse();
+                            },
+                            "inverted"},
+                    Mistake{"Degrees",
+                            [](Dataset* data) {
+                              for (ImuSample& s : data->logs.imu) {
+                                s.angular_velocity *= RadToDeg(1.0);
+                              }
+                            },
+                            "deg/s"},
+                    Mistake{"OneSecond",
+                            [](Dataset* data) {
+                              for (ImuSample& s : data->logs.imu) {
+                                s.timestamp_ns += 1'000'000'000;
+                              }
+                            },
+                            "timeshift_cam_imu"}),
+    [](const testing::TestParamInfo<Mistake>& mistake) {
+      return mistake.param.name;
+    });
+
+TEST(VisionCheck, FindsTheTimeShift) {
+  for (const uint64_t seed : {1, 2, 3}) {
+    SyntheticWorldOptions world_options = SmallWorld(seed, 120);
+    world_options.timeshift_cam_imu_s = 0.0623;
+    const SyntheticWorld world = BuildSyntheticWorld(world_options);
+    Dataset data = ToDataset(world);
+    data.calibration.timeshift_cam_imu_s = 0.0;
+    PriorEstimationOptions options;
+    options.estimate_time_shift = true;
+    const StatusOr<PriorEstimate> estimate =
+        EstimatePriors(data.images, data.logs, data.calibration,
+                       SimulateVision(world, seed), options);
+    ASSERT_TRUE(estimate.ok()) << estimate.status().message();
+    EXPECT_NEAR(estimate->summary.timeshift_cam_imu_s, 0.0623, 0.01);
+  }
+}
+
+TEST(VisionCheck, AcceptsARightCalibration) {
+  for (const uint64_t seed : {4, 5, 6}) {
+    const SyntheticWorld world = BuildSyntheticWorld(SmallWorld(seed));
+    const Dataset data = ToDataset(world);
+    const StatusOr<PriorEstimate> estimate =
+        EstimatePriors(data.images, data.logs, data.calibration,
+                       SimulateVision(world, seed), {});
+    EXPECT_TRUE(estimate.ok()) << estimate.status().message();
+  }
+}
+
+TEST(PriorEstimationOptions, BadValuesAreNamed) {
+  PriorEstimationOptions options;
+  std::string error;
+  EXPECT_TRUE(options.IsValid(&error));
+  options.max_link_s = 0.0;
+  EXPECT_FALSE(options.IsValid(&error));
+  EXPECT_NE(error.find("max_link_s"), std::string::npos);
+  EXPECT_THROW(EstimatePriors({}, {}, {}, {}, options), std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace adasfm
