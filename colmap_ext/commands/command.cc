@@ -61,7 +61,7 @@ CommandOptions::CommandOptions(const std::string& name,
   AddDefault("log_to_stderr", &log_to_stderr_,
              "print COLMAP's informational log lines too (0 or 1)");
   AddDefault("log_level", &log_level_,
-             "verbosity of COLMAP's log lines, 0 to 4");
+             "verbosity of the log lines of COLMAP and Ceres, 0 to 4");
 }
 
 void CommandOptions::PrintHelp() const {

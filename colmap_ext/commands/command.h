@@ -52,7 +52,7 @@ class CommandOptions {
   boost::program_options::options_description options_;
   std::string project_path_;
   bool log_to_stderr_ = false;
-  int log_level_ = 2;
+  int log_level_ = 0;
   bool help_shown_ = false;
 };
 
