@@ -48,7 +48,7 @@ class ModelRefiner {
     Filter(options_.filter_max_reproj_error_px);
     if (PutBackContradictedImages()) Adjust(10, 1e-4);
     triangulator_.CompleteAndMergeTracks(options_.filter_max_reproj_error_px);
-    Adjust(20, 1e-5);
+    Adjust(25, 1e-6);
     Filter(options_.filter_max_reproj_error_px);
     return summary_;
   }
