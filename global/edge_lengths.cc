@@ -130,12 +130,14 @@ class LengthPropagator {
     log_sigmas_.assign(num_edges, 0.0);
     is_known_.assign(num_edges, false);
     is_fixed_.assign(num_edges, false);
+    has_known_.assign(graph.images.size(), false);
   }
 
   void Fix(size_t e, double log_length, double log_sigma) {
     log_lengths_[e] = log_length;
     log_sigmas_[e] = log_sigma;
-    is_known_[e] = is_fixed_[e] = true;
+    is_fixed_[e] = true;
+    MarkKnown(e);
   }
   // A length at which the edge's points have the same median depth as those of
   // all seeds.
@@ -146,12 +148,17 @@ class LengthPropagator {
     }
     Fix(e, -WeightedMedian(&log_depths), options_.max_log_sigma);
   }
+  // Whether an edge of known length ends at one of its images.
+  bool TouchesKnown(size_t e) const {
+    return has_known_[graph_.IndexOf(graph_.edges[e].image_id1)] ||
+           has_known_[graph_.IndexOf(graph_.edges[e].image_id2)];
+  }
   bool IsKnown(size_t e) const { return is_known_[e]; }
   size_t NumDepthPairs(size_t e) const { return depth_pairs_[e].size(); }
 
-  // Spreads lengths from the known edges, those that share most keypoints with
-  // known ones first.
-  void Spread() {
+  // Spreads lengths from the known edges to those that share enough keypoints
+  // with them, most first.
+  void Spread(int min_num_shared) {
     using Candidate = std::tuple<int, int>;  // shared keypoints, -edge
     std::priority_queue<Candidate> queue;
     std::vector<int> num_shared(depth_pairs_.size(), 0);
@@ -163,7 +170,7 @@ class LengthPropagator {
           has_depth[keypoint] = true;
           for (const DepthLink& link : links_[keypoint]) {
             if (is_known_[link.edge]) continue;
-            if (++num_shared[link.edge] >= options_.min_num_shared) {
+            if (++num_shared[link.edge] >= min_num_shared) {
               queue.emplace(num_shared[link.edge], -link.edge);
             }
           }
@@ -192,6 +199,12 @@ class LengthPropagator {
   }
 
  private:
+  void MarkKnown(size_t e) {
+    is_known_[e] = true;
+    has_known_[graph_.IndexOf(graph_.edges[e].image_id1)] = true;
+    has_known_[graph_.IndexOf(graph_.edges[e].image_id2)] = true;
+  }
+
   size_t Keypoint1(size_t e, const DepthPair& pair) const {
     return keypoint_begin_[graph_.IndexOf(graph_.edges[e].image_id1)] +
            pair.index1;
@@ -236,7 +249,7 @@ class LengthPropagator {
     if (!(log_sigma <= options_.max_log_sigma)) return false;
     log_lengths_[e] = median;
     log_sigmas_[e] = log_sigma;
-    is_known_[e] = true;
+    MarkKnown(e);
     return true;
   }
 
@@ -249,23 +262,24 @@ class LengthPropagator {
   std::vector<double> log_sigmas_;
   std::vector<bool> is_known_;
   std::vector<bool> is_fixed_;
+  std::vector<bool> has_known_;  // by image
 };
 
 // Starts every part of the graph that shares too few points with the others,
 // the edges with most matches first. Their units are tied by the depth of the
 // scene: its median is taken to be the same everywhere.
-void SeedParts(const EdgeLengthOptions& options, size_t num_edges,
+void SeedParts(const EdgeLengthOptions& options, const ViewGraph& graph,
                LengthPropagator* propagator) {
-  std::vector<int> order(num_edges);
+  std::vector<int> order(graph.edges.size());
   std::iota(order.begin(), order.end(), 0);
   std::stable_sort(order.begin(), order.end(), [propagator](int a, int b) {
     return propagator->NumDepthPairs(a) > propagator->NumDepthPairs(b);
   });
   for (const int e : order) {
-    if (propagator->NumDepthPairs(e) < options.min_num_shared) break;
-    if (propagator->IsKnown(e)) continue;
+    if (propagator->NumDepthPairs(e) < options.num_shared_reliable) break;
+    if (propagator->TouchesKnown(e)) continue;
     propagator->Seed(e);
-    propagator->Spread();
+    propagator->Spread(options.num_shared_reliable);
   }
 }
 
@@ -277,11 +291,13 @@ bool EdgeLengthOptions::IsValid(std::string* error) const {
              " must be > 0";
     return false;
   }
-  if (max_num_matches < 1 || min_num_shared < 1 || num_sweeps < 0 ||
+  if (max_num_matches < 1 || min_num_shared < 1 ||
+      num_shared_reliable < min_num_shared || num_sweeps < 0 ||
       !(max_log_sigma > 0.0)) {
     *error = "max_num_matches = " + std::to_string(max_num_matches) +
              " and min_num_shared = " + std::to_string(min_num_shared) +
-             " must be >= 1, max_log_sigma > 0, num_sweeps = " +
+             " must be >= 1, num_shared_reliable >= min_num_shared, "
+             "max_log_sigma > 0, num_sweeps = " +
              std::to_string(num_sweeps) + " >= 0";
     return false;
   }
@@ -302,8 +318,9 @@ EdgeLengths EstimateEdgeLengths(
     propagator.Fix(e, std::log(it->second), kPriorLogSigma);
     result.metric = true;
   }
-  propagator.Spread();
-  if (!result.metric) SeedParts(options, num_edges, &propagator);
+  propagator.Spread(options.num_shared_reliable);
+  if (!result.metric) SeedParts(options, graph, &propagator);
+  propagator.Spread(options.min_num_shared);
   for (int i = 0; i < options.num_sweeps; ++i) propagator.Sweep();
   result.lengths.resize(num_edges);
   for (size_t e = 0; e < num_edges; ++e) {

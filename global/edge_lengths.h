@@ -19,6 +19,9 @@ struct EdgeLengthOptions {
   int max_num_matches = 300;
   // Keypoints with known depth that an edge must share.
   int min_num_shared = 5;
+  // Edges that share at least this many come first; without metres, images out
+  // of their reach start a part with a unit of its own.
+  int num_shared_reliable = 20;
   // Lengths less certain than this (1 sigma of their logarithm) are not
   // learned.
   double max_log_sigma = 0.2;
