@@ -87,13 +87,14 @@ struct Comparison {
 };
 
 struct Fit {
-  double cost = std::numeric_limits<double>::infinity();  // rad, mean
+  double cost = std::numeric_limits<double>::infinity();  // rad/s, mean
   Eigen::Vector3d rate_offset = Eigen::Vector3d::Zero();  // rad/s, camera
 };
 
-// Mean distance between the visual rotations and the mapped gyroscope's, less
-// a constant rate (the bias): medians and plain distances, so that a few wrong
-// two-view geometries do not matter.
+// Mean distance between the mean rates of the visual rotations and the mapped
+// gyroscope's, less a constant (the bias). Rates, because what the model leaves
+// out (a slightly turned T_cam_imu) grows with the interval; medians and plain
+// distances, so that a few wrong two-view geometries do not matter.
 Fit ComputeFit(const Comparison& data, const Eigen::Matrix3d& map) {
   Fit fit;
   const size_t num = data.visual.size();
@@ -110,7 +111,7 @@ Fit ComputeFit(const Comparison& data, const Eigen::Matrix3d& map) {
   }
   double sum = 0.0;
   for (size_t i = 0; i < num; ++i) {
-    sum += (differences[i] - data.dt_s[i] * fit.rate_offset).norm();
+    sum += (differences[i] / data.dt_s[i] - fit.rate_offset).norm();
   }
   fit.cost = sum / std::max<size_t>(1, num);
   return fit;
@@ -170,7 +171,11 @@ class VisionComparer {
 
  private:
   void SelectRotations(const std::vector<TimedRotation>& rotations);
-  Comparison Compare(double shift_s) const;
+  Comparison Compare(double shift_s) const {
+    return Compare(rotations_, shift_s);
+  }
+  Comparison Compare(const std::vector<TimedRotation>& rotations,
+                     double shift_s) const;
   // The best shift on a coarse grid for every explanation.
   void SearchShifts(std::vector<Explanation>* explanations) const;
   void RefineShift(Explanation* explanation) const;
@@ -182,6 +187,8 @@ class VisionComparer {
   double timeshift_s_;
   VisionCheckOptions options_;
   std::vector<TimedRotation> rotations_;
+  // The shortest intervals only, for the exact time shift.
+  std::vector<TimedRotation> short_rotations_;
 };
 
 void VisionComparer::SelectRotations(
@@ -201,12 +208,27 @@ void VisionComparer::SelectRotations(
   for (size_t i = 0; i < usable.size(); i += stride) {
     rotations_.push_back(usable[i]);
   }
+  std::vector<timestamp_t> lengths;
+  for (const TimedRotation& rotation : usable) {
+    lengths.push_back(rotation.end_ns - rotation.start_ns);
+  }
+  std::sort(lengths.begin(), lengths.end());
+  for (const TimedRotation& rotation : usable) {
+    // Up to two frames: the tenth part of the lengths is one frame's, however
+    // far the matching reached.
+    const timestamp_t max_length = lengths[lengths.size() / 10] * 5 / 2;
+    if (rotation.end_ns - rotation.start_ns <= max_length &&
+        short_rotations_.size() < kMaxNumRotations) {
+      short_rotations_.push_back(rotation);
+    }
+  }
 }
 
-Comparison VisionComparer::Compare(double shift_s) const {
+Comparison VisionComparer::Compare(const std::vector<TimedRotation>& rotations,
+                                   double shift_s) const {
   const timestamp_t shift = std::llround(1e9 * (timeshift_s_ + shift_s));
   Comparison data;
-  for (const TimedRotation& rotation : rotations_) {
+  for (const TimedRotation& rotation : rotations) {
     const timestamp_t start = rotation.start_ns + shift;
     const timestamp_t end = rotation.end_ns + shift;
     if (!integral_.Covers(start) || !integral_.Covers(end)) continue;
@@ -270,13 +292,19 @@ void VisionComparer::SearchShifts(
   }
 }
 
-// Golden section about the coarse minimum.
+// Golden section about the coarse minimum. What the model leaves out (a
+// slightly turned T_cam_imu) grows with the interval and pulls on the shift, so
+// short intervals decide where there are enough of them.
 void VisionComparer::RefineShift(Explanation* explanation) const {
   constexpr double kRatio = 0.6180339887498949;
   double low = explanation->shift_s - kCoarseStepS;
   double high = explanation->shift_s + kCoarseStepS;
+  const bool has_short =
+      short_rotations_.size() >= 2 * options_.min_num_rotations;
   const auto cost = [&](double shift) {
-    return ComputeFit(Compare(shift), explanation->map).cost;
+    const Comparison data =
+        Compare(has_short ? short_rotations_ : rotations_, shift);
+    return ComputeFit(data, explanation->map).cost;
   };
   double a = high - kRatio * (high - low), b = low + kRatio * (high - low);
   double cost_a = cost(a), cost_b = cost(b);
@@ -295,12 +323,9 @@ void VisionComparer::RefineShift(Explanation* explanation) const {
       cost_b = cost(b);
     }
   }
-  const double shift = 0.5 * (low + high);
-  const Fit fit = ComputeFit(Compare(shift), explanation->map);
-  if (fit.cost <= explanation->fit.cost) {
-    explanation->fit = fit;
-    explanation->shift_s = shift;
-  }
+  explanation->shift_s = 0.5 * (low + high);
+  explanation->fit =
+      ComputeFit(Compare(explanation->shift_s), explanation->map);
 }
 
 std::string AxesToString(const Eigen::Matrix3d& axes) {

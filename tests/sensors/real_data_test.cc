@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <cstdio>
 
 #include "core/random.h"
@@ -69,7 +70,8 @@ TEST_P(RealData, KittiRotationsAreWithinFiveHundredthsOfADegree) {
 }
 
 // The cameras' rotations are the truth's with the noise of two-view geometries,
-// matched with the next eight images.
+// matched with the next eight images. On these sets vision and gyroscope differ
+// by 0.02 deg a frame (mean), more over longer intervals.
 TEST_P(RealData, KittiTimeShiftIsFoundWithinTenMilliseconds) {
   Dataset data;
   if (!ReadDataset(GetParam(), &data)) GTEST_SKIP() << "no shared data";
@@ -87,7 +89,8 @@ TEST_P(RealData, KittiTimeShiftIsFoundWithinTenMilliseconds) {
             ComputeCam2FromCam1(data.cams_from_world.at(id1),
                                 data.cams_from_world.at(id2))
                 .rotation;
-        const Eigen::Vector3d noise = random.GaussianVector(DegToRad(0.05));
+        const Eigen::Vector3d noise = random.GaussianVector(
+            DegToRad(0.02) * std::sqrt(static_cast<double>(id2 - id1)));
         rotations.push_back({id1, id2, ExpSo3(noise) * truth, 200});
       }
     }
