@@ -1,16 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include <unistd.h>
-
-#include <chrono>
 #include <iostream>
-#include <sstream>
 #include <string>
 
+#include "colmap_ext/adasfm_pipeline.h"
 #include "colmap_ext/commands/registry.h"
 #include "colmap_ext/global_report.h"
-#include "colmap_ext/global_stage.h"
-#include "colmap_ext/model_folder.h"
-#include "colmap_ext/two_view_geometry_backup.h"
 
 namespace adasfm {
 namespace {
@@ -73,100 +67,31 @@ void AddOptions(GlobalCommandOptions* options, CommandOptions* command) {
       "rewrite the database's two-view geometries");
 }
 
-Status CheckPaths(const GlobalCommandOptions& options) {
-  const Status status = CheckDatabase(options.database_path);
-  if (!status.ok()) return status;
-  if (options.stage.refinement.enabled &&
-      access(options.database_path.c_str(), W_OK) != 0) {
-    return Status::Error("the database " + options.database_path +
-                         " is not writable; change its permissions or use "
-                         "--AdaSfmGlobal.refine_matches 0");
-  }
-  return PrepareOutputFolder(options.output_path);
-}
-
-void PrintWarnings(const SceneData& scene) {
-  for (const std::string& warning : scene.warnings) {
-    std::cout << "WARNING: " << warning << std::endl;
-  }
-  if (scene.priors.empty()) {
-    std::cout << "WARNING: the database has no sensor priors; the model will "
-                 "have no metric scale (adasfm_prior_importer adds them)"
-              << std::endl;
-  }
-}
-
-// The models first: a crash in between leaves the database as it was.
-Status WriteResult(const GlobalCommandOptions& options, const SceneData& scene,
-                   const GlobalStageResult& result, double total_seconds) {
-  std::vector<const colmap::Reconstruction*> models;
-  for (const CoarseModel& model : result.models) {
-    models.push_back(&model.reconstruction);
-  }
-  Status status = WriteModelFolder(options.output_path, models);
-  if (status.ok()) {
-    status = WriteTextFile(options.output_path + "/removed_pairs.txt",
-                           FormatRemovedPairs(scene, result.removed_pairs));
-  }
-  if (status.ok()) {
-    status =
-        WriteTextFile(options.output_path + "/summary.json",
-                      FormatGlobalReportJson(scene, result, total_seconds));
-  }
-  if (status.ok() && options.stage.refinement.enabled) {
-    status = RewriteTwoViewGeometries(options.database_path, result.geometries,
-                                      result.removed_pairs);
-  }
-  return status;
-}
-
 }  // namespace
 
 Status RunAdasfmGlobal(int argc, char** argv) {
-  const auto start = std::chrono::steady_clock::now();
-  const auto seconds = [start] {
-    return std::chrono::duration<double>(std::chrono::steady_clock::now() -
-                                         start)
-        .count();
-  };
   GlobalCommandOptions options;
   CommandOptions command(
       "adasfm_global",
       "Coarse global SfM on verified matches and sensor priors; writes a "
-      "coarse "
-      "model and cleans the database's two-view geometries (adasfm_restorer "
-      "undoes that).");
+      "coarse model and cleans the database's two-view geometries "
+      "(adasfm_restorer undoes that).");
   AddOptions(&options, &command);
-  Status status = command.Parse(argc, argv);
+  const Status status = command.Parse(argc, argv);
   if (!status.ok() || command.HelpShown()) return status;
-  status = CheckOptions(options.stage);
-  if (status.ok()) status = CheckPaths(options);
-  if (!status.ok()) return status;
 
-  SceneDataOptions scene_options;
-  scene_options.read_raw_matches = options.stage.refinement.enabled;
-  scene_options.use_original_two_view_geometries = true;
-  scene_options.min_num_matches = options.stage.poses.min_num_inliers;
-  const StatusOr<SceneData> scene =
-      ReadSceneData(options.database_path, scene_options);
-  if (!scene.ok()) return scene.status();
-  PrintWarnings(*scene);
-
-  const double reading_seconds = seconds();
-  StatusOr<GlobalStageResult> result = RunGlobalStage(
-      options.stage, *scene, [&](const std::string& name, double share_done) {
+  const StatusOr<CoarseModelReport> report = EstimateCoarseModel(
+      options.stage, options.database_path, options.output_path,
+      [](const std::string& name, double share_done) {
         std::cout << "[" << static_cast<int>(100.0 * share_done) << " %] "
-                  << name << " ..." << std::endl;
+                  << name << std::endl;
       });
-  if (!result.ok()) return result.status();
-  std::ostringstream text;
-  text << scene->images.size() << " images, " << scene->pairs.size()
-       << " verified pairs, " << scene->priors.size() << " priors";
-  result->steps.insert(result->steps.begin(),
-                       {"reading", reading_seconds, text.str()});
-  status = WriteResult(options, *scene, *result, seconds());
-  if (!status.ok()) return status;
-  std::cout << FormatGlobalReportText(*result, seconds()) << std::flush;
+  if (!report.ok()) return report.status();
+  for (const std::string& warning : report->warnings) {
+    std::cout << "WARNING: " << warning << std::endl;
+  }
+  std::cout << FormatGlobalReportText(report->result, report->seconds)
+            << std::flush;
   return Status::Ok();
 }
 

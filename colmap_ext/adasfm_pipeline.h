@@ -1,0 +1,81 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "colmap_ext/global_stage.h"
+#include "colmap_ext/mapper_stage.h"
+#include "colmap_ext/prior_importer.h"
+#include "core/status.h"
+
+namespace adasfm {
+
+// AdaSfM from here to the end. A COLMAP database with verified matches and the
+// logs of cheap sensors become one metric model, in three stages; each reads
+// and leaves ordinary COLMAP files and can be run on its own.
+//
+//   1  ImportPriors         adasfm_prior_importer      sensors/
+//      IMU and wheel logs -> relative pose priors in the database
+//        1.1 read and check the logs        1.3 smooth the whole sequence
+//        1.2 preintegrate between images    1.4 motion and covariance per pair
+//
+//   2  EstimateCoarseModel  adasfm_global              global/
+//      view graph + priors -> coarse model, cleaned matches
+//        2.1 view graph                     2.5 sensor translations
+//        2.2 loop gating, rotations         2.6 camera positions
+//        2.3 edges off the rotations        2.7 tracks, points, adjustment
+//        2.4 directions                     2.8 match refinement
+//
+//   3  MapParts             adasfm_mapper              partition/, colmap_ext/
+//      coarse model + cleaned matches -> the model
+//        3.1 cut into overlapping parts     3.3 align to the coarse frame
+//        3.2 incremental SfM per part       3.4 merge and refine the whole
+//
+// The equations stand in docs/math.md, the files in docs/formats.md.
+struct AdaSfmOptions {
+  PriorImportOptions priors;
+  GlobalStageOptions global;
+  MapperStageOptions mapper;
+
+  bool IsValid(std::string* error) const;
+};
+
+// One line of text and the share of the stage that is done.
+using PipelineProgress = std::function<void(const std::string&, double)>;
+
+// Stage 1. Writes the priors to the database at paths.database_path.
+StatusOr<PriorImport> ImportPriors(const PriorImportOptions& options,
+                                   const PriorImportPaths& paths);
+
+// What a run of stage 2 did beside its files.
+struct CoarseModelReport {
+  GlobalStageResult result;
+  std::vector<std::string> warnings;
+  double seconds = 0.0;
+};
+
+// Stage 2. Writes the models to output_path/0, 1, ... (largest first),
+// removed_pairs.txt and summary.json there, and the refined two-view geometries
+// to the database, whose originals it keeps and starts from: running twice
+// equals running once. On error the database is as it was.
+StatusOr<CoarseModelReport> EstimateCoarseModel(
+    const GlobalStageOptions& options, const std::string& database_path,
+    const std::string& output_path, const PipelineProgress& progress = {});
+
+// What a run of stage 3 did beside its files.
+struct MapReport {
+  MapperStageSummary summary;
+  std::vector<std::string> warnings;
+};
+
+// Stage 3. input_path is a coarse model of stage 2. Writes the model to
+// output_path/0 and summary.json there; after a crash the same call continues.
+StatusOr<MapReport> MapParts(const MapperStageOptions& options,
+                             const std::string& database_path,
+                             const std::string& input_path,
+                             const std::string& output_path,
+                             const PipelineProgress& progress = {});
+
+}  // namespace adasfm

@@ -1,0 +1,145 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "colmap_ext/global_stage.h"
+
+#include <gtest/gtest.h>
+
+#include "colmap_ext/global_report.h"
+#include "tests/colmap_ext/synthetic_scene.h"
+
+namespace adasfm {
+namespace {
+
+SyntheticWorldOptions SmallWorld() {
+  SyntheticWorldOptions options;
+  options.num_images = 60;
+  return options;
+}
+
+GlobalStageResult RunStage(const SceneData& scene,
+                           const GlobalStageOptions& options = {}) {
+  StatusOr<GlobalStageResult> result = RunGlobalStage(options, scene);
+  EXPECT_TRUE(result.ok()) << result.status().message();
+  return std::move(result).value();
+}
+
+TEST(RunGlobalStageTest, FindsAMetricUprightModel) {
+  for (const uint64_t seed : {1, 2}) {
+    SyntheticWorldOptions options = SmallWorld();
+    options.seed = seed;
+    const SyntheticWorld world = BuildSyntheticWorld(options);
+    const GlobalStageResult result =
+        RunStage(BuildSyntheticScene(world, SyntheticPriorOptions()));
+    ASSERT_EQ(result.models.size(), 1);
+    EXPECT_TRUE(result.models[0].metric);
+    EXPECT_TRUE(result.models[0].gravity_aligned);
+    EXPECT_EQ(result.models[0].reconstruction.NumRegImages(), 60);
+    const PoseErrors errors =
+        ComparePoses(world, result.models[0].reconstruction);
+    EXPECT_LT(errors.rmse_m, 0.3) << seed;
+    EXPECT_NEAR(errors.scale, 1.0, 0.01) << seed;
+  }
+}
+
+TEST(RunGlobalStageTest, FisheyeToo) {
+  SyntheticWorldOptions options = SmallWorld();
+  options.camera_model = SyntheticCameraModel::kFisheye;
+  const SyntheticWorld world = BuildSyntheticWorld(options);
+  const GlobalStageResult result =
+      RunStage(BuildSyntheticScene(world, SyntheticPriorOptions()));
+  ASSERT_EQ(result.models.size(), 1);
+  EXPECT_LT(ComparePoses(world, result.models[0].reconstruction).rmse_m, 0.3);
+}
+
+TEST(RunGlobalStageTest, WithoutSensorsTheScaleIsOpen) {
+  const SyntheticWorld world = BuildSyntheticWorld(SmallWorld());
+  SyntheticPriorOptions priors;
+  priors.enabled = false;
+  const GlobalStageResult result = RunStage(BuildSyntheticScene(world, priors));
+  ASSERT_GE(result.models.size(), 1);
+  EXPECT_FALSE(result.models[0].metric);
+  EXPECT_FALSE(result.models[0].gravity_aligned);
+  EXPECT_EQ(result.models[0].reconstruction.NumRegImages(), 60);
+  EXPECT_LT(ComparePoses(world, result.models[0].reconstruction).rmse_m, 0.3);
+}
+
+TEST(RunGlobalStageTest, RefinedMatchesAreTrueOnes) {
+  SyntheticWorldOptions options = SmallWorld();
+  options.num_images = 200;
+  options.alias_pair_ratio = 0.05;
+  const SyntheticWorld world = BuildSyntheticWorld(options);
+  const SceneData scene = BuildSyntheticScene(world, SyntheticPriorOptions());
+  const GlobalStageResult result = RunStage(scene);
+  size_t num_matches = 0, num_true = 0, num_true_raw = 0;
+  const auto is_true = [&](const ImagePair& pair, const FeatureMatch& match) {
+    return world.images[pair.image_id1 - 1].landmark_ids[match.point2D_idx1] ==
+           world.images[pair.image_id2 - 1].landmark_ids[match.point2D_idx2];
+  };
+  for (const NewTwoViewGeometry& geometry : result.geometries) {
+    for (const FeatureMatch& match : geometry.inlier_matches) {
+      num_matches += 1;
+      num_true += is_true(geometry.pair, match);
+    }
+  }
+  for (const ScenePair& pair : scene.pairs) {
+    for (const FeatureMatch& match : pair.raw_matches) {
+      num_true_raw += is_true({pair.image_id1, pair.image_id2}, match);
+    }
+  }
+  EXPECT_GT(num_true, 0.98 * num_matches);
+  EXPECT_GT(num_true, 0.9 * num_true_raw);
+  // Every pair is accounted for once.
+  EXPECT_EQ(result.geometries.size() + result.removed_pairs.size() +
+                result.refinement.num_skipped_pairs,
+            scene.pairs.size());
+}
+
+TEST(RunGlobalStageTest, SameResultOnAnyNumberOfThreads) {
+  const SyntheticWorld world = BuildSyntheticWorld(SmallWorld());
+  const SceneData scene = BuildSyntheticScene(world, SyntheticPriorOptions());
+  GlobalStageOptions options;
+  options.num_threads = 1;
+  const GlobalStageResult single = RunStage(scene, options);
+  options.num_threads = 2;
+  const GlobalStageResult several = RunStage(scene, options);
+  for (const auto& [image_id, pose] :
+       CamsFromWorld(single.models[0].reconstruction)) {
+    // The adjustment adds in changing order: equal but for rounding.
+    EXPECT_LT((several.models[0].reconstruction.Image(image_id).Tvec() -
+               pose.translation)
+                  .norm(),
+              1e-3);
+  }
+  EXPECT_EQ(single.geometries.size(), several.geometries.size());
+}
+
+TEST(RunGlobalStageTest, SwitchesOffMatchRefinement) {
+  const SyntheticWorld world = BuildSyntheticWorld(SmallWorld());
+  GlobalStageOptions options;
+  options.refinement.enabled = false;
+  const GlobalStageResult result =
+      RunStage(BuildSyntheticScene(world, SyntheticPriorOptions()), options);
+  EXPECT_TRUE(result.geometries.empty());
+  EXPECT_TRUE(result.removed_pairs.empty());
+}
+
+TEST(RunGlobalStageTest, AnEmptySceneIsAnError) {
+  const StatusOr<GlobalStageResult> result =
+      RunGlobalStage(GlobalStageOptions(), SceneData());
+  EXPECT_FALSE(result.ok());
+  EXPECT_FALSE(result.status().message().empty());
+}
+
+TEST(RunGlobalStageTest, ReportsEveryStep) {
+  const SyntheticWorld world = BuildSyntheticWorld(SmallWorld());
+  const SceneData scene = BuildSyntheticScene(world, SyntheticPriorOptions());
+  const GlobalStageResult result = RunStage(scene);
+  const std::string json = FormatGlobalReportJson(scene, result, 1.0);
+  for (const StepReport& step : result.steps) {
+    EXPECT_NE(json.find("\"" + step.name + "\""), std::string::npos);
+  }
+  EXPECT_NE(FormatGlobalReportText(result, 1.0).find("60 images"),
+            std::string::npos);
+}
+
+}  // namespace
+}  // namespace adasfm
