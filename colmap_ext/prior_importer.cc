@@ -10,6 +10,7 @@
 #include "colmap_ext/host/database.h"
 #include "colmap_ext/scene_data.h"
 #include "colmap_ext/two_view_poses.h"
+#include "global/refine_relative_poses.h"
 #include "sensors/read_image_times.h"
 #include "sensors/read_imu.h"
 #include "sensors/read_wheel.h"
@@ -151,9 +152,8 @@ Status ReadLogs(const PriorImportPaths& paths,
   return Status::Ok();
 }
 
-// The relative rotations of images that are near in time.
-std::vector<VisualRotation> FindVisualRotations(
-    const std::vector<ImageStamp>& stamps, int max_gap, SceneData scene) {
+void KeepNearPairs(const std::vector<ImageStamp>& stamps, int max_gap,
+                   std::vector<ScenePair>* pairs) {
   std::map<image_t, int> ranks;
   for (size_t i = 0; i < stamps.size(); ++i) ranks[stamps[i].image_id] = i;
   const auto is_far = [&](const ScenePair& pair) {
@@ -162,18 +162,30 @@ std::vector<VisualRotation> FindVisualRotations(
     return rank1 == ranks.end() || rank2 == ranks.end() ||
            std::abs(rank1->second - rank2->second) > max_gap;
   };
-  scene.pairs.erase(
-      std::remove_if(scene.pairs.begin(), scene.pairs.end(), is_far),
-      scene.pairs.end());
-  std::map<image_t, std::vector<Bearing>> bearings;
+  pairs->erase(std::remove_if(pairs->begin(), pairs->end(), is_far),
+               pairs->end());
+}
+
+// The relative rotations of the scene's pairs.
+std::vector<VisualRotation> ComputeVisualRotations(SceneData scene) {
+  GlobalCorrespondences correspondences;
   for (const auto& [image_id, image] : scene.images) {
-    bearings[image_id] =
+    correspondences.bearings[image_id] =
         ComputeBearings(scene.cameras.at(image.camera_id), image.keypoints);
   }
-  const InitialViewGraph view_graph =
-      BuildInitialViewGraph(TwoViewPoseOptions(), scene, bearings);
+  ViewGraph graph = BuildInitialViewGraph(TwoViewPoseOptions(), scene,
+                                          correspondences.bearings)
+                        .graph;
+  for (ScenePair& pair : scene.pairs) {
+    correspondences.matches[ImagePair(pair.image_id1, pair.image_id2)] =
+        std::move(pair.inlier_matches);
+  }
+  // What verification left is fit to few matches: on a straight road its noise
+  // would drown the little that the machine turns.
+  RefineRelativePoses(RelativePoseRefinementOptions(), correspondences, {},
+                      &graph);
   std::vector<VisualRotation> rotations;
-  for (const ViewGraphEdge& edge : view_graph.graph.edges) {
+  for (const ViewGraphEdge& edge : graph.edges) {
     if (!edge.IsKept() || !edge.has_rotation) continue;
     rotations.push_back({edge.image_id1, edge.image_id2,
                          edge.cam2_from_cam1.rotation, edge.num_inliers});
@@ -225,8 +237,9 @@ StatusOr<PriorImport> ComputePriorImport(const PriorImportPaths& paths,
   const StatusOr<std::vector<ImageStamp>> stamps =
       StampImages(paths.image_times_path, *scene, &import);
   if (!stamps.ok()) return stamps.status();
-  const std::vector<VisualRotation> rotations = FindVisualRotations(
-      *stamps, options.max_visual_gap, std::move(scene).value());
+  KeepNearPairs(*stamps, options.max_visual_gap, &scene->pairs);
+  const std::vector<VisualRotation> rotations =
+      ComputeVisualRotations(std::move(scene).value());
   import.num_visual_rotations = rotations.size();
 
   StatusOr<PriorEstimate> estimate = EstimatePriors(
