@@ -7,6 +7,9 @@ const std::vector<Command>& Commands() {
   static const std::vector<Command> commands = {
       {"adasfm_evaluator", "compares a model with the ground truth",
        RunAdasfmEvaluator},
+      {"adasfm_global",
+       "coarse global SfM with sensor priors; cleans the matches",
+       RunAdasfmGlobal},
       {"adasfm_mapper",
        "parallel incremental SfM steered by the coarse model, merged into one",
        RunAdasfmMapper},
