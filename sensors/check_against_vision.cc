@@ -425,6 +425,12 @@ VisionCheck VisionComparer::Run() {
       ComputeCorrelation(shifted, cam_from_imu_, nullptr);
   if (check.shifted_correlation < options_.min_correlation) {
     if (check.total_correlation >= options_.min_correlation) return check;
+    // Little turning and poor two-view geometries agree with nothing: that is
+    // no contradiction.
+    if (check.shifted_correlation > 0.5 * options_.min_correlation ||
+        RadToDeg(turning) < options_.min_contradicting_rms_deg) {
+      return VisionCheck();
+    }
     check.contradiction = Format(
         "vision and gyroscope contradict each other (correlation %.2f, "
         "at the best time shift %.2f): check T_cam_imu, the clocks and "
@@ -445,7 +451,8 @@ VisionCheck VisionComparer::Run() {
 
 bool VisionCheckOptions::IsValid(std::string* error) const {
   if (max_time_shift_s > 0.0 && min_rotation_rms_deg > 0.0 &&
-      min_num_rotations > 1 && min_correlation > 0.0 && min_correlation < 1.0 &&
+      min_contradicting_rms_deg > 0.0 && min_num_rotations > 1 &&
+      min_correlation > 0.0 && min_correlation < 1.0 &&
       max_accepted_shift_s > 0.0) {
     return true;
   }

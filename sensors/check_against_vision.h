@@ -25,6 +25,9 @@ struct VisionCheckOptions {
   double max_time_shift_s = 2.0;
   // Below this the cameras hardly turn and nothing can be said.
   double min_rotation_rms_deg = 0.15;
+  // Cameras that turn this much and fit the gyroscope in no way contradict it;
+  // below it may be the noise of two-view geometries.
+  double min_contradicting_rms_deg = 1.0;
   int min_num_rotations = 10;
   // Correlation from which axes count as agreeing, and below which, when
   // other axes agree, the calibration is refused.

@@ -176,7 +176,9 @@ Status PriorEstimator::CheckVision(
   SensorSummary& summary = estimate_.summary;
   if (!check.is_conclusive) {
     summary.warnings.push_back(
-        "the cameras turn too little to compare them with the gyroscope");
+        "vision cannot be compared with the gyroscope: too little turning, or "
+        "too "
+        "few good two-view rotations");
     return Status::Ok();
   }
   summary.visual_timeshift_correction_s = check.time_shift_correction_s;

@@ -116,6 +116,10 @@ bool ParseInt64(std::string_view field, int64_t* value) {
   return error == std::errc() && end == field.data() + field.size();
 }
 
+bool ParseNanoseconds(std::string_view field, timestamp_t* timestamp_ns) {
+  return ParseInt64(field, timestamp_ns) && *timestamp_ns >= 0;
+}
+
 bool ParseSeconds(std::string_view field, timestamp_t* timestamp_ns) {
   const size_t point = field.find('.');
   const std::string_view whole = field.substr(0, point);
@@ -123,7 +127,9 @@ bool ParseSeconds(std::string_view field, timestamp_t* timestamp_ns) {
   // An exponent (or a sign) is rare: the plain way is good enough there.
   if (field.find_first_of("eE-+") != std::string_view::npos) {
     double value = 0.0;
-    if (!ParseDouble(field, &value) || std::abs(value) > 9e9) return false;
+    if (!ParseDouble(field, &value) || !(value >= 0.0 && value <= 9e9)) {
+      return false;
+    }
     *timestamp_ns = std::llround(1e9 * value);
     return true;
   }

@@ -52,11 +52,13 @@ class LogFile {
 // Locale-independent; the whole field must be a finite number.
 bool ParseDouble(std::string_view field, double* value);
 bool ParseInt64(std::string_view field, int64_t* value);
+// Whole nanoseconds; never negative, so that differences cannot overflow.
+bool ParseNanoseconds(std::string_view field, timestamp_t* timestamp_ns);
 // Decimal seconds to nanoseconds without a detour over double: "1600000003.25"
-// keeps all its digits. False outside the range of int64.
+// keeps all its digits. False when negative or beyond the range of int64.
 bool ParseSeconds(std::string_view field, timestamp_t* timestamp_ns);
 
-// Throws nothing; an error for a wrong number of fields, naming both.
+// An error for a wrong number of fields, naming both.
 Status CheckNumFields(const LogFile& file, const LogLine& line,
                       size_t num_fields, const std::string& meaning);
 

@@ -17,7 +17,7 @@ std::string WithoutFolder(std::string_view path) {
 Status ParseEuroc(const LogFile& file, const LogLine& line, ImageTime* time) {
   const Status status = CheckNumFields(file, line, 2, "ns, filename");
   if (!status.ok()) return status;
-  if (!ParseInt64(line.fields[0], &time->timestamp_ns)) {
+  if (!ParseNanoseconds(line.fields[0], &time->timestamp_ns)) {
     return file.Error(line.number, "column 1 is '" +
                                        std::string(line.fields[0]) +
                                        "', not a time in whole nanoseconds");
@@ -84,7 +84,7 @@ bool ParseImageNameTime(const std::string& name, timestamp_t* timestamp_ns) {
   // Nanoseconds since 1970 (or since a boot minutes ago) have many digits; a
   // frame counter such as 000123 has few.
   if (stem.size() < 12 || stem.size() > 19) return false;
-  return ParseInt64(stem, timestamp_ns) && *timestamp_ns >= 0;
+  return ParseNanoseconds(stem, timestamp_ns);
 }
 
 }  // namespace adasfm

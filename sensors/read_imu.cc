@@ -33,7 +33,7 @@ StatusOr<std::vector<ImuSample>> ReadImu(const std::string& path,
           CheckNumFields(*file, line, 7, "ns, wx, wy, wz, ax, ay, az");
       if (!status.ok()) return status;
       ImuSample sample;
-      if (!ParseInt64(line.fields[0], &sample.timestamp_ns)) {
+      if (!ParseNanoseconds(line.fields[0], &sample.timestamp_ns)) {
         return file->Error(line.number,
                            "column 1 is '" + std::string(line.fields[0]) +
                                "', not a time in whole nanoseconds");

@@ -97,7 +97,7 @@ Status CheckSpeeds(const std::vector<WheelSample>& samples, WheelType type,
 // 4Seasons' times are whole nanoseconds, TUM's are decimal seconds.
 bool ParseTumTime(std::string_view field, timestamp_t* timestamp_ns) {
   if (field.size() >= 15 && field.find('.') == std::string_view::npos) {
-    return ParseInt64(field, timestamp_ns);
+    return ParseNanoseconds(field, timestamp_ns);
   }
   return ParseSeconds(field, timestamp_ns);
 }
@@ -155,7 +155,7 @@ StatusOr<std::vector<WheelSample>> ReadWheel(
         CheckNumFields(*file, line, is_speed ? 2 : 3, "as its header says");
     if (!status.ok()) return status;
     WheelSample sample;
-    if (!ParseInt64(line.fields[0], &sample.timestamp_ns)) {
+    if (!ParseNanoseconds(line.fields[0], &sample.timestamp_ns)) {
       return file->Error(line.number, "column 1 is '" +
                                           std::string(line.fields[0]) +
                                           "', not a time in whole nanoseconds");

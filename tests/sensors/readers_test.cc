@@ -313,5 +313,38 @@ TEST_F(Readers, CalibrationErrors) {
               "none.yaml", {"no such file"});
 }
 
+// Whatever the bytes: a value or an error, never a crash.
+TEST_F(Readers, DamagedFilesGiveAnErrorOrAValue) {
+  const std::string texts[] = {
+      RestingImu(20, 0.001, 9.81), kCalibration,
+      "#timestamp [ns],v [m s^-1],omega [rad s^-1]\n1,2,3\n20,3,4\n",
+      "1.5 1 2 3 0 0 0 1\n2.5 1 2 3 0 0 0 1\n", "10,a.png\n20,b.png\n"};
+  Random random(3);
+  const std::string alphabet = ",.-+e#\n\r\t 0123456789nai[]{}:\xff";
+  for (int run = 0; run < 1000; ++run) {
+    std::string text = texts[run % 5];
+    for (int i = 0; i < 5; ++i) {
+      const size_t position = random.UniformInt(0, text.size() - 1);
+      const char letter = alphabet[random.UniformInt(0, alphabet.size() - 1)];
+      if (random.Uniform(0.0, 1.0) < 0.3) {
+        text.resize(position + 1);
+      } else if (random.Uniform(0.0, 1.0) < 0.5) {
+        text.insert(position, 1, letter);
+      } else {
+        text[position] = letter;
+      }
+    }
+    const std::string path = Write("damaged", text);
+    const auto one_line = [](const Status& status) {
+      return status.ok() || !status.message().empty();
+    };
+    EXPECT_TRUE(one_line(ReadImu(path).status()));
+    EXPECT_TRUE(one_line(ReadSensorCalibration(path).status()));
+    EXPECT_TRUE(one_line(ReadImageTimes(path).status()));
+    EXPECT_TRUE(one_line(ReadWheel(path, WheelType::kVelocity).status()));
+    EXPECT_TRUE(one_line(ReadOdometry(path).status()));
+  }
+}
+
 }  // namespace
 }  // namespace adasfm
