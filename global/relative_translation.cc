@@ -14,6 +14,20 @@
 namespace adasfm {
 namespace {
 
+// The covariance of basis^T normal for one pixel of noise in both keypoints.
+Eigen::Matrix2d NormalNoise(const TranslationProblem& problem, size_t k,
+                            const Eigen::Matrix<double, 3, 2>& basis) {
+  const Bearing& bearing1 = *problem.bearings.bearings1[k];
+  const Bearing& bearing2 = *problem.bearings.bearings2[k];
+  const Eigen::Matrix2d by_pixel1 = basis.transpose() *
+                                    Hat(bearing2.direction) * problem.rotation *
+                                    bearing1.jacobian;
+  const Eigen::Matrix2d by_pixel2 = basis.transpose() *
+                                    Hat(problem.rotation * bearing1.direction) *
+                                    bearing2.jacobian;
+  return by_pixel1 * by_pixel1.transpose() + by_pixel2 * by_pixel2.transpose();
+}
+
 // The larger axis of the direction's covariance: noise of the keypoints, and
 // what an error of the rotation would turn it by.
 double DirectionSigma(const RelativeTranslationOptions& options,
@@ -21,6 +35,7 @@ double DirectionSigma(const RelativeTranslationOptions& options,
                       const Eigen::Vector3d& translation) {
   const Eigen::Matrix<double, 3, 2> basis = TangentBasis(translation);
   Eigen::Matrix2d information = Eigen::Matrix2d::Zero();
+  Eigen::Matrix2d noise = Eigen::Matrix2d::Zero();
   Eigen::Matrix<double, 2, 3> mixed = Eigen::Matrix<double, 2, 3>::Zero();
   const double squared_scale = options.loss_scale_px * options.loss_scale_px;
   double sum_weights = 0.0;
@@ -39,6 +54,7 @@ double DirectionSigma(const RelativeTranslationOptions& options,
         (problem.rotation * problem.bearings.bearings1[k]->direction)
             .cross(bearing2.direction.cross(translation));
     information += weight * by_direction * by_direction.transpose();
+    noise += weight * NormalNoise(problem, k, residual.inverse_norm * basis);
     mixed += weight * by_direction * by_rotation.transpose();
     sum_weights += weight;
     sum_weighted_squares += weight * squared;
@@ -46,6 +62,12 @@ double DirectionSigma(const RelativeTranslationOptions& options,
   const double variance =
       std::max(std::pow(options.keypoint_sigma_px, 2),
                sum_weighted_squares / std::max(1.0, sum_weights - 2.0));
+  // Noise alone makes normals too: without a baseline there is nothing else.
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> eigen(information -
+                                                             variance * noise);
+  information = eigen.eigenvectors() *
+                eigen.eigenvalues().cwiseMax(0.0).asDiagonal() *
+                eigen.eigenvectors().transpose();
   // The ridge stands for a radian: what nothing determines.
   const Eigen::Matrix2d inverse =
       (information + variance * Eigen::Matrix2d::Identity()).inverse();

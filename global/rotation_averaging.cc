@@ -90,38 +90,40 @@ double LossScale(const RotationAveragingOptions& options,
                   kNumSigmas * edge.sigma_rad);
 }
 
-// Geman-McClure, in units of the sigmas.
-double RobustCost(const RotationAveragingOptions& options,
-                  const std::vector<RotationEdge>& edges,
-                  const Rotations& rotations) {
-  double cost = 0.0;
+// Robust without a scale, so that starts far from the optimum compare too.
+double SumOfAbsoluteErrors(const std::vector<RotationEdge>& edges,
+                           const Rotations& rotations) {
+  double sum = 0.0;
   for (const RotationEdge& edge : edges) {
-    const double squared = Residual(edge, rotations).squaredNorm();
-    const double squared_scale = std::pow(LossScale(options, edge), 2);
-    cost += squared * squared_scale / (squared_scale + squared) /
-            (edge.sigma_rad * edge.sigma_rad);
+    sum += Residual(edge, rotations).norm() / edge.sigma_rad;
   }
-  return cost;
+  return sum;
 }
 
-enum class Loss { kL1, kGemanMcClure };
+// The loss of one iteration: L1, or Geman-McClure that takes over at the edge's
+// scale times this factor.
+struct Loss {
+  bool is_l1 = true;
+  double scale_factor = 1.0;
+};
 
-double Weight(const RotationAveragingOptions& options, Loss loss,
+double Weight(const RotationAveragingOptions& options, const Loss& loss,
               const RotationEdge& edge, double residual) {
-  if (loss == Loss::kL1) {
+  if (loss.is_l1) {
     // Residuals below this weigh alike, which keeps the system well
     // conditioned.
     constexpr double kMinResidualRad = 1e-4;
     return 1.0 / (edge.sigma_rad * std::max(residual, kMinResidualRad));
   }
-  const double squared_scale = std::pow(LossScale(options, edge), 2);
+  const double squared_scale =
+      std::pow(loss.scale_factor * LossScale(options, edge), 2);
   return std::pow(squared_scale / (squared_scale + residual * residual), 2) /
          (edge.sigma_rad * edge.sigma_rad);
 }
 
 // One iteration; returns the mean change in radians, or a negative number when
 // the system cannot be solved.
-double Iterate(const RotationAveragingOptions& options, Loss loss,
+double Iterate(const RotationAveragingOptions& options, const Loss& loss,
                const std::vector<RotationEdge>& edges, LaplacianSolver* solver,
                Rotations* rotations) {
   LaplacianSolver::Vectors residuals(edges.size(), 3);
@@ -151,9 +153,97 @@ void StartFromSdp(const RotationAveragingOptions& options,
   result->sdp_rank = solution.rank;
   result->sdp_optimality = solution.optimality;
   // The relaxation is of plain squares: wrong edges may have bent it.
-  if (RobustCost(options, edges, solution.rotations) <
-      RobustCost(options, edges, *rotations)) {
+  if (SumOfAbsoluteErrors(edges, solution.rotations) <
+      SumOfAbsoluteErrors(edges, *rotations)) {
     *rotations = solution.rotations;
+  }
+}
+
+// The cost of a node's edges when it has this rotation.
+double NodeCost(const RotationAveragingOptions& options,
+                const std::vector<RotationEdge>& edges,
+                const std::vector<int>& node_edges, int node,
+                const Eigen::Matrix3d& rotation, const Rotations& rotations) {
+  double cost = 0.0;
+  for (const int e : node_edges) {
+    const RotationEdge& edge = edges[e];
+    const Eigen::Matrix3d predicted =
+        edge.j == node
+            ? Eigen::Matrix3d(edge.rotation * rotations[edge.i])
+            : Eigen::Matrix3d(edge.rotation.transpose() * rotations[edge.j]);
+    const double squared = LogSo3(Eigen::Quaterniond(Eigen::Matrix3d(
+                                      rotation.transpose() * predicted)))
+                               .squaredNorm();
+    const double squared_scale = std::pow(LossScale(options, edge), 2);
+    cost += squared * squared_scale / (squared_scale + squared) /
+            (edge.sigma_rad * edge.sigma_rad);
+  }
+  return cost;
+}
+
+// Nodes that most of their edges contradict may be caught in a wrong optimum:
+// each takes what one of its neighbours says, when that costs less.
+void RepairNodes(const RotationAveragingOptions& options,
+                 const std::vector<RotationEdge>& edges, Rotations* rotations) {
+  std::vector<std::vector<int>> edges_of(rotations->size());
+  std::vector<int> num_contradicting(rotations->size(), 0);
+  for (size_t e = 0; e < edges.size(); ++e) {
+    const bool contradicts =
+        Residual(edges[e], *rotations).norm() > LossScale(options, edges[e]);
+    for (const int node : {edges[e].i, edges[e].j}) {
+      edges_of[node].push_back(e);
+      num_contradicting[node] += contradicts;
+    }
+  }
+  for (size_t node = 0; node < rotations->size(); ++node) {
+    if (2 * num_contradicting[node] <= edges_of[node].size()) continue;
+    double best_cost = NodeCost(options, edges, edges_of[node], node,
+                                (*rotations)[node], *rotations);
+    for (const int e : edges_of[node]) {
+      const RotationEdge& edge = edges[e];
+      Eigen::Matrix3d candidate = edge.rotation * (*rotations)[edge.i];
+      if (edge.i == node) {
+        candidate = edge.rotation.transpose() * (*rotations)[edge.j];
+      }
+      const double cost =
+          NodeCost(options, edges, edges_of[node], node, candidate, *rotations);
+      if (cost < best_cost) {
+        best_cost = cost;
+        (*rotations)[node] = candidate;
+      }
+    }
+  }
+}
+
+// L1 steps, then Geman-McClure from wide to the loss scale, which follows the
+// rotations from far away without losing them to wrong edges.
+void RunIterations(const RotationAveragingOptions& options,
+                   const std::vector<RotationEdge>& edges,
+                   LaplacianSolver* solver, Rotations* rotations,
+                   GlobalRotations* result) {
+  Loss loss;
+  for (int k = 0; k < options.max_num_l1_iterations; ++k) {
+    const double change = Iterate(options, loss, edges, solver, rotations);
+    ++result->num_iterations;
+    if (change < options.convergence_rad) break;
+  }
+  constexpr double kWidestFactor = 16.0;
+  constexpr double kNarrowing = 0.7;
+  loss.is_l1 = false;
+  loss.scale_factor = kWidestFactor;
+  bool was_repaired = false;
+  for (int k = 0; k < options.max_num_irls_iterations; ++k) {
+    const double change = Iterate(options, loss, edges, solver, rotations);
+    ++result->num_iterations;
+    if (change < 0.0) return;
+    if (loss.scale_factor == 1.0 && !was_repaired) {
+      RepairNodes(options, edges, rotations);
+      was_repaired = true;
+    } else if (loss.scale_factor == 1.0 && change < options.convergence_rad) {
+      result->converged = true;
+      return;
+    }
+    loss.scale_factor = std::max(1.0, kNarrowing * loss.scale_factor);
   }
 }
 
@@ -198,25 +288,7 @@ GlobalRotations EstimateGlobalRotations(const RotationAveragingOptions& options,
     node_pairs.emplace_back(edge.i, edge.j);
   }
   LaplacianSolver solver(num_nodes, std::move(node_pairs));
-  const int num_iterations =
-      options.max_num_l1_iterations + options.max_num_irls_iterations;
-  int k = 0;
-  while (k < num_iterations) {
-    const Loss loss =
-        k < options.max_num_l1_iterations ? Loss::kL1 : Loss::kGemanMcClure;
-    const double change = Iterate(options, loss, edges, &solver, &rotations);
-    ++result.num_iterations;
-    if (change < 0.0) break;
-    if (change < options.convergence_rad) {
-      if (loss == Loss::kGemanMcClure) {
-        result.converged = true;
-        break;
-      }
-      k = options.max_num_l1_iterations;
-      continue;
-    }
-    ++k;
-  }
+  RunIterations(options, edges, &solver, &rotations, &result);
 
   const Eigen::Quaterniond first(rotations.front());
   for (size_t i = 0; i < num_nodes; ++i) {

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 namespace adasfm {
 namespace {
@@ -36,11 +37,12 @@ Weighted Accumulate(const TranslationProblem& problem,
   return sums;
 }
 
-// IRLS from a start; each step is the least eigenvector.
+// IRLS from a start; each step is the least eigenvector. The loss narrows from
+// widest_factor times its scale.
 Eigen::Vector3d Solve(const TranslationProblem& problem, int num_iterations,
-                      double loss_scale_px, Eigen::Vector3d translation) {
-  // Wide losses first: the start may be many pixels off.
-  double scale = 8.0 * loss_scale_px;
+                      double loss_scale_px, double widest_factor,
+                      Eigen::Vector3d translation) {
+  double scale = widest_factor * loss_scale_px;
   for (int i = 0; i < num_iterations; ++i) {
     const Weighted sums = Accumulate(problem, translation, scale);
     const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(sums.matrix);
@@ -115,12 +117,16 @@ TranslationDirection EstimateTranslationDirection(
   TranslationDirection best;
   if (problem.normals.size() < 2) return best;
   best.cost = std::numeric_limits<double>::infinity();
-  std::vector<Eigen::Vector3d> starts = {
-      SearchStart(problem, options.loss_scale_px)};
-  if (start.norm() > 0.0) starts.push_back(start.normalized());
-  for (const Eigen::Vector3d& candidate : starts) {
-    const Eigen::Vector3d direction = Solve(problem, options.max_num_iterations,
-                                            options.loss_scale_px, candidate);
+  // The searched start is near if right; the given one may be many pixels off.
+  constexpr double kNear = 2.0;
+  constexpr double kFar = 8.0;
+  std::vector<std::pair<double, Eigen::Vector3d>> starts = {
+      {kNear, SearchStart(problem, options.loss_scale_px)}};
+  if (start.norm() > 0.0) starts.emplace_back(kFar, start.normalized());
+  for (const auto& [widest_factor, candidate] : starts) {
+    const Eigen::Vector3d direction =
+        Solve(problem, options.max_num_iterations, options.loss_scale_px,
+              widest_factor, candidate);
     const double cost =
         Accumulate(problem, direction, options.loss_scale_px).cost;
     if (direction.allFinite() && cost < best.cost) {

@@ -1,0 +1,168 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "global/estimate_coarse_poses.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <set>
+
+#include "core/so3.h"
+#include "tests/global/test_scene.h"
+#include "tests/testing/matchers.h"
+
+namespace adasfm {
+namespace {
+
+struct CoarseProblem {
+  ViewGraph graph;
+  GlobalCorrespondences correspondences;
+  std::vector<RelativePosePrior> priors;
+  std::map<image_t, Rigid3d> truth;
+  std::set<ImagePair> aliases;
+};
+
+// Priors: true motion with 0.02 deg and 1 % of white noise a step and 0.4 % of
+// common scale.
+CoarseProblem BuildProblem(const SyntheticWorldOptions& options) {
+  const SyntheticWorld world = BuildSyntheticWorld(options);
+  Random random(options.seed);
+  CoarseProblem problem;
+  const double scale = 1.0 + random.Gaussian(0.004);
+  for (size_t k = 0; k < world.images.size(); ++k) {
+    const SyntheticImage& image = world.images[k];
+    problem.graph.images.push_back(image.image_id);
+    problem.truth[image.image_id] = image.cam_from_world;
+    problem.correspondences.bearings[image.image_id] =
+        ComputeBearings(world.camera, image);
+    if (k == 0) continue;
+    const SyntheticImage& last = world.images[k - 1];
+    Rigid3d motion =
+        ComputeCam2FromCam1(last.cam_from_world, image.cam_from_world);
+    const double sigma_m = 0.01 * motion.translation.norm() + 1e-3;
+    motion.translation *= scale;
+    problem.priors.push_back(BuildPrior(last.image_id, image.image_id, motion,
+                                        DegToRad(0.02), sigma_m, &random));
+    problem.priors.back().dt_ns = image.timestamp_ns - last.timestamp_ns;
+  }
+  for (const SyntheticPair& pair : world.pairs) {
+    if (pair.inlier_matches.size() < 15) continue;
+    ViewGraphEdge edge = BuildEdge(ImagePair(pair.image_id1, pair.image_id2),
+                                   pair.cam2_from_cam1);
+    edge.num_inliers = pair.inlier_matches.size();
+    problem.graph.edges.push_back(edge);
+    problem.correspondences.matches[edge.Pair()] = pair.inlier_matches;
+    if (pair.is_alias) problem.aliases.insert(edge.Pair());
+  }
+  return problem;
+}
+
+SyntheticWorldOptions AliasedWorld(uint64_t seed) {
+  SyntheticWorldOptions options;
+  options.num_images = 160;
+  options.seed = seed;
+  options.alias_pair_ratio = 0.05;
+  options.num_blackouts = 1;
+  options.blackout_num_images = 12;
+  return options;
+}
+
+TEST(EstimateCoarsePoses, AliasedWorldsWithBlackoutsAreSolvedInMetres) {
+  for (uint64_t seed = 1; seed <= 3; ++seed) {
+    const CoarseProblem problem = BuildProblem(AliasedWorld(seed));
+    ASSERT_FALSE(problem.aliases.empty());
+    const CoarsePoses result =
+        EstimateCoarsePoses(CoarsePoseOptions(), problem.graph,
+                            problem.correspondences, problem.priors);
+    ASSERT_EQ(result.components.size(), 1) << "seed " << seed;
+    const CoarseComponent& component = result.components.front();
+    EXPECT_EQ(component.cams_from_world.size(), problem.graph.images.size());
+    EXPECT_TRUE(component.metric);
+    EXPECT_TRUE(component.rotations_converged);
+    const AlignedErrors errors = ComputeAlignedErrors(
+        component.cams_from_world, problem.truth, AlignmentOptions());
+    EXPECT_LT(errors.rmse_m, 0.5) << "seed " << seed;
+    // The sensors' common scale error has a sigma of 0.4 %.
+    EXPECT_NEAR(errors.scale, 1.0, 0.0125) << "seed " << seed;
+    for (const ViewGraphEdge& edge : result.graph.edges) {
+      if (problem.aliases.count(edge.Pair())) {
+        EXPECT_TRUE(!edge.IsKept() || edge.source != EdgeSource::kVisual);
+      }
+    }
+  }
+}
+
+TEST(EstimateCoarsePoses, WorksWithoutSensorsOnCleanAndFisheyeWorlds) {
+  for (const auto model :
+       {SyntheticCameraModel::kPinhole, SyntheticCameraModel::kFisheye}) {
+    SyntheticWorldOptions options;
+    options.num_images = 80;
+    options.camera_model = model;
+    const CoarseProblem problem = BuildProblem(options);
+    const CoarsePoses result = EstimateCoarsePoses(
+        CoarsePoseOptions(), problem.graph, problem.correspondences, {});
+    ASSERT_FALSE(result.components.empty());
+    const CoarseComponent& component = result.components.front();
+    EXPECT_EQ(component.cams_from_world.size(), 80);
+    EXPECT_FALSE(component.metric);
+    const AlignedErrors errors = ComputeAlignedErrors(
+        component.cams_from_world, problem.truth, AlignmentOptions());
+    // 120 m of road before any bundle adjustment: 2 %.
+    EXPECT_LT(errors.rmse_m, 2.4);
+  }
+}
+
+TEST(EstimateCoarsePoses, SensorsJoinWhatVisionSplits) {
+  SyntheticWorldOptions options;
+  options.num_images = 70;
+  options.trajectory = SyntheticTrajectory::kStraight;
+  CoarseProblem problem = BuildProblem(options);
+  problem.graph.edges.erase(
+      std::remove_if(problem.graph.edges.begin(), problem.graph.edges.end(),
+                     [](const ViewGraphEdge& edge) {
+                       return edge.image_id1 <= 40 && edge.image_id2 > 40;
+                     }),
+      problem.graph.edges.end());
+  const CoarsePoses without = EstimateCoarsePoses(
+      CoarsePoseOptions(), problem.graph, problem.correspondences, {});
+  ASSERT_EQ(without.components.size(), 2);
+  EXPECT_EQ(without.components[0].cams_from_world.size(), 40);
+  EXPECT_EQ(without.components[1].cams_from_world.size(), 30);
+  const CoarsePoses with =
+      EstimateCoarsePoses(CoarsePoseOptions(), problem.graph,
+                          problem.correspondences, problem.priors);
+  ASSERT_EQ(with.components.size(), 1);
+  EXPECT_LT(ComputeAlignedErrors(with.components[0].cams_from_world,
+                                 problem.truth, AlignmentOptions())
+                .rmse_m,
+            0.3);
+}
+
+TEST(EstimateCoarsePoses, DoesNotDependOnThreadsAndRejectsBadInput) {
+  CoarseProblem problem = BuildProblem(AliasedWorld(4));
+  CoarsePoseOptions options;
+  options.num_threads = 1;
+  const CoarsePoses one = EstimateCoarsePoses(
+      options, problem.graph, problem.correspondences, problem.priors);
+  options.num_threads = 3;
+  const CoarsePoses three = EstimateCoarsePoses(
+      options, problem.graph, problem.correspondences, problem.priors);
+  ASSERT_EQ(one.components.size(), three.components.size());
+  for (const auto& [image_id, pose] : one.components[0].cams_from_world) {
+    const Rigid3d& other = three.components[0].cams_from_world.at(image_id);
+    EXPECT_EQ(pose.rotation.coeffs(), other.rotation.coeffs());
+    EXPECT_EQ(pose.translation, other.translation);
+  }
+  options.max_rotation_discrepancy_deg = -1.0;
+  EXPECT_THROW(EstimateCoarsePoses(options, problem.graph,
+                                   problem.correspondences, problem.priors),
+               std::invalid_argument);
+  std::swap(problem.graph.edges[0], problem.graph.edges[1]);
+  EXPECT_THROW(EstimateCoarsePoses(CoarsePoseOptions(), problem.graph,
+                                   problem.correspondences, problem.priors),
+               std::invalid_argument);
+  EXPECT_TRUE(EstimateCoarsePoses(CoarsePoseOptions(), ViewGraph(), {}, {})
+                  .components.empty());
+}
+
+}  // namespace
+}  // namespace adasfm
