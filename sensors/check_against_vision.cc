@@ -9,6 +9,7 @@
 #include <stdexcept>
 
 #include "core/so3.h"
+#include "sensors/rotation_comparison.h"
 
 namespace adasfm {
 namespace {
@@ -32,118 +33,6 @@ std::string Format(const char* format, double a, double b = 0.0,
   return buffer;
 }
 
-// The integral of the angular velocity at any time.
-class RateIntegral {
- public:
-  explicit RateIntegral(const std::vector<ImuSample>& imu) : imu_(imu) {
-    integral_.resize(imu.size(), Eigen::Vector3d::Zero());
-    for (size_t i = 1; i < imu.size(); ++i) {
-      const double dt =
-          SecondsFromNs(imu[i].timestamp_ns - imu[i - 1].timestamp_ns);
-      integral_[i] =
-          integral_[i - 1] +
-          0.5 * dt * (imu[i - 1].angular_velocity + imu[i].angular_velocity);
-    }
-  }
-
-  bool Covers(timestamp_t time_ns) const {
-    return time_ns >= imu_.front().timestamp_ns &&
-           time_ns <= imu_.back().timestamp_ns;
-  }
-
-  Eigen::Vector3d At(timestamp_t time_ns) const {
-    const auto next =
-        std::upper_bound(imu_.begin(), imu_.end(), time_ns,
-                         [](timestamp_t time, const ImuSample& s) {
-                           return time < s.timestamp_ns;
-                         });
-    const size_t i = next - imu_.begin();
-    if (i == imu_.size()) return integral_.back();
-    const ImuSample& a = imu_[i - 1];
-    const ImuSample& b = imu_[i];
-    const double dt = SecondsFromNs(time_ns - a.timestamp_ns);
-    const double ratio = dt / SecondsFromNs(b.timestamp_ns - a.timestamp_ns);
-    return integral_[i - 1] +
-           dt * (a.angular_velocity +
-                 0.5 * ratio * (b.angular_velocity - a.angular_velocity));
-  }
-
- private:
-  const std::vector<ImuSample>& imu_;
-  std::vector<Eigen::Vector3d> integral_;
-};
-
-double Median(std::vector<double>* values) {
-  const auto middle = values->begin() + values->size() / 2;
-  std::nth_element(values->begin(), middle, values->end());
-  return *middle;
-}
-
-// Rotation vectors of both sides over the same intervals.
-struct Comparison {
-  std::vector<Eigen::Vector3d> visual;  // in the camera frame
-  std::vector<Eigen::Vector3d> gyro;    // in the IMU frame
-  std::vector<double> dt_s;
-};
-
-struct Fit {
-  double cost = std::numeric_limits<double>::infinity();  // rad/s, mean
-  Eigen::Vector3d rate_offset = Eigen::Vector3d::Zero();  // rad/s, camera
-};
-
-// Mean distance between the mean rates of the visual rotations and the mapped
-// gyroscope's, less a constant (the bias). Rates, because what the model leaves
-// out (a slightly turned T_cam_imu) grows with the interval; medians and plain
-// distances, so that a few wrong two-view geometries do not matter.
-Fit ComputeFit(const Comparison& data, const Eigen::Matrix3d& map) {
-  Fit fit;
-  const size_t num = data.visual.size();
-  std::vector<double> rates(num);
-  std::vector<Eigen::Vector3d> differences(num);
-  for (size_t i = 0; i < num; ++i) {
-    differences[i] = data.visual[i] - map * data.gyro[i];
-  }
-  for (int axis = 0; axis < 3; ++axis) {
-    for (size_t i = 0; i < num; ++i) {
-      rates[i] = differences[i][axis] / data.dt_s[i];
-    }
-    fit.rate_offset[axis] = Median(&rates);
-  }
-  double sum = 0.0;
-  for (size_t i = 0; i < num; ++i) {
-    sum += (differences[i] / data.dt_s[i] - fit.rate_offset).norm();
-  }
-  fit.cost = sum / std::max<size_t>(1, num);
-  return fit;
-}
-
-// Correlation per axis and of all axes together, about the means.
-double ComputeCorrelation(const Comparison& data, const Eigen::Matrix3d& map,
-                          Eigen::Vector3d* per_axis) {
-  Eigen::Vector3d mean_visual = Eigen::Vector3d::Zero();
-  Eigen::Vector3d mean_gyro = Eigen::Vector3d::Zero();
-  const double num = static_cast<double>(data.visual.size());
-  for (size_t i = 0; i < data.visual.size(); ++i) {
-    mean_visual += data.visual[i] / num;
-    mean_gyro += map * data.gyro[i] / num;
-  }
-  Eigen::Vector3d both = Eigen::Vector3d::Zero();
-  Eigen::Vector3d visual = both, gyro = both;
-  for (size_t i = 0; i < data.visual.size(); ++i) {
-    const Eigen::Vector3d a = data.visual[i] - mean_visual;
-    const Eigen::Vector3d b = map * data.gyro[i] - mean_gyro;
-    both += a.cwiseProduct(b);
-    visual += a.cwiseAbs2();
-    gyro += b.cwiseAbs2();
-  }
-  constexpr double kTiny = 1e-24;
-  if (per_axis != nullptr) {
-    *per_axis = both.cwiseQuotient(
-        (visual.cwiseProduct(gyro).cwiseSqrt().array() + kTiny).matrix());
-  }
-  return both.sum() / (std::sqrt(visual.sum() * gyro.sum()) + kTiny);
-}
-
 // One way in which the calibration may be wrong.
 struct Explanation {
   enum Kind { kCalibrated, kDegrees, kInverted, kAxes };
@@ -151,7 +40,7 @@ struct Explanation {
   Eigen::Matrix3d map = Eigen::Matrix3d::Identity();
   Eigen::Matrix3d axes = Eigen::Matrix3d::Identity();
   double shift_s = 0.0;
-  Fit fit;
+  RotationFit fit;
 };
 
 class VisionComparer {
@@ -171,11 +60,11 @@ class VisionComparer {
 
  private:
   void SelectRotations(const std::vector<TimedRotation>& rotations);
-  Comparison Compare(double shift_s) const {
+  RotationComparison Compare(double shift_s) const {
     return Compare(rotations_, shift_s);
   }
-  Comparison Compare(const std::vector<TimedRotation>& rotations,
-                     double shift_s) const;
+  RotationComparison Compare(const std::vector<TimedRotation>& rotations,
+                             double shift_s) const;
   // The best shift on a coarse grid for every explanation.
   void SearchShifts(std::vector<Explanation>* explanations) const;
   void RefineShift(Explanation* explanation) const;
@@ -224,10 +113,10 @@ void VisionComparer::SelectRotations(
   }
 }
 
-Comparison VisionComparer::Compare(const std::vector<TimedRotation>& rotations,
-                                   double shift_s) const {
+RotationComparison VisionComparer::Compare(
+    const std::vector<TimedRotation>& rotations, double shift_s) const {
   const timestamp_t shift = std::llround(1e9 * (timeshift_s_ + shift_s));
-  Comparison data;
+  RotationComparison data;
   for (const TimedRotation& rotation : rotations) {
     const timestamp_t start = rotation.start_ns + shift;
     const timestamp_t end = rotation.end_ns + shift;
@@ -280,10 +169,10 @@ void VisionComparer::SearchShifts(
     const int magnitude = (step + 1) / 2;
     const double shift =
         kCoarseStepS * (step % 2 == 1 ? magnitude : -magnitude);
-    const Comparison data = Compare(shift);
+    const RotationComparison data = Compare(shift);
     if (data.visual.size() < min_num) continue;
     for (Explanation& explanation : *explanations) {
-      const Fit fit = ComputeFit(data, explanation.map);
+      const RotationFit fit = ComputeRotationFit(data, explanation.map);
       if (fit.cost < explanation.fit.cost) {
         explanation.fit = fit;
         explanation.shift_s = shift;
@@ -302,9 +191,9 @@ void VisionComparer::RefineShift(Explanation* explanation) const {
   const bool has_short =
       short_rotations_.size() >= 2 * options_.min_num_rotations;
   const auto cost = [&](double shift) {
-    const Comparison data =
+    const RotationComparison data =
         Compare(has_short ? short_rotations_ : rotations_, shift);
-    return ComputeFit(data, explanation->map).cost;
+    return ComputeRotationFit(data, explanation->map).cost;
   };
   double a = high - kRatio * (high - low), b = low + kRatio * (high - low);
   double cost_a = cost(a), cost_b = cost(b);
@@ -325,7 +214,7 @@ void VisionComparer::RefineShift(Explanation* explanation) const {
   }
   explanation->shift_s = 0.5 * (low + high);
   explanation->fit =
-      ComputeFit(Compare(explanation->shift_s), explanation->map);
+      ComputeRotationFit(Compare(explanation->shift_s), explanation->map);
 }
 
 std::string AxesToString(const Eigen::Matrix3d& axes) {
@@ -383,7 +272,7 @@ VisionCheck VisionComparer::Run() {
   if (!std::isfinite(calibrated.fit.cost)) return check;
   RefineShift(&calibrated);
 
-  const Comparison shifted = Compare(calibrated.shift_s);
+  const RotationComparison shifted = Compare(calibrated.shift_s);
   double turning = 0.0;
   Eigen::Vector3d mean = Eigen::Vector3d::Zero();
   for (const Eigen::Vector3d& v : shifted.visual) mean += v;
@@ -395,12 +284,12 @@ VisionCheck VisionComparer::Run() {
   if (RadToDeg(turning) < options_.min_rotation_rms_deg) return check;
 
   check.is_conclusive = true;
-  const Comparison as_is = Compare(0.0);
-  Fit as_is_fit;
+  const RotationComparison as_is = Compare(0.0);
+  RotationFit as_is_fit;
   if (as_is.visual.size() >= min_num) {
     check.total_correlation =
-        ComputeCorrelation(as_is, cam_from_imu_, &check.correlation);
-    as_is_fit = ComputeFit(as_is, cam_from_imu_);
+        ComputeRotationCorrelation(as_is, cam_from_imu_, &check.correlation);
+    as_is_fit = ComputeRotationFit(as_is, cam_from_imu_);
   }
   // The first explanation that is clearly better than all before it.
   const Explanation* best = &calibrated;
@@ -411,7 +300,7 @@ VisionCheck VisionComparer::Run() {
     }
   }
   check.shifted_correlation =
-      ComputeCorrelation(Compare(best->shift_s), best->map, nullptr);
+      ComputeRotationCorrelation(Compare(best->shift_s), best->map, nullptr);
   // The offset is that of the cameras' rotation, which turns against the body.
   check.gyroscope_bias = cam_from_imu_.transpose() * calibrated.fit.rate_offset;
   if (best != &calibrated &&
@@ -422,7 +311,7 @@ VisionCheck VisionComparer::Run() {
     return check;
   }
   check.shifted_correlation =
-      ComputeCorrelation(shifted, cam_from_imu_, nullptr);
+      ComputeRotationCorrelation(shifted, cam_from_imu_, nullptr);
   if (check.shifted_correlation < options_.min_correlation) {
     if (check.total_correlation >= options_.min_correlation) return check;
     // Little turning and poor two-view geometries agree with nothing: that is

@@ -1,0 +1,100 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "sensors/rotation_comparison.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace adasfm {
+namespace {
+
+double Median(std::vector<double>* values) {
+  const auto middle = values->begin() + values->size() / 2;
+  std::nth_element(values->begin(), middle, values->end());
+  return *middle;
+}
+
+}  // namespace
+
+RateIntegral::RateIntegral(const std::vector<ImuSample>& imu) : imu_(imu) {
+  integral_.resize(imu.size(), Eigen::Vector3d::Zero());
+  for (size_t i = 1; i < imu.size(); ++i) {
+    const double dt =
+        SecondsFromNs(imu[i].timestamp_ns - imu[i - 1].timestamp_ns);
+    integral_[i] =
+        integral_[i - 1] +
+        0.5 * dt * (imu[i - 1].angular_velocity + imu[i].angular_velocity);
+  }
+}
+
+bool RateIntegral::Covers(timestamp_t time_ns) const {
+  return time_ns >= imu_.front().timestamp_ns &&
+         time_ns <= imu_.back().timestamp_ns;
+}
+
+Eigen::Vector3d RateIntegral::At(timestamp_t time_ns) const {
+  const auto next = std::upper_bound(imu_.begin(), imu_.end(), time_ns,
+                                     [](timestamp_t time, const ImuSample& s) {
+                                       return time < s.timestamp_ns;
+                                     });
+  const size_t i = next - imu_.begin();
+  if (i == imu_.size()) return integral_.back();
+  const ImuSample& a = imu_[i - 1];
+  const ImuSample& b = imu_[i];
+  const double dt = SecondsFromNs(time_ns - a.timestamp_ns);
+  const double ratio = dt / SecondsFromNs(b.timestamp_ns - a.timestamp_ns);
+  return integral_[i - 1] +
+         dt * (a.angular_velocity +
+               0.5 * ratio * (b.angular_velocity - a.angular_velocity));
+}
+
+RotationFit ComputeRotationFit(const RotationComparison& data,
+                               const Eigen::Matrix3d& map) {
+  RotationFit fit;
+  const size_t num = data.visual.size();
+  std::vector<double> rates(num);
+  std::vector<Eigen::Vector3d> differences(num);
+  for (size_t i = 0; i < num; ++i) {
+    differences[i] = data.visual[i] - map * data.gyro[i];
+  }
+  for (int axis = 0; axis < 3; ++axis) {
+    for (size_t i = 0; i < num; ++i) {
+      rates[i] = differences[i][axis] / data.dt_s[i];
+    }
+    fit.rate_offset[axis] = Median(&rates);
+  }
+  double sum = 0.0;
+  for (size_t i = 0; i < num; ++i) {
+    sum += (differences[i] / data.dt_s[i] - fit.rate_offset).norm();
+  }
+  fit.cost = sum / std::max<size_t>(1, num);
+  return fit;
+}
+
+double ComputeRotationCorrelation(const RotationComparison& data,
+                                  const Eigen::Matrix3d& map,
+                                  Eigen::Vector3d* per_axis) {
+  Eigen::Vector3d mean_visual = Eigen::Vector3d::Zero();
+  Eigen::Vector3d mean_gyro = Eigen::Vector3d::Zero();
+  const double num = static_cast<double>(data.visual.size());
+  for (size_t i = 0; i < data.visual.size(); ++i) {
+    mean_visual += data.visual[i] / num;
+    mean_gyro += map * data.gyro[i] / num;
+  }
+  Eigen::Vector3d both = Eigen::Vector3d::Zero();
+  Eigen::Vector3d visual = both, gyro = both;
+  for (size_t i = 0; i < data.visual.size(); ++i) {
+    const Eigen::Vector3d a = data.visual[i] - mean_visual;
+    const Eigen::Vector3d b = map * data.gyro[i] - mean_gyro;
+    both += a.cwiseProduct(b);
+    visual += a.cwiseAbs2();
+    gyro += b.cwiseAbs2();
+  }
+  constexpr double kTiny = 1e-24;
+  if (per_axis != nullptr) {
+    *per_axis = both.cwiseQuotient(
+        (visual.cwiseProduct(gyro).cwiseSqrt().array() + kTiny).matrix());
+  }
+  return both.sum() / (std::sqrt(visual.sum() * gyro.sum()) + kTiny);
+}
+
+}  // namespace adasfm

@@ -1,0 +1,52 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <Eigen/Core>
+#include <limits>
+#include <vector>
+
+#include "core/sensor_log.h"
+#include "core/types.h"
+
+namespace adasfm {
+
+// The integral of the angular velocity at any time. Keeps a reference to the
+// samples.
+class RateIntegral {
+ public:
+  explicit RateIntegral(const std::vector<ImuSample>& imu);
+
+  bool Covers(timestamp_t time_ns) const;
+  // Linear between samples; undefined outside of the log.
+  Eigen::Vector3d At(timestamp_t time_ns) const;
+
+ private:
+  const std::vector<ImuSample>& imu_;
+  std::vector<Eigen::Vector3d> integral_;
+};
+
+// Rotation vectors of both sides over the same intervals.
+struct RotationComparison {
+  std::vector<Eigen::Vector3d> visual;  // in the camera frame
+  std::vector<Eigen::Vector3d> gyro;    // in the IMU frame
+  std::vector<double> dt_s;
+};
+
+struct RotationFit {
+  double cost = std::numeric_limits<double>::infinity();  // rad/s, mean
+  Eigen::Vector3d rate_offset = Eigen::Vector3d::Zero();  // rad/s, camera
+};
+
+// Mean distance between the mean rates of the visual rotations and the mapped
+// gyroscope's, less a constant (the bias). Rates, because what the model leaves
+// out (a slightly turned T_cam_imu) grows with the interval; medians and plain
+// distances, so that a few wrong two-view geometries do not matter.
+RotationFit ComputeRotationFit(const RotationComparison& data,
+                               const Eigen::Matrix3d& map);
+
+// Correlation per axis and of all axes together, about the means.
+double ComputeRotationCorrelation(const RotationComparison& data,
+                                  const Eigen::Matrix3d& map,
+                                  Eigen::Vector3d* per_axis);
+
+}  // namespace adasfm
