@@ -132,18 +132,14 @@ class CoarsePoseEstimator {
   }
 
   // Global rotations tell the two optima of nearly planar pairs apart, as
-  // odometry does for the others.
+  // odometry does for the others. Removed pairs stay removed: bent towards the
+  // prediction, a wrong one would look right.
   void RepeatRotations() {
     for (int round = 1; round < options_.num_rotation_rounds; ++round) {
       const auto predictions = PredictFromRotations();
       if (std::none_of(predictions.begin(), predictions.end(),
                        [](const auto& p) { return p.has_value(); })) {
         return;
-      }
-      for (ViewGraphEdge& edge : graph_.edges) {
-        if (edge.removal == EdgeRemoval::kRotation) {
-          edge.removal = EdgeRemoval::kKept;
-        }
       }
       if (options_.relative_poses.enabled) {
         RefineRelativePoses(options_.relative_poses, correspondences_,

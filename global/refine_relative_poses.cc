@@ -143,6 +143,8 @@ RelativePose DescendFromPrediction(const RelativePoseRefinementOptions& options,
   weighted.information = variance * prediction.covariance.inverse();
   DirectionSearch search;
   search.loss_scale_px = options.loss_scale_px;
+  search.search = false;
+  search.max_num_iterations = 6;
   RelativePose pose;
   pose.rotation = weighted.rotation;
   pose.translation =

@@ -59,12 +59,13 @@ double DirectionSigma(const RelativeTranslationOptions& options,
     sum_weights += weight;
     sum_weighted_squares += weight * squared;
   }
+  const double measured_variance =
+      sum_weighted_squares / std::max(1.0, sum_weights - 2.0);
   const double variance =
-      std::max(std::pow(options.keypoint_sigma_px, 2),
-               sum_weighted_squares / std::max(1.0, sum_weights - 2.0));
+      std::max(std::pow(options.keypoint_sigma_px, 2), measured_variance);
   // Noise alone makes normals too: without a baseline there is nothing else.
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> eigen(information -
-                                                             variance * noise);
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> eigen(
+      information - measured_variance * noise);
   information = eigen.eigenvectors() *
                 eigen.eigenvalues().cwiseMax(0.0).asDiagonal() *
                 eigen.eigenvectors().transpose();

@@ -51,17 +51,38 @@ Eigen::Vector3d Solve(const TranslationProblem& problem, int num_iterations,
     if (next.dot(translation) < 0.0) next = -next;
     const double change = (next - translation).norm();
     translation = next;
-    if (scale <= loss_scale_px && change < 1e-6) break;
+    constexpr double kSmallChange = 1e-5;
+    if (scale <= loss_scale_px && change < kSmallChange) break;
     scale = std::max(loss_scale_px, 0.5 * scale);
   }
   return translation;
+}
+
+// The cost of an even subset of the matches, enough to rank hypotheses.
+double SampledCost(const TranslationProblem& problem,
+                   const Eigen::Vector3d& translation, double loss_scale_px) {
+  constexpr size_t kNumSamples = 40;
+  const size_t stride =
+      std::max<size_t>(1, problem.normals.size() / kNumSamples);
+  const double squared_scale = loss_scale_px * loss_scale_px;
+  double cost = 0.0;
+  for (size_t k = 0; k < problem.normals.size(); k += stride) {
+    const double distance_px =
+        ComputeEpipolarResidual(*problem.bearings.bearings1[k],
+                                *problem.bearings.bearings2[k],
+                                problem.rotation, translation)
+            .distance_px;
+    const double squared = distance_px * distance_px;
+    cost += squared / (squared_scale + squared);
+  }
+  return cost;
 }
 
 // The best of the directions that even pairs of matches imply (two normals
 // span the plane orthogonal to t).
 Eigen::Vector3d SearchStart(const TranslationProblem& problem,
                             double loss_scale_px) {
-  constexpr size_t kNumHypotheses = 24;
+  constexpr size_t kNumHypotheses = 16;
   const size_t count = problem.normals.size();
   Eigen::Vector3d best = Eigen::Vector3d::UnitZ();
   double best_cost = std::numeric_limits<double>::infinity();
@@ -72,7 +93,7 @@ Eigen::Vector3d SearchStart(const TranslationProblem& problem,
         problem.normals[a].cross(problem.normals[b]);
     if (!(direction.norm() > 1e-12)) continue;
     const double cost =
-        Accumulate(problem, direction.normalized(), loss_scale_px).cost;
+        SampledCost(problem, direction.normalized(), loss_scale_px);
     if (cost < best_cost) {
       best_cost = cost;
       best = direction.normalized();
@@ -120,8 +141,10 @@ TranslationDirection EstimateTranslationDirection(
   // The searched start is near if right; the given one may be many pixels off.
   constexpr double kNear = 2.0;
   constexpr double kFar = 8.0;
-  std::vector<std::pair<double, Eigen::Vector3d>> starts = {
-      {kNear, SearchStart(problem, options.loss_scale_px)}};
+  std::vector<std::pair<double, Eigen::Vector3d>> starts;
+  if (options.search || start.norm() == 0.0) {
+    starts.emplace_back(kNear, SearchStart(problem, options.loss_scale_px));
+  }
   if (start.norm() > 0.0) starts.emplace_back(kFar, start.normalized());
   for (const auto& [widest_factor, candidate] : starts) {
     const Eigen::Vector3d direction =

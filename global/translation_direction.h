@@ -20,6 +20,8 @@ TranslationProblem BuildTranslationProblem(EdgeBearings bearings,
                                            const Eigen::Matrix3d& rotation);
 
 struct DirectionSearch {
+  // Also search from pairs of matches when there is a start.
+  bool search = true;
   int max_num_iterations = 20;
   // Where the Cauchy loss takes over, px.
   double loss_scale_px = 1.0;
