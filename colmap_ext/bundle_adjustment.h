@@ -52,7 +52,9 @@ struct PriorBundleAdjustmentOptions {
   int max_num_iterations = 50;
   // Relative change of the cost at which the adjustment has converged.
   double function_tolerance = 1e-5;
-  int num_threads = -1;
+  // Several threads of the solver add in changing order: results then agree up
+  // to rounding only. One thread repeats them bit by bit. -1: all.
+  int num_threads = 1;
   // Up to this many images the reduced camera system is solved densely, up to
   // the second number by sparse Cholesky, beyond that iteratively.
   int max_num_images_dense = 50;

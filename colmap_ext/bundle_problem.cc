@@ -80,7 +80,7 @@ BundleProblem::BundleProblem(const PriorBundleAdjustmentOptions& options,
 
 void BundleProblem::PrepareForEvaluation(bool, bool new_evaluation_point) {
   if (!new_evaluation_point) return;
-  for (auto& [image_id, block] : images_) block.pose.Update();
+  for (auto& [image_id, block] : images_) block.pose->Update();
 }
 
 bool BundleProblem::RefinesCameras() const {
@@ -95,13 +95,17 @@ void BundleProblem::AddImages(const PriorBundleAdjustmentProblem& problem,
     const colmap::Image& image = reconstruction.Image(image_id);
     if (!image.IsRegistered()) return;
     ImageBlock& block = images_[image_id];
-    block.pose = AdjustedPose(CamFromWorld(image));
     block.is_constant = is_constant;
     const colmap::Camera& camera = reconstruction.Camera(image.CameraId());
     cameras_[image.CameraId()].params = camera.Params();
   };
   for (const image_t image_id : problem.images) add(image_id, false);
   for (const image_t image_id : problem.constant_images) add(image_id, true);
+  poses_.reserve(images_.size());
+  for (auto& [image_id, block] : images_) {
+    poses_.emplace_back(CamFromWorld(reconstruction.Image(image_id)));
+    block.pose = &poses_.back();
+  }
 }
 
 std::vector<BundleProblem::Observation> BundleProblem::FindObservations(
@@ -112,7 +116,7 @@ std::vector<BundleProblem::Observation> BundleProblem::FindObservations(
   for (const colmap::TrackElement& element : point.Track().Elements()) {
     const auto block = images_.find(element.image_id);
     if (block == images_.end()) continue;
-    const AdjustedPose& pose = block->second.pose;
+    const AdjustedPose& pose = *block->second.pose;
     const double depth = pose.rotation.row(2).dot(point.XYZ() - pose.center);
     if (!(depth > kMinProjectionDepth)) continue;
     const colmap::Image& image = reconstruction.Image(element.image_id);
@@ -146,6 +150,7 @@ void BundleProblem::AddPoints(const colmap::Reconstruction& reconstruction) {
   std::sort(point_ids.begin(), point_ids.end());
   point_ids.erase(std::unique(point_ids.begin(), point_ids.end()),
                   point_ids.end());
+  points_.reserve(point_ids.size());
   for (const colmap::point3D_t point_id : point_ids) {
     const colmap::Point3D& point = reconstruction.Point3D(point_id);
     if (!point.XYZ().allFinite()) continue;
@@ -165,9 +170,9 @@ void BundleProblem::AddObservation(const colmap::Reconstruction& reconstruction,
   ImageBlock& block = images_.at(observation.image_id);
   block.num_observations += 1;
   if (!RefinesCameras()) {
-    reprojection_costs_.emplace_back(observation.keypoint, &block.pose);
+    reprojection_costs_.emplace_back(observation.keypoint, block.pose);
     problem_->AddResidualBlock(&reprojection_costs_.back(),
-                               reprojection_loss_.get(), block.pose.parameters,
+                               reprojection_loss_.get(), block.pose->parameters,
                                point->xyz.data());
     return;
   }
@@ -177,9 +182,9 @@ void BundleProblem::AddObservation(const colmap::Reconstruction& reconstruction,
   camera.is_used = true;
   other_costs_.push_back(
       CreateCameraCost(reconstruction.Camera(camera_id), observation.xy,
-                       options_.keypoint_sigma_px, &block.pose));
+                       options_.keypoint_sigma_px, block.pose));
   problem_->AddResidualBlock(other_costs_.back().get(),
-                             reprojection_loss_.get(), block.pose.parameters,
+                             reprojection_loss_.get(), block.pose->parameters,
                              point->xyz.data(), camera.params.data());
 }
 
@@ -206,10 +211,11 @@ void BundleProblem::AddPriors(const std::vector<PosePriorEdge>& edges) {
 void BundleProblem::AddPrior(const PosePriorEdge& edge,
                              PosePriorCost::Term term, ImageBlock* image1,
                              ImageBlock* image2, ceres::LossFunction* loss) {
-  other_costs_.push_back(std::make_unique<PosePriorCost>(
-      edge, term, &image1->pose, &image2->pose));
+  other_costs_.push_back(
+      std::make_unique<PosePriorCost>(edge, term, image1->pose, image2->pose));
   problem_->AddResidualBlock(other_costs_.back().get(), loss,
-                             image1->pose.parameters, image2->pose.parameters);
+                             image1->pose->parameters,
+                             image2->pose->parameters);
   image1->num_priors += 1;
   image2->num_priors += 1;
 }
@@ -219,7 +225,7 @@ void BundleProblem::SetConstantBlocks(
   for (auto& [image_id, block] : images_) {
     if (!block.IsUsed()) continue;
     if (block.is_constant) {
-      problem_->SetParameterBlockConstant(block.pose.parameters);
+      problem_->SetParameterBlockConstant(block.pose->parameters);
     } else {
       num_adjusted_images_ += 1;
     }
@@ -262,7 +268,7 @@ void BundleProblem::FixFirstPose() {
   }
   if (first == nullptr) return;
   first->is_constant = true;
-  problem_->SetParameterBlockConstant(first->pose.parameters);
+  problem_->SetParameterBlockConstant(first->pose->parameters);
 }
 
 void BundleProblem::FixDistanceToFarthestPose(double sigma_ratio) {
@@ -279,7 +285,7 @@ void BundleProblem::FixDistanceToFarthestPose(double sigma_ratio) {
   for (auto& [image_id, block] : images_) {
     if (!block.IsUsed()) continue;
     const double distance =
-        (block.pose.center - first.second->pose.center).norm();
+        (block.pose->center - first.second->pose->center).norm();
     if (distance <= max_distance) continue;
     max_distance = distance;
     farthest = {image_id, &block};
@@ -300,7 +306,7 @@ std::shared_ptr<ceres::ParameterBlockOrdering> BundleProblem::Ordering() {
     ordering->AddElementToGroup(point.xyz.data(), 0);
   }
   for (auto& [image_id, block] : images_) {
-    if (block.IsUsed()) ordering->AddElementToGroup(block.pose.parameters, 1);
+    if (block.IsUsed()) ordering->AddElementToGroup(block.pose->parameters, 1);
   }
   for (auto& [camera_id, block] : cameras_) {
     if (block.is_used) ordering->AddElementToGroup(block.params.data(), 1);
@@ -314,7 +320,7 @@ bool BundleProblem::IsFinite() const {
                        [](double value) { return std::isfinite(value); });
   };
   for (const auto& [image_id, block] : images_) {
-    if (!all_finite(block.pose.parameters, 6)) return false;
+    if (!all_finite(block.pose->parameters, 6)) return false;
   }
   for (const PointBlock& point : points_) {
     if (!point.xyz.allFinite()) return false;
@@ -328,7 +334,7 @@ bool BundleProblem::IsFinite() const {
 void BundleProblem::WriteTo(colmap::Reconstruction* reconstruction) const {
   for (const auto& [image_id, block] : images_) {
     if (block.is_constant || !block.IsUsed()) continue;
-    AdjustedPose pose = block.pose;
+    AdjustedPose pose = *block.pose;
     pose.Update();
     SetCamFromWorld(pose.CamFromWorld(), &reconstruction->Image(image_id));
   }

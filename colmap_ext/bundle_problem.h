@@ -49,7 +49,7 @@ class BundleProblem final : private ceres::EvaluationCallback {
 
  private:
   struct ImageBlock {
-    AdjustedPose pose;
+    AdjustedPose* pose = nullptr;  // in poses_
     bool is_constant = false;
     int num_observations = 0;
     int num_priors = 0;
@@ -90,7 +90,10 @@ class BundleProblem final : private ceres::EvaluationCallback {
   const PriorBundleAdjustmentOptions options_;
   std::map<image_t, ImageBlock> images_;
   std::map<camera_t, CameraBlock> cameras_;
-  std::deque<PointBlock> points_;
+  // Ceres orders the blocks of a group by address: contiguous and in the order
+  // of ids, so that every run adds in the same order.
+  std::vector<AdjustedPose> poses_;
+  std::vector<PointBlock> points_;
   std::deque<ReprojectionCost> reprojection_costs_;
   std::vector<std::unique_ptr<ceres::CostFunction>> other_costs_;
   std::unique_ptr<ceres::LossFunction> reprojection_loss_;

@@ -25,12 +25,12 @@ class Stopwatch {
   Clock::time_point start_ = Clock::now();
 };
 
-// One number of threads for all steps.
+// One number of threads for all steps but the adjustment, whose own option says
+// why.
 GlobalStageOptions WithThreads(GlobalStageOptions options) {
   options.two_view.num_threads = options.num_threads;
   options.poses.num_threads = options.num_threads;
   options.structure.triangulation.num_threads = options.num_threads;
-  options.structure.bundle.num_threads = options.num_threads;
   options.refinement.num_threads = options.num_threads;
   return options;
 }

@@ -21,7 +21,7 @@ struct GlobalStageOptions {
   CoarsePoseOptions poses;
   CoarseStructureOptions structure;
   MatchRefinementOptions refinement;
-  // Of all steps; -1: all of the machine's.
+  // Of all steps but structure.bundle; -1: all of the machine's.
   int num_threads = -1;
 
   bool IsValid(std::string* error) const;
