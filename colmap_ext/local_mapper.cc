@@ -2,6 +2,7 @@
 #include "colmap_ext/local_mapper.h"
 
 #include <algorithm>
+#include <cmath>
 #include <map>
 #include <stdexcept>
 #include <utility>
@@ -200,7 +201,9 @@ class LocalMapper {
       problem.priors = FindPriorEdges(*scene_, all);
     }
     PriorBundleAdjustmentOptions options;
-    options.keypoint_sigma_px = options_.keypoint_sigma_px;
+    options.keypoint_sigma_px = ComputeEffectiveKeypointSigma(
+        options_.keypoint_sigma_px, options_.num_independent_keypoints,
+        reconstruction_);
     options.max_num_iterations = max_num_iterations;
     options.function_tolerance = 1e-4;
     options.num_threads = options_.num_threads;
@@ -312,7 +315,20 @@ bool LocalMapperOptions::IsValid(std::string* error) const {
          check(global_adjustment_growth > 1.0, "global_adjustment_growth",
                global_adjustment_growth, "must be above 1") &&
          check(keypoint_sigma_px > 0.0, "keypoint_sigma_px", keypoint_sigma_px,
-               "must be positive");
+               "must be positive") &&
+         check(num_independent_keypoints > 0.0, "num_independent_keypoints",
+               num_independent_keypoints, "must be positive");
+}
+
+double ComputeEffectiveKeypointSigma(
+    double keypoint_sigma_px, double num_independent_keypoints,
+    const colmap::Reconstruction& reconstruction) {
+  const size_t num_images = reconstruction.NumRegImages();
+  if (num_images == 0) return keypoint_sigma_px;
+  const double num_per_image =
+      1.0 * reconstruction.ComputeNumObservations() / num_images;
+  return keypoint_sigma_px *
+         std::sqrt(std::max(1.0, num_per_image / num_independent_keypoints));
 }
 
 std::vector<PosePriorEdge> FindPriorEdges(const MapperScene& scene,

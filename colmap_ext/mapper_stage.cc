@@ -405,6 +405,7 @@ std::string ComputeMapperFingerprint(const MapperStageOptions& options,
   hash.Add(local.min_triangulation_angle_deg);
   hash.Add(local.global_adjustment_growth);
   hash.Add(local.keypoint_sigma_px);
+  hash.Add(local.num_independent_keypoints);
   return hash.Text();
 }
 

@@ -117,7 +117,9 @@ class ModelRefiner {
     }
     AddCoarseEdges(&problem.priors);
     PriorBundleAdjustmentOptions options;
-    options.keypoint_sigma_px = options_.keypoint_sigma_px;
+    options.keypoint_sigma_px = ComputeEffectiveKeypointSigma(
+        options_.keypoint_sigma_px, options_.num_independent_keypoints,
+        reconstruction_);
     options.refine_focal_length = options_.refine_focal_length;
     options.refine_principal_point = options_.refine_principal_point;
     options.refine_extra_params = options_.refine_extra_params;
@@ -191,12 +193,12 @@ class ModelRefiner {
 
 bool RefineModelOptions::IsValid(std::string* error) const {
   if (filter_max_reproj_error_px > 0.0 && min_triangulation_angle_deg > 0.0 &&
-      keypoint_sigma_px > 0.0) {
+      keypoint_sigma_px > 0.0 && num_independent_keypoints > 0.0) {
     return true;
   }
   *error =
-      "AdaSfmMapper.filter_max_reproj_error_px, min_triangulation_angle_deg "
-      "and keypoint_sigma_px must be positive";
+      "AdaSfmMapper.filter_max_reproj_error_px, min_triangulation_angle_deg, "
+      "keypoint_sigma_px and num_independent_keypoints must be positive";
   return false;
 }
 

@@ -14,6 +14,8 @@ struct RefineModelOptions {
   double filter_max_reproj_error_px = 4.0;
   double min_triangulation_angle_deg = 1.5;
   double keypoint_sigma_px = 1.0;
+  // As in LocalMapperOptions.
+  double num_independent_keypoints = 200.0;
   // Intrinsics are adjusted here and nowhere else, so that all parts agree
   // about them.
   bool refine_focal_length = false;

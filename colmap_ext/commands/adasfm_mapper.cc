@@ -82,6 +82,8 @@ void AddMapperOptions(MapperCommandOptions* options, CommandOptions* command) {
       "sensor priors as terms of the bundle adjustment");
   add("keypoint_sigma_px", &local.keypoint_sigma_px,
       "1 sigma of keypoints, weighs priors [px]");
+  add("num_independent_keypoints", &local.num_independent_keypoints,
+      "an image's keypoints weigh against priors as this many at most");
   add("filter_max_reproj_error_px", &local.filter_max_reproj_error_px,
       "observations beyond it are removed [px]");
   add("min_triangulation_angle_deg", &local.min_triangulation_angle_deg,
@@ -159,6 +161,7 @@ void ResolveIntrinsics(const SceneData& data, MapperCommandOptions* options) {
   refine.filter_max_reproj_error_px = local.filter_max_reproj_error_px;
   refine.min_triangulation_angle_deg = local.min_triangulation_angle_deg;
   refine.keypoint_sigma_px = local.keypoint_sigma_px;
+  refine.num_independent_keypoints = local.num_independent_keypoints;
 }
 
 Status WriteText(const std::string& path, const std::string& text) {
