@@ -31,6 +31,7 @@ void BM_AdjustBundle(benchmark::State& state) {
   PriorBundleAdjustmentOptions options;
   options.max_num_iterations = kNumIterations;
   options.function_tolerance = 0.0;
+  options.num_threads = -1;  // as COLMAP
   int num_iterations = 0;
   for (auto _ : state) {
     colmap::Reconstruction reconstruction = noisy;
