@@ -47,6 +47,8 @@ void AddFusionOptions(OdometryFusionOptions* fusion, CommandOptions* command) {
       "sideways speed of the wheel frame [m/s/sqrt(Hz)]");
   add("vertical_speed_noise", &fusion->vertical_speed_noise,
       "vertical speed of the wheel frame [m/s/sqrt(Hz)]");
+  add("planar_rotation_noise", &fusion->planar_rotation_noise,
+      "roll and pitch of a machine without IMU [rad/sqrt(s)]");
   add("slip_threshold_sigma", &fusion->slip_threshold_sigma,
       "wheels further than this from the IMU lose weight [sigma]");
   add("slip_min_speed_m_s", &fusion->slip_min_speed_m_s,
