@@ -173,7 +173,7 @@ double MaxReprojError(const CoarseStructureOptions& options, int round) {
 
 bool CoarseStructureOptions::IsValid(std::string* error) const {
   if (!tracks.IsValid(error) || !triangulation.IsValid(error) ||
-      !bundle.IsValid(error)) {
+      !bundle.IsValid(error) || !balance.IsValid(error)) {
     return false;
   }
   if (num_rounds < 1) {
@@ -210,6 +210,7 @@ CoarseModel BuildCoarseModel(
   const PriorBundleAdjustmentProblem problem =
       CreateProblem(options, scene, input);
 
+  double keypoint_sigma_factor = 1.0;
   for (int round = 0; round < options.num_rounds; ++round) {
     TrackTriangulationOptions triangulation = options.triangulation;
     triangulation.max_reproj_error_px = MaxReprojError(options, round);
@@ -226,7 +227,8 @@ CoarseModel BuildCoarseModel(
                            &model.min_angle_deg),
               &model.reconstruction);
     model.rounds.push_back(
-        AdjustBundle(options.bundle, problem, &model.reconstruction));
+        AdjustBundleInBalance(options.balance, options.bundle, problem,
+                              &model.reconstruction, &keypoint_sigma_factor));
     if (!model.rounds.back().success) break;
   }
   model.reconstruction.FilterAllPoints3D(
@@ -239,6 +241,10 @@ CoarseModel BuildCoarseModel(
     AlignToGravity(*gravity, &model.reconstruction);
     model.gravity_aligned = true;
   }
+  model.keypoint_sigma_px =
+      options.bundle.keypoint_sigma_px * keypoint_sigma_factor;
+  model.prior_chi2_per_dof =
+      ComputePriorChi2PerDof(problem.priors, model.reconstruction);
   FillFigures(options, &model);
   return model;
 }

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "colmap_ext/balance_priors.h"
 #include "colmap_ext/bundle_adjustment.h"
 #include "colmap_ext/scene_data.h"
 #include "core/bearing.h"
@@ -20,6 +21,7 @@ struct CoarseStructureOptions {
   TrackOptions tracks;
   TrackTriangulationOptions triangulation;
   PriorBundleAdjustmentOptions bundle;
+  PriorBalanceOptions balance;
   // Motion straight ahead leaves some images without points of a wide angle.
   // Images with fewer points than this get those with the next smaller angles,
   int min_num_points_per_image = 40;
@@ -54,6 +56,9 @@ struct CoarseModel {
   size_t num_points = 0;
   size_t num_observations = 0;
   double mean_reproj_error_px = 0.0;
+  // As in RefineModelSummary.
+  double keypoint_sigma_px = 0.0;
+  double prior_chi2_per_dof = 0.0;
   // Smallest triangulation angle that had to be accepted.
   double min_angle_deg = 0.0;
   // Images with fewer points than asked for, in spite of that.

@@ -31,6 +31,8 @@ Json ModelJson(const CoarseComponent& component, const CoarseModel& model) {
           {"observations", model.num_observations},
           {"mean_reproj_error_px", model.mean_reproj_error_px},
           {"min_triangulation_angle_deg", model.min_angle_deg},
+          {"keypoint_sigma_px", model.keypoint_sigma_px},
+          {"prior_chi2_per_dof", model.prior_chi2_per_dof},
           {"metric", model.metric},
           {"gravity_aligned", model.gravity_aligned},
           {"rotations_converged", component.rotations_converged},

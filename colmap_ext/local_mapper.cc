@@ -201,13 +201,18 @@ class LocalMapper {
       problem.priors = FindPriorEdges(*scene_, all);
     }
     PriorBundleAdjustmentOptions options;
-    options.keypoint_sigma_px = ComputeEffectiveKeypointSigma(
-        options_.keypoint_sigma_px, options_.num_independent_keypoints,
-        reconstruction_);
+    options.keypoint_sigma_px = options_.keypoint_sigma_px;
     options.max_num_iterations = max_num_iterations;
     options.function_tolerance = 1e-4;
     options.num_threads = options_.num_threads;
-    AdjustBundle(options, problem, &reconstruction_);
+    if (!constant_images.empty()) {
+      // Neighbours that stand fixed say nothing about the balance.
+      options.keypoint_sigma_px *= keypoint_sigma_factor_;
+      AdjustBundle(options, problem, &reconstruction_);
+      return;
+    }
+    AdjustBundleInBalance(options_.balance, options, problem, &reconstruction_,
+                          &keypoint_sigma_factor_);
   }
 
   void AdjustAll(int max_num_iterations) {
@@ -289,6 +294,7 @@ class LocalMapper {
   std::set<image_t> batch_;
   std::map<image_t, int> num_visible_at_failure_;
   size_t num_registered_at_adjustment_ = 0;
+  double keypoint_sigma_factor_ = 1.0;
   LocalMapResult result_;
 };
 
@@ -316,19 +322,7 @@ bool LocalMapperOptions::IsValid(std::string* error) const {
                global_adjustment_growth, "must be above 1") &&
          check(keypoint_sigma_px > 0.0, "keypoint_sigma_px", keypoint_sigma_px,
                "must be positive") &&
-         check(num_independent_keypoints > 0.0, "num_independent_keypoints",
-               num_independent_keypoints, "must be positive");
-}
-
-double ComputeEffectiveKeypointSigma(
-    double keypoint_sigma_px, double num_independent_keypoints,
-    const colmap::Reconstruction& reconstruction) {
-  const size_t num_images = reconstruction.NumRegImages();
-  if (num_images == 0) return keypoint_sigma_px;
-  const double num_per_image =
-      1.0 * reconstruction.ComputeNumObservations() / num_images;
-  return keypoint_sigma_px *
-         std::sqrt(std::max(1.0, num_per_image / num_independent_keypoints));
+         balance.IsValid(error);
 }
 
 std::vector<PosePriorEdge> FindPriorEdges(const MapperScene& scene,

@@ -7,6 +7,7 @@
 #include <set>
 #include <string>
 
+#include "colmap_ext/balance_priors.h"
 #include "colmap_ext/bundle_adjustment.h"
 #include "colmap_ext/initial_pair.h"
 #include "colmap_ext/local_mapper_scene.h"
@@ -29,9 +30,8 @@ struct LocalMapperOptions {
   double global_adjustment_growth = 1.5;
   // 1 sigma of a keypoint's position, which weighs priors against keypoints.
   double keypoint_sigma_px = 1.0;
-  // Keypoints of one image share errors (calibration, moving cars): more of
-  // them than this add no weight against the priors.
-  double num_independent_keypoints = 200.0;
+  // How vision is weighed against the priors.
+  PriorBalanceOptions balance;
   int num_threads = 1;
 
   bool IsValid(std::string* error) const;
@@ -64,13 +64,6 @@ LocalMapResult ReconstructLocally(const LocalMapperOptions& options,
                                   const SceneData& data,
                                   const CoarsePoseMap& coarse,
                                   const std::set<image_t>& images);
-
-// keypoint_sigma_px, enlarged where images have more than
-// num_independent_keypoints observations on average, so that all observations
-// of an image weigh as much as that many.
-double ComputeEffectiveKeypointSigma(
-    double keypoint_sigma_px, double num_independent_keypoints,
-    const colmap::Reconstruction& reconstruction);
 
 // The priors among the images, as terms of an adjustment.
 std::vector<PosePriorEdge> FindPriorEdges(const MapperScene& scene,

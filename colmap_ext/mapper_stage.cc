@@ -405,7 +405,9 @@ std::string ComputeMapperFingerprint(const MapperStageOptions& options,
   hash.Add(local.min_triangulation_angle_deg);
   hash.Add(local.global_adjustment_growth);
   hash.Add(local.keypoint_sigma_px);
-  hash.Add(local.num_independent_keypoints);
+  hash.Add(local.balance.enabled);
+  hash.Add(local.balance.max_chi2_per_dof);
+  hash.Add(local.balance.max_sigma_factor);
   return hash.Text();
 }
 

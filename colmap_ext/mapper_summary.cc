@@ -50,6 +50,8 @@ std::string FormatMapperSummaryJson(const MapperStageSummary& summary) {
       {"num_merged_points", summary.merge.num_merged_points},
       {"num_images_put_back", summary.refine.num_images_put_back},
       {"num_refinement_iterations", summary.refine.num_iterations},
+      {"keypoint_sigma_px", summary.refine.keypoint_sigma_px},
+      {"prior_chi2_per_dof", summary.refine.prior_chi2_per_dof},
       {"plan_seconds", summary.plan_seconds},
       {"parts_seconds", summary.parts_seconds},
       {"merge_seconds", summary.merge_seconds},

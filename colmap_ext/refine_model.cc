@@ -117,9 +117,7 @@ class ModelRefiner {
     }
     AddCoarseEdges(&problem.priors);
     PriorBundleAdjustmentOptions options;
-    options.keypoint_sigma_px = ComputeEffectiveKeypointSigma(
-        options_.keypoint_sigma_px, options_.num_independent_keypoints,
-        reconstruction_);
+    options.keypoint_sigma_px = options_.keypoint_sigma_px;
     options.refine_focal_length = options_.refine_focal_length;
     options.refine_principal_point = options_.refine_principal_point;
     options.refine_extra_params = options_.refine_extra_params;
@@ -127,7 +125,13 @@ class ModelRefiner {
     options.function_tolerance = function_tolerance;
     options.num_threads = options_.num_threads;
     summary_.num_iterations +=
-        AdjustBundle(options, problem, &reconstruction_).num_iterations;
+        AdjustBundleInBalance(options_.balance, options, problem,
+                              &reconstruction_, &keypoint_sigma_factor_)
+            .num_iterations;
+    summary_.keypoint_sigma_px =
+        options_.keypoint_sigma_px * keypoint_sigma_factor_;
+    summary_.prior_chi2_per_dof =
+        ComputePriorChi2PerDof(problem.priors, reconstruction_);
   }
 
   bool IsContradicted(const RelativePosePrior& prior) const {
@@ -186,6 +190,7 @@ class ModelRefiner {
   MapperScene& scene_;
   colmap::Reconstruction& reconstruction_;
   Triangulator triangulator_;
+  double keypoint_sigma_factor_ = 1.0;
   RefineModelSummary summary_;
 };
 
@@ -193,12 +198,12 @@ class ModelRefiner {
 
 bool RefineModelOptions::IsValid(std::string* error) const {
   if (filter_max_reproj_error_px > 0.0 && min_triangulation_angle_deg > 0.0 &&
-      keypoint_sigma_px > 0.0 && num_independent_keypoints > 0.0) {
-    return true;
+      keypoint_sigma_px > 0.0) {
+    return balance.IsValid(error);
   }
   *error =
-      "AdaSfmMapper.filter_max_reproj_error_px, min_triangulation_angle_deg, "
-      "keypoint_sigma_px and num_independent_keypoints must be positive";
+      "AdaSfmMapper.filter_max_reproj_error_px, min_triangulation_angle_deg "
+      "and keypoint_sigma_px must be positive";
   return false;
 }
 

@@ -4,6 +4,7 @@
 #include <set>
 #include <string>
 
+#include "colmap_ext/balance_priors.h"
 #include "colmap_ext/local_mapper_scene.h"
 #include "core/types.h"
 
@@ -15,7 +16,7 @@ struct RefineModelOptions {
   double min_triangulation_angle_deg = 1.5;
   double keypoint_sigma_px = 1.0;
   // As in LocalMapperOptions.
-  double num_independent_keypoints = 200.0;
+  PriorBalanceOptions balance;
   // Intrinsics are adjusted here and nowhere else, so that all parts agree
   // about them.
   bool refine_focal_length = false;
@@ -31,6 +32,10 @@ struct RefineModelOptions {
 
 struct RefineModelSummary {
   int num_iterations = 0;
+  // 1 sigma of keypoints that agrees with the priors (balance_priors.h).
+  double keypoint_sigma_px = 0.0;
+  // Squared whitened residual of the priors per degree of freedom at the end.
+  double prior_chi2_per_dof = 0.0;
   // Images that the priors contradict and that were put back.
   int num_images_put_back = 0;
 };

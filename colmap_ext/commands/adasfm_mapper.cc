@@ -82,8 +82,13 @@ void AddMapperOptions(MapperCommandOptions* options, CommandOptions* command) {
       "sensor priors as terms of the bundle adjustment");
   add("keypoint_sigma_px", &local.keypoint_sigma_px,
       "1 sigma of keypoints, weighs priors [px]");
-  add("num_independent_keypoints", &local.num_independent_keypoints,
-      "an image's keypoints weigh against priors as this many at most");
+  add("balance_priors", &local.balance.enabled,
+      "raise the keypoint sigma until the priors agree within their "
+      "covariance");
+  add("max_prior_chi2", &local.balance.max_chi2_per_dof,
+      "squared whitened residual per degree of freedom that priors may have");
+  add("max_keypoint_sigma_factor", &local.balance.max_sigma_factor,
+      "largest factor by which the keypoint sigma is raised");
   add("filter_max_reproj_error_px", &local.filter_max_reproj_error_px,
       "observations beyond it are removed [px]");
   add("min_triangulation_angle_deg", &local.min_triangulation_angle_deg,
@@ -161,7 +166,7 @@ void ResolveIntrinsics(const SceneData& data, MapperCommandOptions* options) {
   refine.filter_max_reproj_error_px = local.filter_max_reproj_error_px;
   refine.min_triangulation_angle_deg = local.min_triangulation_angle_deg;
   refine.keypoint_sigma_px = local.keypoint_sigma_px;
-  refine.num_independent_keypoints = local.num_independent_keypoints;
+  refine.balance = local.balance;
 }
 
 Status WriteText(const std::string& path, const std::string& text) {
