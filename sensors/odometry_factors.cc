@@ -189,21 +189,23 @@ void LinkBuilder::AddWheel(double weight) {
   Eigen::Matrix<double, 3, 2> forward_by_mount;
   const Eigen::Vector3d forward = globals_.Forward(
       context_.problem->imu_from_wheel.rotation, &forward_by_mount);
-  const double scale = globals_.values[ChainGlobals::kScale];
+  const double logged_per_true = globals_.values[ChainGlobals::kLoggedLength];
   const Eigen::Vector3d phi =
       LogSo3(wheel.profile_rotation.conjugate() * a_rotation_);
   const Eigen::Matrix3d map =
       wheel.displacement_map + wheel.rotation_moment * Hat(phi);
+  // What the wheel frame's origin moves by.
+  const Eigen::Vector3d moved = second_.step_in_previous + a_ * lever - lever;
   const int row = num_rows_;
-  values_.segment<3>(row) =
-      second_.step_in_previous + a_ * lever - lever - scale * (map * forward);
-  jacobian_.block<3, 3>(row, kSecond + ChainState::kStep).setIdentity();
-  AddRelativeRotation<3>(
-      row, -a_ * Hat(lever) + scale * wheel.rotation_moment * Hat(forward) *
-                                  RightJacobianInverseSo3(phi));
-  jacobian_.block<3, 1>(row, kGlobals + ChainGlobals::kScale) = -map * forward;
+  values_.segment<3>(row) = logged_per_true * moved - map * forward;
+  jacobian_.block<3, 3>(row, kSecond + ChainState::kStep) =
+      logged_per_true * Eigen::Matrix3d::Identity();
+  AddRelativeRotation<3>(row, -logged_per_true * a_ * Hat(lever) +
+                                  wheel.rotation_moment * Hat(forward) *
+                                      RightJacobianInverseSo3(phi));
+  jacobian_.block<3, 1>(row, kGlobals + ChainGlobals::kLoggedLength) = moved;
   jacobian_.block<3, 2>(row, kGlobals + ChainGlobals::kMountYaw) =
-      -scale * map * forward_by_mount;
+      -map * forward_by_mount;
   Whiten<3>(wheel.covariance / weight);
   wheel_chi2_ +=
       weight > 0.0 ? values_.segment<3>(row).squaredNorm() / weight : 0.0;
@@ -223,14 +225,15 @@ void LinkBuilder::AddWheelYaw(double weight) {
   const Eigen::Vector3d turn = LogSo3(a_rotation_);
   const double root_weight = std::sqrt(weight / wheel.yaw_variance);
   const int row = num_rows_++;
-  values_[row] =
-      root_weight *
-      (up.dot(turn) - globals_.values[ChainGlobals::kTrack] * wheel.yaw_rad -
-       globals_.values[ChainGlobals::kCurvature] * wheel.distance_m);
-  AddRelativeRotation<1>(
-      row, root_weight * up.transpose() * RightJacobianInverseSo3(turn));
-  jacobian_(row, kGlobals + ChainGlobals::kTrack) =
-      -root_weight * wheel.yaw_rad;
+  const double logged_per_true = globals_.values[ChainGlobals::kLoggedYaw];
+  values_[row] = root_weight *
+                 (logged_per_true * up.dot(turn) -
+                  globals_.values[ChainGlobals::kCurvature] * wheel.distance_m -
+                  wheel.yaw_rad);
+  AddRelativeRotation<1>(row, root_weight * logged_per_true * up.transpose() *
+                                  RightJacobianInverseSo3(turn));
+  jacobian_(row, kGlobals + ChainGlobals::kLoggedYaw) =
+      root_weight * up.dot(turn);
   jacobian_(row, kGlobals + ChainGlobals::kCurvature) =
       -root_weight * wheel.distance_m;
   wheel_chi2_ += values_[row] * values_[row] / weight;

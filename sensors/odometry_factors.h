@@ -31,12 +31,20 @@ struct ChainState {
 
 // The unknowns of all times.
 struct ChainGlobals {
-  enum Offset { kScale = 0, kTrack, kCurvature, kMountYaw, kMountPitch };
+  enum Offset {
+    kLoggedLength = 0,
+    kLoggedYaw,
+    kCurvature,
+    kMountYaw,
+    kMountPitch
+  };
   static constexpr int kSize = 5;
   using Vector = Eigen::Matrix<double, kSize, 1>;
 
-  // True speed = scale * logged, true yaw = track * logged + curvature *
-  // distance; the forward direction is turned by the mount angles.
+  // Logged length = first * true length, logged yaw = second * true yaw -
+  // third * distance; the forward direction is turned by the mount angles.
+  // Factors stand with what is estimated, not with what was logged: a factor
+  // of noisy readings would come out too small, the smaller the noise is then.
   Vector values = (Vector() << 1.0, 1.0, 0.0, 0.0, 0.0).finished();
 
   static Vector PriorMeans() { return ChainGlobals().values; }
@@ -54,8 +62,8 @@ inline constexpr int kLinkSize = 2 * ChainState::kSize + ChainGlobals::kSize;
 //   IMU       Log(dR^T A), A v_k+1 - v_k - R_k^T G dt - dv,
 //             u - v_k dt - R_k^T G dt^2 / 2 - dp      (joint 9x9 covariance)
 //   biases    b_k+1 - b_k                             (random walk)
-//   wheels    u + A l - l - scale (M d + N (phi x d)) (3x3 / weight)
-//   yaw       z . Log(A) - track * yaw - curvature * distance
+//   wheels    q (u + A l - l) - (M d + N (phi x d))   (3x3 / weight)
+//   yaw       q' z . Log(A) - curvature * distance - yaw
 //   rest      Log(A), u, v_k, v_k+1                   (at a standstill)
 // plus weak priors where a link has no sensor for a coordinate.
 struct LinkResiduals {

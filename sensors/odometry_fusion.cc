@@ -192,7 +192,7 @@ void Smoother::UpdateWeights(double threshold) {
 }
 
 void Smoother::FindSlips(OdometryFusionResult* result) const {
-  const double scale = globals_.values[ChainGlobals::kScale];
+  const double scale = 1.0 / globals_.values[ChainGlobals::kLoggedLength];
   const Eigen::Vector3d& lever = problem_.imu_from_wheel.translation;
   const Eigen::Vector3d forward =
       globals_.Forward(problem_.imu_from_wheel.rotation, nullptr);
@@ -248,10 +248,13 @@ void Smoother::FillResult(OdometryFusionResult* result) const {
             covariance.diagonal().segment<3>(ChainState::kGyro).mean();
         accel_variance +=
             covariance.diagonal().segment<3>(ChainState::kAccel).mean();
-        constexpr int kScale = 2 * ChainState::kSize + ChainGlobals::kScale;
-        result->wheel_scale_sigma = std::sqrt(covariance(kScale, kScale));
+        constexpr int kLength =
+            2 * ChainState::kSize + ChainGlobals::kLoggedLength;
+        const double length = globals_.values[ChainGlobals::kLoggedLength];
+        result->wheel_scale_sigma =
+            std::sqrt(covariance(kLength, kLength)) / (length * length);
       });
-  result->wheel_scale = globals_.values[ChainGlobals::kScale];
+  result->wheel_scale = 1.0 / globals_.values[ChainGlobals::kLoggedLength];
   if (num_links > 0) {
     result->gyroscope_bias_sigma = std::sqrt(gyro_variance / num_links);
     result->accelerometer_bias_sigma = std::sqrt(accel_variance / num_links);

@@ -99,6 +99,23 @@ TEST(SyntheticPriors, LongerDrivesTellTheWheelScale) {
   EXPECT_LT(std::sqrt(squares), 0.003);
 }
 
+// A factor of noisy readings would come out too small; one of what is estimated
+// does not (sensors/odometry_factors.h).
+TEST(SyntheticPriors, NoisyWheelsDoNotShrinkTheScale) {
+  constexpr int kNumSeeds = 8;
+  double error = 0.0, variance = 0.0;
+  for (int seed = 1; seed <= kNumSeeds; ++seed) {
+    SyntheticWorldOptions options = SmallWorld(seed, 150);
+    options.wheel_speed_noise = 0.3;
+    const Dataset data = ToDataset(BuildSyntheticWorld(options));
+    const SensorSummary summary = Estimate(data).summary;
+    error += (summary.wheel_scale - options.wheel_scale) / kNumSeeds;
+    variance += summary.wheel_scale_sigma * summary.wheel_scale_sigma /
+                (kNumSeeds * kNumSeeds);
+  }
+  EXPECT_NEAR(error, 0.0, 3.0 * std::sqrt(variance));
+}
+
 TEST(SyntheticPriors, StartsWithoutStandstill) {
   for (const uint64_t seed : {1, 2, 3}) {
     SyntheticWorldOptions options = SmallWorld(seed);
