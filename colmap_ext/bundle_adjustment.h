@@ -41,9 +41,9 @@ struct PriorBundleAdjustmentOptions {
   // Where the robust loss on reprojection errors (soft L1) takes over, in px;
   // <= 0: plain squares.
   double reproj_loss_scale_px = 2.0;
-  // Where the robust loss on whitened prior terms takes over, in sigmas. Huber:
-  // a term that is far off keeps its pull. With a loss that lets go (Cauchy),
-  // many priors that a drifting model contradicts together were all dropped.
+  // Where the robust loss (Cauchy) on whitened prior terms takes over, in
+  // sigmas. It drops single wrong priors; many that vision contradicts together
+  // are what balance_priors.h is for.
   double prior_loss_scale = 3.0;
 
   bool refine_focal_length = false;

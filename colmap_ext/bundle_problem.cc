@@ -61,7 +61,7 @@ BundleProblem::BundleProblem(const PriorBundleAdjustmentOptions& options,
                              const colmap::Reconstruction& reconstruction)
     : options_(options),
       prior_loss_(
-          std::make_unique<ceres::HuberLoss>(options.prior_loss_scale)) {
+          std::make_unique<ceres::CauchyLoss>(options.prior_loss_scale)) {
   if (options.reproj_loss_scale_px > 0.0) {
     reprojection_loss_ = std::make_unique<ceres::SoftLOneLoss>(
         options.reproj_loss_scale_px / options.keypoint_sigma_px);

@@ -11,7 +11,7 @@ namespace {
 
 MapperWorld BuildDrive(uint64_t seed) {
   MapperWorldOptions options;
-  options.world.num_images = 60;
+  options.world.num_images = 120;
   options.world.seed = seed;
   return BuildMapperWorld(options);
 }
