@@ -2,13 +2,12 @@
 #include "sensors/check_against_vision.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstdio>
-#include <limits>
 #include <stdexcept>
 
 #include "core/so3.h"
+#include "sensors/calibration_mistakes.h"
 #include "sensors/rotation_comparison.h"
 
 namespace adasfm {
@@ -25,20 +24,25 @@ constexpr double kCoarseStepS = 0.02;
 // listed later this much better than one listed earlier.
 constexpr double kClearlyBetter = 0.7;
 constexpr double kTie = 0.9;
+// A refusal needs evidence. The best of some 10,000 wrong explanations (50 at
+// 200 shifts) is by chance e^9 times likelier than the right one; twice that.
+constexpr double kMinEvidence = 20.0;
 
-std::string Format(const char* format, double a, double b = 0.0,
-                   double c = 0.0) {
+std::string Format(const char* format, double a, double b) {
   char buffer[256];
-  std::snprintf(buffer, sizeof(buffer), format, a, b, c);
+  std::snprintf(buffer, sizeof(buffer), format, a, b);
   return buffer;
 }
 
-// One way in which the calibration may be wrong.
+std::string Figures(const VisionCheck& check) {
+  return Format(
+      " (correlation of gyroscope and vision %.2f as calibrated, %.2f then)",
+      check.total_correlation, check.shifted_correlation);
+}
+
+// A mistake (or none) at its best time shift.
 struct Explanation {
-  enum Kind { kCalibrated, kDegrees, kInverted, kAxes };
-  Kind kind = kCalibrated;
-  Eigen::Matrix3d map = Eigen::Matrix3d::Identity();
-  Eigen::Matrix3d axes = Eigen::Matrix3d::Identity();
+  CalibrationMistake mistake;
   double shift_s = 0.0;
   RotationFit fit;
 };
@@ -68,8 +72,13 @@ class VisionComparer {
   // The best shift on a coarse grid for every explanation.
   void SearchShifts(std::vector<Explanation>* explanations) const;
   void RefineShift(Explanation* explanation) const;
-  std::vector<Explanation> ListExplanations() const;
-  std::string Describe(const Explanation& best, const VisionCheck& check) const;
+  // See ComputeEvidence; over the intervals that the log covers at both
+  // time shifts.
+  double Evidence(const Explanation& worse, const Explanation& better) const;
+  // The first of the best explanations that beat the calibrated one.
+  const Explanation* FindBetter(
+      const std::vector<Explanation>& explanations) const;
+  static double TurningDeg(const RotationComparison& data);
 
   RateIntegral integral_;
   Eigen::Matrix3d cam_from_imu_;
@@ -129,35 +138,6 @@ RotationComparison VisionComparer::Compare(
   return data;
 }
 
-std::vector<Explanation> VisionComparer::ListExplanations() const {
-  std::vector<Explanation> list(3);
-  list[0].map = cam_from_imu_;
-  list[1].kind = Explanation::kDegrees;
-  list[1].map = DegToRad(1.0) * cam_from_imu_;
-  list[2].kind = Explanation::kInverted;
-  list[2].map = cam_from_imu_.transpose();
-  std::array<int, 3> order = {0, 1, 2};
-  do {
-    for (int signs = 0; signs < 8; ++signs) {
-      Explanation explanation;
-      explanation.kind = Explanation::kAxes;
-      explanation.axes.setZero();
-      for (int row = 0; row < 3; ++row) {
-        explanation.axes(row, order[row]) = (signs >> row) & 1 ? -1.0 : 1.0;
-      }
-      if (explanation.axes.isIdentity()) continue;
-      explanation.map = cam_from_imu_ * explanation.axes;
-      list.push_back(explanation);
-    }
-  } while (std::next_permutation(order.begin(), order.end()));
-  // Few changes first: they win ties.
-  std::stable_sort(list.begin() + 3, list.end(),
-                   [](const Explanation& a, const Explanation& b) {
-                     return a.axes.trace() > b.axes.trace();
-                   });
-  return list;
-}
-
 void VisionComparer::SearchShifts(
     std::vector<Explanation>* explanations) const {
   const int num_steps =
@@ -172,7 +152,7 @@ void VisionComparer::SearchShifts(
     const RotationComparison data = Compare(shift);
     if (data.visual.size() < min_num) continue;
     for (Explanation& explanation : *explanations) {
-      const RotationFit fit = ComputeRotationFit(data, explanation.map);
+      const RotationFit fit = ComputeRotationFit(data, explanation.mistake.map);
       if (fit.cost < explanation.fit.cost) {
         explanation.fit = fit;
         explanation.shift_s = shift;
@@ -193,7 +173,7 @@ void VisionComparer::RefineShift(Explanation* explanation) const {
   const auto cost = [&](double shift) {
     const RotationComparison data =
         Compare(has_short ? short_rotations_ : rotations_, shift);
-    return ComputeRotationFit(data, explanation->map).cost;
+    return ComputeRotationFit(data, explanation->mistake.map).cost;
   };
   double a = high - kRatio * (high - low), b = low + kRatio * (high - low);
   double cost_a = cost(a), cost_b = cost(b);
@@ -213,124 +193,131 @@ void VisionComparer::RefineShift(Explanation* explanation) const {
     }
   }
   explanation->shift_s = 0.5 * (low + high);
-  explanation->fit =
-      ComputeRotationFit(Compare(explanation->shift_s), explanation->map);
+  explanation->fit = ComputeRotationFit(Compare(explanation->shift_s),
+                                        explanation->mistake.map);
 }
 
-std::string AxesToString(const Eigen::Matrix3d& axes) {
-  const char* names = "xyz";
-  std::string text;
-  for (int row = 0; row < 3; ++row) {
-    for (int column = 0; column < 3; ++column) {
-      if (axes(row, column) == 0.0) continue;
-      if (!text.empty()) text += ", ";
-      text += names[row];
-      text += axes(row, column) < 0.0 ? " = -" : " = ";
-      text += names[column];
-    }
+double VisionComparer::Evidence(const Explanation& worse,
+                                const Explanation& better) const {
+  RotationComparison worse_data, better_data;
+  timestamp_t end_ns = rotations_.front().start_ns;
+  double covered_s = 0.0, sum_s = 0.0;
+  for (const TimedRotation& rotation : rotations_) {
+    const RotationComparison a = Compare({rotation}, worse.shift_s);
+    const RotationComparison b = Compare({rotation}, better.shift_s);
+    if (a.visual.empty() || b.visual.empty()) continue;
+    worse_data.Append(a);
+    better_data.Append(b);
+    sum_s += SecondsFromNs(rotation.end_ns - rotation.start_ns);
+    const timestamp_t new_ns = std::max(end_ns, rotation.end_ns);
+    covered_s += SecondsFromNs(new_ns - std::max(end_ns, rotation.start_ns));
+    end_ns = new_ns;
   }
-  return text;
+  if (covered_s <= 0.0) return 0.0;
+  return ComputeEvidence(ComputeRateDistances(worse_data, worse.mistake.map,
+                                              worse.fit.rate_offset),
+                         ComputeRateDistances(better_data, better.mistake.map,
+                                              better.fit.rate_offset),
+                         sum_s / covered_s);
 }
 
-std::string VisionComparer::Describe(const Explanation& best,
-                                     const VisionCheck& check) const {
-  const std::string figures = Format(
-      " (correlation of gyroscope and vision %.2f as calibrated, %.2f "
-      "then)",
-      check.total_correlation, check.shifted_correlation);
-  switch (best.kind) {
-    case Explanation::kCalibrated:
-      return Format(
-                 "images and IMU differ by %+.4f s more than "
-                 "timeshift_cam_imu says: set it to %.4f or let it be "
-                 "estimated",
-                 best.shift_s, timeshift_s_ + best.shift_s) +
-             figures;
-    case Explanation::kDegrees:
-      return "angular velocities look like deg/s: multiply them by pi / 180 "
-             "(rad/s are expected)" +
-             figures;
-    case Explanation::kInverted:
-      return "T_cam_imu looks inverted (it seems to be T_imu_cam): invert the "
-             "matrix" +
-             figures;
-    case Explanation::kAxes:
-      return "the IMU's axes do not fit T_cam_imu: vision fits when the log's "
-             "axes are read as " +
-             AxesToString(best.axes) + figures;
+double VisionComparer::TurningDeg(const RotationComparison& data) {
+  Eigen::Vector3d mean = Eigen::Vector3d::Zero();
+  for (const Eigen::Vector3d& v : data.visual) mean += v;
+  mean /= static_cast<double>(data.visual.size());
+  double sum = 0.0;
+  for (const Eigen::Vector3d& v : data.visual) sum += (v - mean).squaredNorm();
+  return RadToDeg(std::sqrt(sum / data.visual.size()));
+}
+
+const Explanation* VisionComparer::FindBetter(
+    const std::vector<Explanation>& explanations) const {
+  const Explanation* best = &explanations[0];
+  for (size_t i = 1; i < explanations.size(); ++i) {
+    const Explanation& other = explanations[i];
+    const double bar = best == &explanations[0] ? kClearlyBetter : kTie;
+    if (other.fit.cost >= bar * best->fit.cost) continue;
+    if (Evidence(explanations[0], other) < kMinEvidence) continue;
+    best = &other;
   }
-  return "";
+  return best;
 }
 
 VisionCheck VisionComparer::Run() {
-  VisionCheck check;
+  // 1. Every explanation at its best time shift.
   const size_t min_num = options_.min_num_rotations;
-  if (rotations_.size() < min_num) return check;
-  std::vector<Explanation> explanations = ListExplanations();
+  if (rotations_.size() < min_num) return VisionCheck();
+  std::vector<Explanation> explanations;
+  for (const CalibrationMistake& mistake :
+       ListCalibrationMistakes(cam_from_imu_)) {
+    explanations.push_back({mistake, 0.0, RotationFit()});
+  }
   SearchShifts(&explanations);
   Explanation& calibrated = explanations[0];
-  if (!std::isfinite(calibrated.fit.cost)) return check;
+  if (!std::isfinite(calibrated.fit.cost)) return VisionCheck();
   RefineShift(&calibrated);
-
   const RotationComparison shifted = Compare(calibrated.shift_s);
-  double turning = 0.0;
-  Eigen::Vector3d mean = Eigen::Vector3d::Zero();
-  for (const Eigen::Vector3d& v : shifted.visual) mean += v;
-  mean /= static_cast<double>(shifted.visual.size());
-  for (const Eigen::Vector3d& v : shifted.visual) {
-    turning += (v - mean).squaredNorm();
-  }
-  turning = std::sqrt(turning / shifted.visual.size());
-  if (RadToDeg(turning) < options_.min_rotation_rms_deg) return check;
+  const double turning_deg = TurningDeg(shifted);
+  if (turning_deg < options_.min_rotation_rms_deg) return VisionCheck();
 
+  // 2. How well the calibration fits as it is.
+  VisionCheck check;
   check.is_conclusive = true;
-  const RotationComparison as_is = Compare(0.0);
-  RotationFit as_is_fit;
-  if (as_is.visual.size() >= min_num) {
-    check.total_correlation =
-        ComputeRotationCorrelation(as_is, cam_from_imu_, &check.correlation);
-    as_is_fit = ComputeRotationFit(as_is, cam_from_imu_);
+  Explanation as_is = calibrated;
+  const RotationComparison unshifted = Compare(0.0);
+  const bool has_unshifted = unshifted.visual.size() >= min_num;
+  if (has_unshifted) {
+    as_is.shift_s = 0.0;
+    as_is.fit = ComputeRotationFit(unshifted, cam_from_imu_);
+    check.total_correlation = ComputeRotationCorrelation(
+        unshifted, cam_from_imu_, &check.correlation);
   }
-  // The first explanation that is clearly better than all before it.
-  const Explanation* best = &calibrated;
-  for (size_t i = 1; i < explanations.size(); ++i) {
-    const double bar = best == &calibrated ? kClearlyBetter : kTie;
-    if (explanations[i].fit.cost < bar * best->fit.cost) {
-      best = &explanations[i];
-    }
-  }
-  check.shifted_correlation =
-      ComputeRotationCorrelation(Compare(best->shift_s), best->map, nullptr);
   // The offset is that of the cameras' rotation, which turns against the body.
   check.gyroscope_bias = cam_from_imu_.transpose() * calibrated.fit.rate_offset;
+
+  // 3. A mistake that explains vision better.
+  const Explanation* best = FindBetter(explanations);
+  check.shifted_correlation = ComputeRotationCorrelation(
+      Compare(best->shift_s), best->mistake.map, nullptr);
   if (best != &calibrated &&
       check.shifted_correlation >= options_.min_correlation) {
-    check.best_axes = best->axes;
-    check.is_inverted = best->kind == Explanation::kInverted;
-    check.contradiction = Describe(*best, check);
+    check.best_axes = best->mistake.axes;
+    check.is_inverted = best->mistake.kind == CalibrationMistake::kInverted;
+    check.contradiction = DescribeMistake(best->mistake) + Figures(check);
     return check;
   }
   check.shifted_correlation =
       ComputeRotationCorrelation(shifted, cam_from_imu_, nullptr);
-  if (check.shifted_correlation < options_.min_correlation) {
-    if (check.total_correlation >= options_.min_correlation) return check;
-    // Little turning and poor two-view geometries agree with nothing: that is
-    // no contradiction.
-    if (check.shifted_correlation > 0.5 * options_.min_correlation ||
-        RadToDeg(turning) < options_.min_contradicting_rms_deg) {
+  if (check.shifted_correlation < options_.min_correlation &&
+      check.total_correlation < options_.min_correlation) {
+    // 4. Nothing fits: is the gyroscope worse than none?
+    Explanation none = as_is;
+    none.mistake.map.setZero();
+    none.fit = ComputeRotationFit(Compare(as_is.shift_s), none.mistake.map);
+    if (turning_deg < options_.min_contradicting_rms_deg ||
+        Evidence(as_is, none) < kMinEvidence) {
       return VisionCheck();
     }
-    check.contradiction = Format(
-        "vision and gyroscope contradict each other (correlation %.2f, "
-        "at the best time shift %.2f): check T_cam_imu, the clocks and "
-        "whether log and images belong together",
-        check.total_correlation, check.shifted_correlation);
+    check.contradiction =
+        "vision and gyroscope contradict each other: check T_cam_imu, the "
+        "clocks and whether log and images belong together" +
+        Figures(check);
     return check;
   }
+  if (check.shifted_correlation < options_.min_correlation) return check;
+
+  // 5. The time shift.
   check.time_shift_correction_s = calibrated.shift_s;
+  const bool is_better = calibrated.fit.cost < kTie * as_is.fit.cost &&
+                         Evidence(as_is, calibrated) >= kMinEvidence;
   if (std::abs(calibrated.shift_s) > options_.max_accepted_shift_s &&
-      calibrated.fit.cost < kTie * as_is_fit.cost) {
-    check.contradiction = Describe(calibrated, check);
+      (is_better || !has_unshifted)) {
+    check.contradiction =
+        Format(
+            "images and IMU differ by %+.4f s more than timeshift_cam_imu "
+            "says: set it to %.4f or let it be estimated",
+            calibrated.shift_s, timeshift_s_ + calibrated.shift_s) +
+        Figures(check);
     check.contradiction_is_time_shift = true;
   }
   return check;

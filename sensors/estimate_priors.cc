@@ -176,9 +176,8 @@ Status PriorEstimator::CheckVision(
   SensorSummary& summary = estimate_.summary;
   if (!check.is_conclusive) {
     summary.warnings.push_back(
-        "vision cannot be compared with the gyroscope: too little turning, or "
-        "too "
-        "few good two-view rotations");
+        "the gyroscope cannot be checked against vision: too little turning, "
+        "or two-view rotations too few or too poor");
     return Status::Ok();
   }
   summary.visual_timeshift_correction_s = check.time_shift_correction_s;

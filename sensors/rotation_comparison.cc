@@ -47,6 +47,12 @@ Eigen::Vector3d RateIntegral::At(timestamp_t time_ns) const {
                0.5 * ratio * (b.angular_velocity - a.angular_velocity));
 }
 
+void RotationComparison::Append(const RotationComparison& other) {
+  visual.insert(visual.end(), other.visual.begin(), other.visual.end());
+  gyro.insert(gyro.end(), other.gyro.begin(), other.gyro.end());
+  dt_s.insert(dt_s.end(), other.dt_s.begin(), other.dt_s.end());
+}
+
 RotationFit ComputeRotationFit(const RotationComparison& data,
                                const Eigen::Matrix3d& map) {
   RotationFit fit;
@@ -63,11 +69,39 @@ RotationFit ComputeRotationFit(const RotationComparison& data,
     fit.rate_offset[axis] = Median(&rates);
   }
   double sum = 0.0;
-  for (size_t i = 0; i < num; ++i) {
-    sum += (differences[i] / data.dt_s[i] - fit.rate_offset).norm();
+  for (const double distance :
+       ComputeRateDistances(data, map, fit.rate_offset)) {
+    sum += distance;
   }
   fit.cost = sum / std::max<size_t>(1, num);
   return fit;
+}
+
+std::vector<double> ComputeRateDistances(const RotationComparison& data,
+                                         const Eigen::Matrix3d& map,
+                                         const Eigen::Vector3d& rate_offset) {
+  std::vector<double> distances(data.visual.size());
+  for (size_t i = 0; i < distances.size(); ++i) {
+    const Eigen::Vector3d difference = data.visual[i] - map * data.gyro[i];
+    distances[i] = (difference / data.dt_s[i] - rate_offset).norm();
+  }
+  return distances;
+}
+
+double ComputeEvidence(const std::vector<double>& worse,
+                       const std::vector<double>& better, double num_repeats) {
+  if (worse.empty()) return 0.0;
+  std::vector<double> sorted = worse;
+  // The median of a three-dimensional normal vector's length.
+  const double sigma = Median(&sorted) / 1.538;
+  if (sigma <= 0.0) return 0.0;
+  constexpr double kFreedom = 3.0;
+  double sum = 0.0;
+  for (size_t i = 0; i < worse.size(); ++i) {
+    const double a = worse[i] / sigma, b = better[i] / sigma;
+    sum += std::log1p(a * a / kFreedom) - std::log1p(b * b / kFreedom);
+  }
+  return 0.5 * (kFreedom + 3.0) * sum / std::max(1.0, num_repeats);
 }
 
 double ComputeRotationCorrelation(const RotationComparison& data,

@@ -30,6 +30,8 @@ struct RotationComparison {
   std::vector<Eigen::Vector3d> visual;  // in the camera frame
   std::vector<Eigen::Vector3d> gyro;    // in the IMU frame
   std::vector<double> dt_s;
+
+  void Append(const RotationComparison& other);
 };
 
 struct RotationFit {
@@ -43,6 +45,19 @@ struct RotationFit {
 // distances, so that a few wrong two-view geometries do not matter.
 RotationFit ComputeRotationFit(const RotationComparison& data,
                                const Eigen::Matrix3d& map);
+
+// The distances of which the fit's cost is the mean, one an interval.
+std::vector<double> ComputeRateDistances(const RotationComparison& data,
+                                         const Eigen::Matrix3d& map,
+                                         const Eigen::Vector3d& rate_offset);
+
+// Logarithm of how much likelier one explanation makes the rotations than
+// another, from the distances of both. Errors are taken to have Student's
+// distribution with three degrees of freedom (two-view geometries have long
+// tails) and the worse explanation's median, which favours it. num_repeats is
+// how often the intervals cover the same time: that many count as one.
+double ComputeEvidence(const std::vector<double>& worse,
+                       const std::vector<double>& better, double num_repeats);
 
 // Correlation per axis and of all axes together, about the means.
 double ComputeRotationCorrelation(const RotationComparison& data,

@@ -6,65 +6,16 @@
 
 #include "core/random.h"
 #include "core/so3.h"
-#include "dataset.h"
-#include "synthetic/synthetic_world.h"
+#include "synthetic_dataset.h"
 
 namespace adasfm {
 namespace {
-
-SyntheticWorldOptions SmallWorld(uint64_t seed, int num_images = 80) {
-  SyntheticWorldOptions options;
-  options.num_images = num_images;
-  options.seed = seed;
-  // Only the logs matter here.
-  options.num_keypoints_per_image = 8;
-  options.num_sequential_neighbors = 1;
-  return options;
-}
-
-Dataset ToDataset(const SyntheticWorld& world) {
-  Dataset data;
-  SensorCalibration& calibration = data.calibration;
-  calibration.cam_from_imu = world.cam_from_imu;
-  calibration.timeshift_cam_imu_s = world.options.timeshift_cam_imu_s;
-  calibration.has_imu = true;
-  calibration.imu_noise = world.options.imu_noise;
-  calibration.imu_rate_hz = world.options.imu_rate_hz;
-  calibration.has_wheel = true;
-  calibration.wheel_type = WheelType::kDifferential;
-  calibration.track_width_m = world.track_width_m;
-  calibration.wheel_speed_noise = world.options.wheel_speed_noise;
-  calibration.imu_from_wheel = world.imu_from_wheel;
-  data.logs.imu = world.imu_samples;
-  data.logs.wheel = world.wheel_samples;
-  for (const SyntheticImage& image : world.images) {
-    data.images.push_back({image.image_id, image.name, image.timestamp_ns});
-    data.cams_from_world[image.image_id] = image.cam_from_world;
-  }
-  return data;
-}
 
 PriorEstimate Estimate(const Dataset& data) {
   const StatusOr<PriorEstimate> estimate =
       EstimatePriors(data.images, data.logs, data.calibration, {}, {});
   if (!estimate.ok()) throw std::runtime_error(estimate.status().message());
   return *estimate;
-}
-
-std::vector<VisualRotation> SimulateVision(const SyntheticWorld& world,
-                                           uint64_t seed) {
-  Random random(seed);
-  std::vector<VisualRotation> rotations;
-  for (size_t i = 0; i + 1 < world.images.size(); ++i) {
-    const SyntheticImage& first = world.images[i];
-    const SyntheticImage& second = world.images[i + 1];
-    const Eigen::Quaterniond truth =
-        ComputeCam2FromCam1(first.cam_from_world, second.cam_from_world)
-            .rotation;
-    rotations.push_back({first.image_id, second.image_id,
-                         ExpSo3(random.GaussianVector(1e-3)) * truth, 100});
-  }
-  return rotations;
 }
 
 TEST(SyntheticPriors, ErrorsMatchTheirCovarianceOverTwentySeeds) {
@@ -295,100 +246,6 @@ TEST(SyntheticPriors, SameInputSameResult) {
     EXPECT_EQ(a.priors[i].covariance, b.priors[i].covariance);
     EXPECT_EQ(a.priors[i].cam2_from_cam1.translation,
               b.priors[i].cam2_from_cam1.translation);
-  }
-}
-
-// What users get wrong, and the words that must be in the answer.
-struct Mistake {
-  const char* name;
-  void (*make)(Dataset*);
-  const char* words;
-};
-
-class Mistakes : public testing::TestWithParam<Mistake> {};
-
-TEST_P(Mistakes, AreNamed) {
-  for (const uint64_t seed : {1, 2, 3}) {
-    const SyntheticWorld world = BuildSyntheticWorld(SmallWorld(seed, 120));
-    Dataset data = ToDataset(world);
-    GetParam().make(&data);
-    const std::vector<VisualRotation> vision = SimulateVision(world, seed);
-    const StatusOr<PriorEstimate> estimate =
-        EstimatePriors(data.images, data.logs, data.calibration, vision, {});
-    ASSERT_FALSE(estimate.ok()) << GetParam().name;
-    EXPECT_NE(estimate.status().message().find(GetParam().words),
-              std::string::npos)
-        << estimate.status().message();
-    // The user may insist.
-    PriorEstimationOptions options;
-    options.check_against_vision = false;
-    EXPECT_TRUE(EstimatePriors(data.images, data.logs, data.calibration, vision,
-                               options)
-                    .ok());
-  }
-}
-
-INSTANTIATE_TEST_SUITE_P(
-    Table, Mistakes,
-    testing::Values(Mistake{"SwappedAxes",
-                            [](Dataset* data) {
-                              for (ImuSample& s : data->logs.imu) {
-                                std::swap(s.angular_velocity.y(),
-                                          s.angular_velocity.z());
-                                std::swap(s.specific_force.y(),
-                                          s.specific_force.z());
-                              }
-                            },
-                            "axes"},
-                    Mistake{"InvertedExtrinsics",
-                            [](Dataset* data) {
-                              data->calibration.cam_from_imu =
-                                  data->calibration.cam_from_imu.Inverse();
-                            },
-                            "inverted"},
-                    Mistake{"Degrees",
-                            [](Dataset* data) {
-                              for (ImuSample& s : data->logs.imu) {
-                                s.angular_velocity *= RadToDeg(1.0);
-                              }
-                            },
-                            "deg/s"},
-                    Mistake{"OneSecond",
-                            [](Dataset* data) {
-                              for (ImuSample& s : data->logs.imu) {
-                                s.timestamp_ns += 1'000'000'000;
-                              }
-                            },
-                            "timeshift_cam_imu"}),
-    [](const testing::TestParamInfo<Mistake>& mistake) {
-      return mistake.param.name;
-    });
-
-TEST(VisionCheck, FindsTheTimeShift) {
-  for (const uint64_t seed : {1, 2, 3}) {
-    SyntheticWorldOptions world_options = SmallWorld(seed, 120);
-    world_options.timeshift_cam_imu_s = 0.0623;
-    const SyntheticWorld world = BuildSyntheticWorld(world_options);
-    Dataset data = ToDataset(world);
-    data.calibration.timeshift_cam_imu_s = 0.0;
-    PriorEstimationOptions options;
-    options.estimate_time_shift = true;
-    const StatusOr<PriorEstimate> estimate =
-        EstimatePriors(data.images, data.logs, data.calibration,
-                       SimulateVision(world, seed), options);
-    ASSERT_TRUE(estimate.ok()) << estimate.status().message();
-    EXPECT_NEAR(estimate->summary.timeshift_cam_imu_s, 0.0623, 0.01);
-  }
-}
-
-TEST(VisionCheck, AcceptsARightCalibration) {
-  for (const uint64_t seed : {4, 5, 6}) {
-    const SyntheticWorld world = BuildSyntheticWorld(SmallWorld(seed));
-    const Dataset data = ToDataset(world);
-    const StatusOr<PriorEstimate> estimate =
-        EstimatePriors(data.images, data.logs, data.calibration,
-                       SimulateVision(world, seed), {});
-    EXPECT_TRUE(estimate.ok()) << estimate.status().message();
   }
 }
 
