@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <chrono>
 #include <map>
+#include <set>
 #include <sstream>
 #include <stdexcept>
 
@@ -88,6 +89,30 @@ std::string DescribeModel(const CoarseModel& model) {
   return text.str();
 }
 
+// Pairs whose matches show another place than the poses say. Refinement cannot
+// tell: two look-alike places on one straight street differ only by a motion
+// along the line of sight, which leaves their matches on the epipolar lines.
+std::set<ImagePair> FindRefutedPairs(const ViewGraph& graph) {
+  std::set<ImagePair> refuted;
+  for (const ViewGraphEdge& edge : graph.edges) {
+    switch (edge.removal) {
+      case EdgeRemoval::kOdometryRotation:
+      case EdgeRemoval::kOdometryPosition:
+      case EdgeRemoval::kFalseLoop:
+      case EdgeRemoval::kRotation:
+      case EdgeRemoval::kTranslation:
+        refuted.insert(edge.Pair());
+        break;
+      case EdgeRemoval::kKept:
+      case EdgeRemoval::kFewInliers:
+      case EdgeRemoval::kRelativePose:
+      case EdgeRemoval::kDisconnected:
+        break;
+    }
+  }
+  return refuted;
+}
+
 // Refines the pairs within every model, in the frame of the model's poses.
 void RefinePairs(const MatchRefinementOptions& options, const SceneData& scene,
                  const GlobalCorrespondences& correspondences,
@@ -100,11 +125,14 @@ void RefinePairs(const MatchRefinementOptions& options, const SceneData& scene,
   }
   std::vector<std::map<ImagePair, std::vector<FeatureMatch>>> candidates(
       result->models.size());
+  const std::set<ImagePair> refuted = FindRefutedPairs(result->poses.graph);
   for (const ScenePair& pair : scene.pairs) {
     const auto it1 = component_of.find(pair.image_id1);
     const auto it2 = component_of.find(pair.image_id2);
     if (it1 == component_of.end() || it2 == component_of.end()) {
       ++result->refinement.num_skipped_pairs;
+    } else if (refuted.count(ImagePair(pair.image_id1, pair.image_id2))) {
+      result->removed_pairs.emplace_back(pair.image_id1, pair.image_id2);
     } else if (it1->second == it2->second) {
       candidates[it1->second][ImagePair(pair.image_id1, pair.image_id2)] =
           pair.raw_matches.empty() ? pair.inlier_matches : pair.raw_matches;
