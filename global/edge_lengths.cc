@@ -60,6 +60,9 @@ std::vector<DepthPair> ComputeDepthPairs(
   const Eigen::Vector3d translation =
       edge.cam2_from_cam1.translation.normalized();
   const double min_sin_parallax = std::sin(DegToRad(options.min_parallax_deg));
+  // Beyond this parallax other errors than the keypoints' decide; without the
+  // bound, one wrong match of wide parallax would outweigh a hundred true ones.
+  constexpr double kSaturation = 0.05;
   std::vector<std::pair<double, DepthPair>> candidates;
   for (const FeatureMatch& match : matches) {
     double depth1, depth2, sin_parallax;
@@ -71,10 +74,11 @@ std::vector<DepthPair> ComputeDepthPairs(
     if (depth1 <= 0.0 || depth2 <= 0.0 || sin_parallax < min_sin_parallax) {
       continue;
     }
+    const double squared = sin_parallax * sin_parallax;
     candidates.push_back(
         {-sin_parallax,
          {match.point2D_idx1, match.point2D_idx2, std::log(depth1),
-          std::log(depth2), sin_parallax * sin_parallax}});
+          std::log(depth2), squared / (squared + kSaturation * kSaturation)}});
   }
   std::stable_sort(
       candidates.begin(), candidates.end(),
