@@ -8,6 +8,10 @@ function(adasfm_target_options target)
   if(ADASFM_WERROR)
     target_compile_options(${target} PRIVATE -Werror)
   endif()
+  if(ADASFM_BUILD_FUZZERS)
+    # The fuzzer follows what the layers execute.
+    target_compile_options(${target} PUBLIC -fsanitize=fuzzer-no-link)
+  endif()
   if(ADASFM_SANITIZE)
     target_compile_options(${target} PUBLIC -fsanitize=address,undefined
                            -fno-sanitize-recover=undefined
