@@ -36,6 +36,7 @@ class CoarsePoseEstimator {
     EstimateTranslations();
     EstimatePositions();
     result_.graph = std::move(graph_);
+    result_.priors = std::move(priors_);
     return std::move(result_);
   }
 
@@ -49,14 +50,41 @@ class CoarsePoseEstimator {
       edge.removal = EdgeRemoval::kFewInliers;
       ++num_removed;
     }
-    chain_ = OdometryChain(priors_, options_.chain);
+    const RotationRateReport rates = BuildChain();
     if (options_.relative_poses.enabled) {
       RefineRelativePoses(options_.relative_poses, correspondences_,
                           PredictRotations(), &graph_);
     }
     EndStep("relative poses", std::to_string(graph_.edges.size()) + " pairs, " +
                                   std::to_string(num_removed) +
-                                  " with few inliers removed");
+                                  " with few inliers removed, odometry turned "
+                                  "by up to " +
+                                  std::to_string(rates.max_rate_rad_s) +
+                                  " rad/s");
+  }
+
+  // The chain, after vision has corrected its rotations.
+  RotationRateReport BuildChain() {
+    chain_ = OdometryChain(priors_, options_.chain);
+    if (chain_.empty() || !options_.relative_poses.enabled ||
+        !options_.rotation_rates.enabled) {
+      return RotationRateReport();
+    }
+    ViewGraph near = graph_;
+    near.edges.erase(
+        std::remove_if(
+            near.edges.begin(), near.edges.end(),
+            [this](const ViewGraphEdge& edge) {
+              return !chain_.IsConnected(edge.image_id1, edge.image_id2) ||
+                     std::abs(chain_.NumSteps(edge.image_id1, edge.image_id2)) >
+                         options_.rotation_rates.max_num_steps;
+            }),
+        near.edges.end());
+    RefineRelativePoses(options_.relative_poses, correspondences_, {}, &near);
+    const RotationRateReport report =
+        CorrectRotationRates(options_.rotation_rates, chain_, near, &priors_);
+    chain_ = OdometryChain(priors_, options_.chain);
+    return report;
   }
 
   std::vector<std::optional<RotationPrediction>> PredictRotations() const {
@@ -324,7 +352,7 @@ class CoarsePoseEstimator {
 
   const CoarsePoseOptions& options_;
   const GlobalCorrespondences& correspondences_;
-  const std::vector<RelativePosePrior>& priors_;
+  std::vector<RelativePosePrior> priors_;
   ViewGraph graph_;
   OdometryChain chain_;
   EdgeLengths lengths_;
@@ -353,11 +381,11 @@ bool CoarsePoseOptions::IsValid(std::string* error) const {
              " must be >= 0";
     return false;
   }
-  return chain.IsValid(error) && relative_poses.IsValid(error) &&
-         lengths.IsValid(error) && loops.IsValid(error) &&
-         rotations.IsValid(error) && translations.IsValid(error) &&
-         augmentation.IsValid(error) && positions.IsValid(error) &&
-         position_filter.IsValid(error);
+  return chain.IsValid(error) && rotation_rates.IsValid(error) &&
+         relative_poses.IsValid(error) && lengths.IsValid(error) &&
+         loops.IsValid(error) && rotations.IsValid(error) &&
+         translations.IsValid(error) && augmentation.IsValid(error) &&
+         positions.IsValid(error) && position_filter.IsValid(error);
 }
 
 CoarsePoses EstimateCoarsePoses(const CoarsePoseOptions& options,

@@ -8,6 +8,7 @@
 #include "core/relative_pose_prior.h"
 #include "core/rigid3d.h"
 #include "global/augment_view_graph.h"
+#include "global/correct_rotation_rates.h"
 #include "global/correspondences.h"
 #include "global/edge_lengths.h"
 #include "global/filter_edges_by_position.h"
@@ -24,6 +25,7 @@ namespace adasfm {
 // Nested by step, in order of their use.
 struct CoarsePoseOptions {
   OdometryChainOptions chain;
+  RotationRateOptions rotation_rates;
   RelativePoseRefinementOptions relative_poses;
   EdgeLengthOptions lengths;
   LoopFilterOptions loops;
@@ -75,6 +77,8 @@ struct CoarsePoses {
   // The input's edges and those added, with reasons of removal and the
   // relative poses as they were used.
   ViewGraph graph;
+  // The input's, with the rotations that vision corrected.
+  std::vector<RelativePosePrior> priors;
   std::vector<CoarseStep> steps;
 };
 
@@ -83,6 +87,7 @@ struct CoarsePoses {
 // empty. Throws std::invalid_argument for invalid options or an inconsistent
 // graph. Numbered steps:
 //   1 least-squares relative poses            RefineRelativePoses
+//     odometry's rotation rates               CorrectRotationRates
 //   2 odometry chain, lengths, loop gating    FilterLoopsByOdometry
 //   3 sensor edges, rotation averaging        EstimateGlobalRotations
 //   4 edges off the rotations                 FilterEdgesByRotation

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "global/odometry_chain.h"
 
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <set>
@@ -53,6 +54,13 @@ Matrix6d ObservedCovariance(const RelativePosePrior& prior) {
   return covariance.allFinite() ? covariance : Matrix6d::Zero();
 }
 
+Eigen::Matrix3d SquareRoot(const Eigen::Matrix3d& covariance) {
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(covariance);
+  return eigen.eigenvectors() *
+         eigen.eigenvalues().cwiseMax(0.0).cwiseSqrt().asDiagonal() *
+         eigen.eigenvectors().transpose();
+}
+
 // The part of the motion that was observed.
 Rigid3d ObservedMotion(const RelativePosePrior& prior) {
   Rigid3d motion;
@@ -72,6 +80,11 @@ bool OdometryChainOptions::IsValid(std::string* error) const {
     *error =
         "gyro_bias_sigma_rad_s = " + std::to_string(gyro_bias_sigma_rad_s) +
         " must be >= 0";
+    return false;
+  }
+  if (!(persistent_translation_ratio >= 0.0)) {
+    *error = "persistent_translation_ratio = " +
+             std::to_string(persistent_translation_ratio) + " must be >= 0";
     return false;
   }
   return true;
@@ -124,12 +137,14 @@ void OdometryChain::AppendPiece(image_t first,
                                       TwistFromError(motion.translation);
     node.covariance += start_from_error * ObservedCovariance(prior) *
                        start_from_error.transpose();
-    // d(error) / d(scale, gyro bias) of this step.
-    Eigen::Matrix<double, 6, 4> systematic;
-    systematic.setZero();
+    // d(error) / d(scale, gyro bias, persistent translation error) of this
+    // step.
+    Systematic systematic = Systematic::Zero();
     systematic.block<3, 1>(3, 0) = motion.translation;
     systematic.block<3, 3>(0, 1) =
         SecondsFromNs(prior.dt_ns) * Eigen::Matrix3d::Identity();
+    systematic.block<3, 3>(3, 4) =
+        SquareRoot(ObservedCovariance(prior).bottomRightCorner<3, 3>());
     node.systematic += start_from_error * systematic;
     index_[node.image_id] = nodes_.size();
     nodes_.push_back(node);
@@ -178,11 +193,12 @@ ChainMotion OdometryChain::Motion(image_t image_id1, image_t image_id2) const {
 
   // In the start's frame the errors of the steps add up; the error's sign does
   // not matter to a covariance, so both directions of travel are one formula.
-  Eigen::Vector4d variances;
+  Eigen::Matrix<double, 7, 1> variances;
   variances << std::pow(options_.scale_sigma, 2),
-      Eigen::Vector3d::Constant(std::pow(options_.gyro_bias_sigma_rad_s, 2));
-  const Eigen::Matrix<double, 6, 4> systematic =
-      later.systematic - earlier.systematic;
+      Eigen::Vector3d::Constant(std::pow(options_.gyro_bias_sigma_rad_s, 2)),
+      Eigen::Vector3d::Constant(
+          std::pow(options_.persistent_translation_ratio, 2));
+  const Systematic systematic = later.systematic - earlier.systematic;
   const Matrix6d covariance_in_start =
       later.covariance - earlier.covariance +
       systematic * variances.asDiagonal() * systematic.transpose();

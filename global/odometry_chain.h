@@ -18,6 +18,10 @@ struct OdometryChainOptions {
   double scale_sigma = 0.01;
   // 1 sigma of the gyro bias that is left, rad/s, per axis.
   double gyro_bias_sigma_rad_s = 2e-4;
+  // The steps of a smoothed drive share the errors of its tilt and velocity:
+  // this many sigmas of their translations persist from step to step, besides
+  // the part that changes.
+  double persistent_translation_ratio = 1.0;
 
   bool IsValid(std::string* error) const;
 };
@@ -63,14 +67,15 @@ class OdometryChain {
 
  private:
   using Matrix6d = Eigen::Matrix<double, 6, 6>;
+  // By the scale, the gyro bias and the persistent translation error.
+  using Systematic = Eigen::Matrix<double, 6, 7>;
   struct Node {
     image_t image_id = kInvalidImageId;
     int piece = -1;
     Rigid3d cam_from_start;
     // Prefix sums over the piece's steps up to this node.
     Matrix6d covariance = Matrix6d::Zero();
-    Eigen::Matrix<double, 6, 4> systematic =
-        Eigen::Matrix<double, 6, 4>::Zero();
+    Systematic systematic = Systematic::Zero();
     int num_without_rotation = 0;
     int num_without_position = 0;
   };

@@ -65,14 +65,16 @@ TEST(OdometryChain, CovarianceAgreesWithMonteCarlo) {
   OdometryChainOptions options;
   options.scale_sigma = 0.004;
   options.gyro_bias_sigma_rad_s = 5e-4;
+  options.persistent_translation_ratio = 0.3;
   Random random(7);
   const auto draw = [&](double rotation_sigma, double translation_sigma,
-                        double scale, const Eigen::Vector3d& bias) {
+                        double scale, const Eigen::Vector3d& bias,
+                        const Eigen::Vector3d& persistent) {
     std::vector<RelativePosePrior> priors;
     for (int k = 1; k <= kNumSteps; ++k) {
       Rigid3d step = TrueStep(k);
       step.rotation = ExpSo3(0.1 * bias) * step.rotation;
-      step.translation *= scale;
+      step.translation = scale * step.translation + persistent;
       priors.push_back(BuildPrior(k, k + 1, step, rotation_sigma,
                                   translation_sigma, &random));
       priors.back().covariance.diagonal()
@@ -81,7 +83,8 @@ TEST(OdometryChain, CovarianceAgreesWithMonteCarlo) {
     }
     return OdometryChain(priors, options);
   };
-  const OdometryChain truth = draw(0, 0, 1.0, Eigen::Vector3d::Zero());
+  const OdometryChain truth =
+      draw(0, 0, 1.0, Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero());
   for (const auto& [from, to] :
        std::vector<std::pair<image_t, image_t>>{{11, 111}, {111, 31}}) {
     Matrix6d sampled = Matrix6d::Zero();
@@ -90,7 +93,9 @@ TEST(OdometryChain, CovarianceAgreesWithMonteCarlo) {
       const Rigid3d drawn =
           draw(kRotationSigma, kTranslationSigma,
                1.0 + random.Gaussian(options.scale_sigma),
-               random.GaussianVector(options.gyro_bias_sigma_rad_s))
+               random.GaussianVector(options.gyro_bias_sigma_rad_s),
+               random.GaussianVector(options.persistent_translation_ratio *
+                                     kTranslationSigma))
               .Motion(from, to)
               .cam2_from_cam1;
       Eigen::Matrix<double, 6, 1> error;
