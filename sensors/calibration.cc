@@ -4,6 +4,7 @@
 #include <yaml-cpp/yaml.h>
 
 #include <Eigen/LU>
+#include <cctype>
 #include <cmath>
 #include <filesystem>
 #include <fstream>
@@ -17,6 +18,14 @@ namespace {
 
 // Calibrations are printed with a few digits only.
 constexpr double kRotationTolerance = 1e-2;
+
+// yaml-cpp quotes what it could not read, and scalars may span lines.
+std::string OneLine(std::string text) {
+  for (char& c : text) {
+    if (std::iscntrl(static_cast<unsigned char>(c))) c = ' ';
+  }
+  return text;
+}
 
 // Reads keys of one YAML file; what is wrong is thrown as one line and becomes
 // a Status in ReadSensorCalibration.
@@ -176,10 +185,10 @@ StatusOr<SensorCalibration> ReadSensorCalibration(const std::string& path) {
   } catch (const YAML::Exception& exception) {
     return Status::Error(path + ", line " +
                          std::to_string(exception.mark.line + 1) +
-                         ": not readable as YAML (" + exception.msg +
+                         ": not readable as YAML (" + OneLine(exception.msg) +
                          "); check indentation and brackets");
   } catch (const std::runtime_error& exception) {
-    return Status::Error(exception.what());
+    return Status::Error(OneLine(exception.what()));
   }
 }
 

@@ -4,21 +4,17 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
-#include <limits>
 #include <stdexcept>
 #include <tuple>
 
 #include "core/so3.h"
 #include "sensors/build_odometry_links.h"
 #include "sensors/check_against_vision.h"
+#include "sensors/compose_prior.h"
 #include "sensors/initial_odometry.h"
-#include "sensors/log_checks.h"
 
 namespace adasfm {
 namespace {
-
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
-constexpr double kSlipFlagWeight = 0.3;
 
 std::string Format(const char* format, double a, double b = 0.0) {
   char buffer[256];
@@ -47,10 +43,7 @@ class PriorEstimator {
   Status CheckVision(const std::vector<VisualRotation>& rotations);
   void Fuse();
   void BuildPriors();
-  RelativePosePrior BuildPrior(size_t image) const;
   void FillSummary();
-  void PredictDrift();
-  void ListSlips();
   ImuBias FirstBias() const;
 
   const SensorCalibration& calibration_;
@@ -66,23 +59,6 @@ class PriorEstimator {
   OdometryFusionResult fused_;
   PriorEstimate estimate_;
 };
-
-template <typename Sample>
-void MeasureRate(const std::vector<Sample>& samples, double* rate_hz,
-                 int* num_gaps, double* max_gap_s) {
-  std::vector<timestamp_t> times;
-  times.reserve(samples.size());
-  for (const Sample& sample : samples) times.push_back(sample.timestamp_ns);
-  const double period = ComputeMedianPeriod(times);
-  if (period <= 0.0) return;
-  *rate_hz = 1.0 / period;
-  for (size_t i = 1; i < times.size(); ++i) {
-    const double gap = SecondsFromNs(times[i] - times[i - 1]);
-    if (gap <= 3.0 * period) continue;
-    ++*num_gaps;
-    *max_gap_s = std::max(*max_gap_s, gap);
-  }
-}
 
 void PriorEstimator::SelectLogs(const SensorLogs& logs) {
   SensorSummary& summary = estimate_.summary;
@@ -100,15 +76,7 @@ void PriorEstimator::SelectLogs(const SensorLogs& logs) {
     summary.warnings.push_back(
         "the calibration has no wheel0: the wheel log is not used");
   }
-  MeasureRate(logs_.imu, &summary.imu_rate_hz, &summary.num_imu_gaps,
-              &summary.max_imu_gap_s);
-  if (logs_.odometry.empty()) {
-    MeasureRate(logs_.wheel, &summary.wheel_rate_hz, &summary.num_wheel_gaps,
-                &summary.max_wheel_gap_s);
-  } else {
-    MeasureRate(logs_.odometry, &summary.wheel_rate_hz, &summary.num_wheel_gaps,
-                &summary.max_wheel_gap_s);
-  }
+  SummarizeRates(logs_, &summary);
   if (summary.imu_rate_hz > 0.0 &&
       std::abs(summary.imu_rate_hz / calibration_.imu_rate_hz - 1.0) > 0.2) {
     summary.warnings.push_back(
@@ -248,68 +216,6 @@ void PriorEstimator::Fuse() {
   fused_ = FuseOdometry(problem_, options_.fusion);
 }
 
-// From image i to i + 1. Motions of the links between are composed; their
-// errors are alike (one speed, one bias), so n of them count up to n times
-// their sum of variances.
-RelativePosePrior PriorEstimator::BuildPrior(size_t image) const {
-  const size_t first = timeline_.indices[image];
-  const size_t last = timeline_.indices[image + 1];
-  Rigid3d body2_from_body1;
-  Eigen::Matrix<double, 6, 6> covariance = Eigen::Matrix<double, 6, 6>::Zero();
-  bool has_imu = true, has_wheel = true, has_yaw = true, is_slipping = false;
-  for (size_t k = first; k < last; ++k) {
-    const OdometryMotion& motion = fused_.motions[k];
-    const OdometryLink& link = problem_.links[k];
-    // An error before this link is seen from behind it.
-    Eigen::Matrix<double, 6, 6> carry = Eigen::Matrix<double, 6, 6>::Identity();
-    const Eigen::Matrix3d rotation =
-        motion.body2_from_body1.rotation.toRotationMatrix();
-    carry.topLeftCorner<3, 3>() = rotation;
-    carry.bottomRightCorner<3, 3>() = rotation;
-    Eigen::Matrix<double, 6, 6> own = Eigen::Matrix<double, 6, 6>::Identity();
-    own.bottomLeftCorner<3, 3>() =
-        -Hat(rotation * body2_from_body1.translation);
-    covariance = carry * covariance * carry.transpose() +
-                 own * motion.covariance * own.transpose();
-    body2_from_body1 = motion.body2_from_body1 * body2_from_body1;
-    has_imu &= link.has_imu;
-    has_wheel &= link.has_wheel;
-    has_yaw &=
-        link.has_wheel && (link.has_wheel_yaw || link.wheel.has_rotation);
-    is_slipping |= motion.wheel_weight < kSlipFlagWeight;
-  }
-  covariance *= static_cast<double>(last - first);
-
-  RelativePosePrior prior;
-  prior.image_id1 = images_[image].image_id;
-  prior.image_id2 = images_[image + 1].image_id;
-  prior.dt_ns = images_[image + 1].timestamp_ns - images_[image].timestamp_ns;
-  const Rigid3d& cam_from_imu = calibration_.cam_from_imu;
-  const Rigid3d imu_from_cam = cam_from_imu.Inverse();
-  prior.cam2_from_cam1 = cam_from_imu * body2_from_body1 * imu_from_cam;
-  const Eigen::Matrix3d rotation = cam_from_imu.rotation.toRotationMatrix();
-  Eigen::Matrix<double, 6, 6> map = Eigen::Matrix<double, 6, 6>::Zero();
-  map.topLeftCorner<3, 3>() = rotation;
-  map.bottomRightCorner<3, 3>() = rotation;
-  map.bottomLeftCorner<3, 3>() =
-      -rotation * Hat(body2_from_body1.rotation * imu_from_cam.translation);
-  prior.covariance = map * covariance * map.transpose();
-
-  const bool has_rotation = has_imu || has_yaw;
-  if (has_rotation) prior.flags |= kPriorRotation;
-  if (has_rotation && has_wheel) prior.flags |= kPriorDirection;
-  if (has_wheel) prior.flags |= kPriorLength;
-  if (is_slipping && has_wheel) prior.flags |= kPriorWheelSlip;
-  const auto forget = [&prior](int begin) {
-    prior.covariance.middleRows<3>(begin).setZero();
-    prior.covariance.middleCols<3>(begin).setZero();
-    prior.covariance.diagonal().segment<3>(begin).setConstant(kInfinity);
-  };
-  if (!has_rotation) forget(0);
-  if (!has_wheel) forget(3);
-  return prior;
-}
-
 void PriorEstimator::BuildPriors() {
   const Eigen::Vector3d down(0.0, 0.0, -1.0);
   for (size_t i = 0; i < images_.size(); ++i) {
@@ -323,51 +229,14 @@ void PriorEstimator::BuildPriors() {
           (fused_.states[index].world_from_imu.conjugate() * down);
     }
     if (i + 1 == images_.size()) break;
-    const RelativePosePrior prior = BuildPrior(i);
+    RelativePosePrior prior =
+        ComposePrior(problem_, fused_, index, timeline_.indices[i + 1],
+                     calibration_.cam_from_imu);
+    prior.image_id1 = images_[i].image_id;
+    prior.image_id2 = images_[i + 1].image_id;
+    prior.dt_ns = images_[i + 1].timestamp_ns - images_[i].timestamp_ns;
     if (prior.flags != 0) estimate_.priors.push_back(prior);
   }
-}
-
-void PriorEstimator::ListSlips() {
-  std::vector<WheelSlip>& slips = estimate_.summary.wheel_slips;
-  size_t last_link = 0;
-  for (const auto& [link, speed_error] : fused_.slipping_links) {
-    // What happened before the first image or after the last is of no use.
-    if (link + 1 <= timeline_.indices.front() ||
-        link >= timeline_.indices.back()) {
-      continue;
-    }
-    if (slips.empty() || link > last_link + 2) slips.emplace_back();
-    WheelSlip& slip = slips.back();
-    if (slip.end_ns == 0) {
-      slip.start_ns = timeline_.times_ns[link] - timeshift_ns_;
-    }
-    slip.end_ns = timeline_.times_ns[link + 1] - timeshift_ns_;
-    if (std::abs(speed_error) > std::abs(slip.speed_error_m_s)) {
-      slip.speed_error_m_s = speed_error;
-    }
-    last_link = link;
-  }
-}
-
-// Over 100 m at the mean speed: heading by the gyroscope's noise and what is
-// left of its bias; the position by heading (its mean over the way is half of
-// its end) and scale.
-void PriorEstimator::PredictDrift() {
-  SensorSummary& summary = estimate_.summary;
-  double moving_s = 0.0;
-  for (const OdometryLink& link : problem_.links) {
-    if (link.has_wheel && link.standstill == StandstillKind::kNone)
-      moving_s += link.dt_s;
-  }
-  if (summary.distance_m <= 0.0 || moving_s <= 0.0) return;
-  const double time = 100.0 * moving_s / summary.distance_m;
-  const double walk = calibration_.imu_noise.gyroscope_noise_density;
-  const double heading =
-      std::hypot(walk * std::sqrt(time), summary.gyroscope_bias_sigma * time);
-  if (!logs_.imu.empty()) summary.drift_per_100m_deg = RadToDeg(heading);
-  summary.drift_per_100m_m =
-      100.0 * std::hypot(0.5 * heading, summary.wheel_scale_sigma);
 }
 
 void PriorEstimator::FillSummary() {
@@ -410,8 +279,8 @@ void PriorEstimator::FillSummary() {
         "the smoother did not settle: sensors contradict each other; check "
         "T_cam_imu, T_imu_wheel and the noise figures");
   }
-  PredictDrift();
-  ListSlips();
+  PredictDrift(problem_, !logs_.imu.empty(), &summary);
+  summary.wheel_slips = ListWheelSlips(fused_, timeline_, timeshift_ns_);
 }
 
 StatusOr<PriorEstimate> PriorEstimator::Run(

@@ -11,6 +11,7 @@
 #include "core/status.h"
 #include "sensors/calibration.h"
 #include "sensors/odometry_fusion.h"
+#include "sensors/sensor_summary.h"
 
 namespace adasfm {
 
@@ -61,40 +62,6 @@ struct PriorEstimationOptions {
   OdometryFusionOptions fusion;
 
   bool IsValid(std::string* error) const;
-};
-
-// Figures for the screen and the JSON summary; zero where there is no sensor.
-struct SensorSummary {
-  int num_images = 0;
-  int num_images_in_logs = 0;
-  int num_priors = 0;
-  double prior_ratio = 0.0;  // of the consecutive pairs
-  double imu_rate_hz = 0.0;
-  double wheel_rate_hz = 0.0;
-  int num_imu_gaps = 0;
-  int num_wheel_gaps = 0;
-  double max_imu_gap_s = 0.0;
-  double max_wheel_gap_s = 0.0;
-  double standstill_s = 0.0;
-  // Means over the sequence, with the mean 1 sigma of an axis.
-  Eigen::Vector3d gyroscope_bias = Eigen::Vector3d::Zero();
-  double gyroscope_bias_sigma = 0.0;
-  Eigen::Vector3d accelerometer_bias = Eigen::Vector3d::Zero();
-  double accelerometer_bias_sigma = 0.0;
-  // At the first image in the logs, in its camera frame; zero when unknown.
-  Eigen::Vector3d first_gravity_in_cam = Eigen::Vector3d::Zero();
-  // True speed = scale * logged speed.
-  double wheel_scale = 1.0;
-  double wheel_scale_sigma = 0.0;
-  // The time shift in use, and what vision would add to it (0 when unknown).
-  double timeshift_cam_imu_s = 0.0;
-  double visual_timeshift_correction_s = 0.0;
-  std::vector<WheelSlip> wheel_slips;  // camera clock
-  double distance_m = 0.0;
-  // Expected error of the chained priors after 100 m, 1 sigma.
-  double drift_per_100m_m = 0.0;
-  double drift_per_100m_deg = 0.0;
-  std::vector<std::string> warnings;
 };
 
 struct PriorEstimate {

@@ -23,7 +23,6 @@ constexpr double kFirstThresholdFactor = 8.0;
 constexpr double kMaxFirstForceError = 1.5;  // m/s^2
 constexpr double kFirstSlipWeight = 1e-4;
 constexpr double kConvergedStep = 1e-5;  // of a sigma-free unit: rad, m/s, m
-constexpr double kSlipWeight = 0.3;
 
 class Smoother {
  public:
@@ -283,37 +282,6 @@ OdometryFusionResult Smoother::Run() {
 }
 
 }  // namespace
-
-bool OdometryFusionOptions::IsValid(std::string* error) const {
-  const std::pair<const char*, double> positive[] = {
-      {"gravity_m_s2", gravity_m_s2},
-      {"gyroscope_bias_sigma", gyroscope_bias_sigma},
-      {"accelerometer_bias_sigma", accelerometer_bias_sigma},
-      {"wheel_scale_sigma", wheel_scale_sigma},
-      {"wheel_track_sigma", wheel_track_sigma},
-      {"wheel_curvature_sigma", wheel_curvature_sigma},
-      {"lateral_speed_noise", lateral_speed_noise},
-      {"vertical_speed_noise", vertical_speed_noise},
-      {"planar_rotation_noise", planar_rotation_noise},
-      {"slip_threshold_sigma", slip_threshold_sigma},
-      {"standstill_speed_sigma", standstill_speed_sigma},
-      {"standstill_rate_sigma", standstill_rate_sigma},
-      {"unaided_speed_sigma", unaided_speed_sigma},
-      {"max_num_iterations", static_cast<double>(max_num_iterations)}};
-  for (const auto& [name, value] : positive) {
-    if (value > 0.0) continue;
-    *error = "AdaSfmPriors." + std::string(name) + " is " +
-             std::to_string(value) + "; it must be positive";
-    return false;
-  }
-  if (!(wheel_mount_sigma_deg >= 0.0) || !(slip_min_speed_m_s >= 0.0)) {
-    *error =
-        "AdaSfmPriors.wheel_mount_sigma_deg and .slip_min_speed_m_s must "
-        "not be negative";
-    return false;
-  }
-  return true;
-}
 
 OdometryFusionResult FuseOdometry(const OdometryFusionProblem& problem,
                                   const OdometryFusionOptions& options) {

@@ -96,6 +96,9 @@ struct OdometryMotion {
   double wheel_weight = 1.0;  // < 1: the wheels contradicted the IMU
 };
 
+// Wheels that weigh less than this slip.
+inline constexpr double kSlipWeight = 0.3;
+
 struct WheelSlip {
   timestamp_t start_ns = 0;
   timestamp_t end_ns = 0;

@@ -1,0 +1,61 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <Eigen/Core>
+#include <string>
+#include <vector>
+
+#include "sensors/build_odometry_links.h"
+#include "sensors/odometry_fusion.h"
+
+namespace adasfm {
+
+// Figures for the screen and the JSON summary; zero where there is no sensor.
+struct SensorSummary {
+  int num_images = 0;
+  int num_images_in_logs = 0;
+  int num_priors = 0;
+  double prior_ratio = 0.0;  // of the consecutive pairs
+  double imu_rate_hz = 0.0;
+  double wheel_rate_hz = 0.0;
+  int num_imu_gaps = 0;
+  int num_wheel_gaps = 0;
+  double max_imu_gap_s = 0.0;
+  double max_wheel_gap_s = 0.0;
+  double standstill_s = 0.0;
+  // Means over the sequence, with the mean 1 sigma of an axis.
+  Eigen::Vector3d gyroscope_bias = Eigen::Vector3d::Zero();
+  double gyroscope_bias_sigma = 0.0;
+  Eigen::Vector3d accelerometer_bias = Eigen::Vector3d::Zero();
+  double accelerometer_bias_sigma = 0.0;
+  // At the first image in the logs, in its camera frame; zero when unknown.
+  Eigen::Vector3d first_gravity_in_cam = Eigen::Vector3d::Zero();
+  // True speed = scale * logged speed.
+  double wheel_scale = 1.0;
+  double wheel_scale_sigma = 0.0;
+  // The time shift in use, and what vision would add to it (0 when unknown).
+  double timeshift_cam_imu_s = 0.0;
+  double visual_timeshift_correction_s = 0.0;
+  std::vector<WheelSlip> wheel_slips;  // camera clock
+  double distance_m = 0.0;
+  // Expected error of the chained priors after 100 m, 1 sigma.
+  double drift_per_100m_m = 0.0;
+  double drift_per_100m_deg = 0.0;
+  std::vector<std::string> warnings;
+};
+
+// Rates and gaps of the logs.
+void SummarizeRates(const MotionLogs& logs, SensorSummary* summary);
+
+// Slips between the first and the last image, on the camera's clock.
+std::vector<WheelSlip> ListWheelSlips(const OdometryFusionResult& fused,
+                                      const OdometryTimeline& timeline,
+                                      timestamp_t timeshift_ns);
+
+// Needs distance, bias and scale of the summary. Over 100 m at the mean speed:
+// heading by the gyroscope's noise and what is left of its bias; the position
+// by heading (its mean over the way is half of its end) and scale.
+void PredictDrift(const OdometryFusionProblem& problem, bool has_imu,
+                  SensorSummary* summary);
+
+}  // namespace adasfm
