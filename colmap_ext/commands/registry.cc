@@ -16,6 +16,8 @@ const std::vector<Command>& Commands() {
       {"adasfm_prior_importer",
        "turns IMU and wheel logs into priors in the database",
        RunAdasfmPriorImporter},
+      {"adasfm_reporter", "shows a model in one HTML file to look at",
+       RunAdasfmReporter},
       {"adasfm_restorer", "undoes what adasfm_global rewrote in the database",
        RunAdasfmRestorer},
       {"adasfm_synthesizer", "makes a drive with ground truth",

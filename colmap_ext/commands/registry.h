@@ -13,6 +13,7 @@ Status RunAdasfmEvaluator(int argc, char** argv);
 Status RunAdasfmGlobal(int argc, char** argv);
 Status RunAdasfmMapper(int argc, char** argv);
 Status RunAdasfmPriorImporter(int argc, char** argv);
+Status RunAdasfmReporter(int argc, char** argv);
 Status RunAdasfmRestorer(int argc, char** argv);
 Status RunAdasfmSynthesizer(int argc, char** argv);
 

@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <iostream>
+#include <string>
+
+#include "colmap_ext/commands/registry.h"
+#include "colmap_ext/report.h"
+
+namespace adasfm {
+
+Status RunAdasfmReporter(int argc, char** argv) {
+  ReportOptions options;
+  std::string output_path;
+  CommandOptions command("adasfm_reporter",
+                         "Shows a model, and how it came about, in one HTML "
+                         "file that needs no network.");
+  command.AddRequired("output_path", &output_path, "HTML file to write");
+  command.AddRequired("input_path", &options.input_path,
+                      "model folder, or a folder of models, of which the "
+                      "largest is shown; the summary of adasfm_mapper beside "
+                      "it is read too");
+  command.AddDefault("coarse_path", &options.coarse_path,
+                     "the model of adasfm_global, likewise; its summary and "
+                     "removed pairs are read too");
+  command.AddDefault("database_path", &options.database_path,
+                     "COLMAP database, for the priors and the view graph; the "
+                     "summary of adasfm_prior_importer beside it is read too");
+  command.AddDefault("ground_truth_path", &options.ground_truth_path,
+                     "true poses: a COLMAP model, a TUM trajectory, or lines "
+                     "`name qw qx qy qz tx ty tz` (cam_from_world)");
+  command.AddDefault("image_times_path", &options.ground_truth.image_times_path,
+                     "times of the images, for a trajectory; when empty, the "
+                     "names' digits are nanoseconds");
+  command.AddDefault("max_time_gap_s", &options.ground_truth.max_time_gap_s,
+                     "a trajectory is interpolated between poses at most this "
+                     "far apart [s]");
+  command.AddDefault("max_num_points", &options.max_num_points,
+                     "largest number of points in the 3D view");
+  const Status parsed = command.Parse(argc, argv);
+  if (!parsed.ok() || command.HelpShown()) return parsed;
+  const Status valid = CheckOptions(options);
+  if (!valid.ok()) return valid;
+  const StatusOr<std::string> page = BuildReport(options);
+  if (!page.ok()) return page.status();
+  const Status written = WriteTextFile(output_path, *page);
+  if (written.ok()) {
+    std::cout << "Report: " << output_path << std::endl;
+  }
+  return written;
+}
+
+}  // namespace adasfm

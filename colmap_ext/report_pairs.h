@@ -1,0 +1,55 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <nlohmann/json.hpp>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "colmap_ext/report_scene.h"
+#include "colmap_ext/sqlite.h"
+
+namespace adasfm {
+
+// Values counted in bins of equal width from 0; the last one takes all that
+// lies beyond. {"width", "counts", "unit"}.
+class Histogram {
+ public:
+  Histogram(double bin_width, int num_bins)
+      : bin_width_(bin_width), counts_(num_bins, 0) {}
+  void Add(double value);
+  nlohmann::json ToJson() const;
+
+ private:
+  double bin_width_;
+  std::vector<int64_t> counts_;
+};
+
+// What a database says of its verified pairs, before and after adasfm_global.
+struct ReportPairs {
+  // Indices of images, and inlier matches before and after; for the matrix.
+  nlohmann::json pairs;
+  // Share of the raw matches that verification kept, per pair; null without
+  // raw matches.
+  nlohmann::json inlier_ratios_before;
+  nlohmann::json inlier_ratios_after;
+  int64_t num_before = 0;
+  int64_t num_after = 0;
+  bool was_rewritten = false;
+};
+
+// Pairs with fewer inliers than COLMAP's own 15 do not count. Throws
+// SqliteError.
+ReportPairs ReadReportPairs(const ReportScene& scene,
+                            SqliteConnection* database);
+
+// The pairs of removed_pairs.txt (`name1 name2` a line; names may have spaces)
+// as indices; lines with unknown names are counted only.
+struct RemovedPairs {
+  std::vector<std::pair<size_t, size_t>> pairs;
+  int num_unknown = 0;
+};
+RemovedPairs ReadRemovedPairs(const std::string& path,
+                              const ReportScene& scene);
+
+}  // namespace adasfm
