@@ -50,10 +50,12 @@ struct EdgeLengths {
 // has one depth in its image, and each edge sees it as a multiple of its own
 // length. Metric lengths of the priors start it; without any
 // the depth of the scene sets the unit. So collinear centres, which directions
-// alone leave free, become solvable. known_lengths_m: of sensor edges.
+// alone leave free, become solvable. known_lengths_m: of sensor edges. start:
+// lengths found before, of the same graph's edges, or none.
 EdgeLengths EstimateEdgeLengths(
     const EdgeLengthOptions& options, const ViewGraph& graph,
     const std::map<ImagePair, double>& known_lengths_m,
-    const GlobalCorrespondences& correspondences);
+    const GlobalCorrespondences& correspondences,
+    const EdgeLengths& start = EdgeLengths());
 
 }  // namespace adasfm

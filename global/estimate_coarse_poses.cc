@@ -110,8 +110,9 @@ class CoarsePoseEstimator {
               chain_.empty() ? "skipped: no odometry" : "switched off");
       return;
     }
-    const LoopFilterReport report = FilterLoopsByOdometry(
-        options_.loops, chain_, EstimateLengths(), &graph_);
+    lengths_ = EstimateLengths();
+    const LoopFilterReport report =
+        FilterLoopsByOdometry(options_.loops, chain_, lengths_, &graph_);
     EndStep("loop gating",
             std::to_string(report.num_tested) + " pairs tested, " +
                 std::to_string(report.num_contradicting) +
@@ -301,7 +302,7 @@ class CoarsePoseEstimator {
       }
     }
     return EstimateEdgeLengths(options_.lengths, graph_, known_lengths_m,
-                               correspondences_);
+                               correspondences_, lengths_);
   }
 
   std::vector<std::optional<EdgeLength>> SelectLengths(
