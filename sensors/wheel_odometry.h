@@ -34,10 +34,11 @@ std::vector<WheelSpeed> ComputeWheelSpeeds(
 
 // The wheels' motion over an interval in the body frame at its start. The
 // wheel frame's origin moves by
-//   scale (M d + N (phi x d)),
-// d the forward direction in the body frame, phi the rotation vector by which
-// the true rotation over the interval exceeds the profile's: the profile gives
-// the shape of the turn, the state its end (docs/sensors.md).
+//   (M d + N (phi x d)) / q,
+// q the logged length of a true metre, d the forward direction in the body
+// frame, phi the rotation vector by which the true rotation over the interval
+// exceeds the profile's: the profile gives the shape of the turn, the state its
+// end (docs/sensors.md).
 struct WheelMotion {
   double dt_s = 0.0;
   Eigen::Matrix3d displacement_map = Eigen::Matrix3d::Zero();  // M, metres
