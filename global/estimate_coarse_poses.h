@@ -36,6 +36,10 @@ struct CoarsePoseOptions {
   AugmentationOptions augmentation;
   TranslationAveragingOptions positions;
   PositionFilterOptions position_filter;
+  // What positions must reach to count as converged, and the angle within
+  // which a direction agrees with them.
+  double min_direction_agreement = 0.8;
+  double max_agreeing_direction_deg = 3.0;
   // Least error granted to the odometry's rotation between two cameras (their
   // calibration, rolling shutter), added to its covariance.
   double min_predicted_rotation_sigma_deg = 0.05;
@@ -60,7 +64,11 @@ struct CoarseComponent {
   // In metres.
   bool metric = false;
   bool rotations_converged = false;
+  // The solver came to rest and min_direction_agreement is reached.
   bool positions_converged = false;
+  // Share of the visual edges with a clear direction that fit the positions
+  // within max_agreeing_direction_deg; edges off the rotations do not.
+  double direction_agreement = 0.0;
   double sdp_optimality = 0.0;
 };
 

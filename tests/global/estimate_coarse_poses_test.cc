@@ -104,10 +104,34 @@ TEST(EstimateCoarsePoses, WorksWithoutSensorsOnCleanAndFisheyeWorlds) {
     const CoarseComponent& component = result.components.front();
     EXPECT_EQ(component.cams_from_world.size(), 80);
     EXPECT_FALSE(component.metric);
+    EXPECT_TRUE(component.positions_converged);
+    EXPECT_GT(component.direction_agreement, 0.9);
     const AlignedErrors errors = ComputeAlignedErrors(
         component.cams_from_world, problem.truth, AlignmentOptions());
     // 120 m of road before any bundle adjustment: 2 %.
     EXPECT_LT(errors.rmse_m, 2.4);
+  }
+}
+
+// One wrong match of wide parallax among many true ones must not set an edge's
+// length, and with it the scale of half of the road.
+TEST(EstimateCoarsePoses, KeepsTheScaleAlongLongRoadsWithoutSensors) {
+  for (uint64_t seed = 1; seed <= 3; ++seed) {
+    SyntheticWorldOptions options;
+    options.num_images = 160;
+    options.seed = seed;
+    options.trajectory = SyntheticTrajectory::kStraight;
+    const CoarseProblem problem = BuildProblem(options);
+    const CoarsePoses result = EstimateCoarsePoses(
+        CoarsePoseOptions(), problem.graph, problem.correspondences, {});
+    ASSERT_EQ(result.components.size(), 1) << "seed " << seed;
+    EXPECT_TRUE(result.components[0].positions_converged);
+    // 240 m of road: 1.5 %.
+    EXPECT_LT(ComputeAlignedErrors(result.components[0].cams_from_world,
+                                   problem.truth, AlignmentOptions())
+                  .rmse_m,
+              3.6)
+        << "seed " << seed;
   }
 }
 

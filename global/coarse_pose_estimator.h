@@ -1,0 +1,64 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <chrono>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "global/estimate_coarse_poses.h"
+
+namespace adasfm {
+
+// The state that the steps of EstimateCoarsePoses hand on; one member function
+// a step, which ends it with its name, time and summary.
+class CoarsePoseEstimator {
+ public:
+  CoarsePoseEstimator(const CoarsePoseOptions& options, const ViewGraph& graph,
+                      const GlobalCorrespondences& correspondences,
+                      const std::vector<RelativePosePrior>& priors)
+      : options_(options),
+        correspondences_(correspondences),
+        priors_(priors),
+        graph_(graph),
+        step_start_(std::chrono::steady_clock::now()) {}
+
+  CoarsePoses Run();
+
+ private:
+  using Rotations = std::map<image_t, Eigen::Quaterniond>;
+  void RefinePairs();
+  RotationRateReport BuildChain();
+  std::vector<std::optional<RotationPrediction>> PredictRotations() const;
+  void FilterLoops();
+  void EstimateRotations();
+  void FilterByRotation();
+  void RepeatRotations();
+  std::vector<std::optional<RotationPrediction>> PredictFromRotations() const;
+  void EstimateTranslations();
+  void EstimatePositions();
+  int EstimateComponent(const std::vector<image_t>& images);
+  double MeasureDirectionAgreement(const GlobalPositions& positions) const;
+  int RemoveEdgesOffPositions();
+  EdgeLengths EstimateLengths() const;
+  std::vector<std::optional<EdgeLength>> SelectLengths(
+      const ViewGraph& subgraph) const;
+  std::map<image_t, Eigen::Vector3d> StartFromChain(
+      std::vector<image_t> images) const;
+  void EndStep(const std::string& name, const std::string& summary);
+
+  const CoarsePoseOptions& options_;
+  const GlobalCorrespondences& correspondences_;
+  std::vector<RelativePosePrior> priors_;
+  ViewGraph graph_;
+  OdometryChain chain_;
+  EdgeLengths lengths_;
+  Rotations rotations_;
+  std::map<image_t, bool> rotation_converged_;
+  std::map<image_t, double> sdp_optimality_;
+  CoarsePoses result_;
+  std::chrono::steady_clock::time_point step_start_;
+};
+
+}  // namespace adasfm

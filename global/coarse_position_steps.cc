@@ -1,0 +1,182 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "core/so3.h"
+#include "global/coarse_pose_estimator.h"
+
+namespace adasfm {
+
+void CoarsePoseEstimator::EstimateTranslations() {
+  RelativeTranslationReport report;
+  if (options_.translations.enabled) {
+    report = EstimateRelativeTranslations(options_.translations, rotations_,
+                                          correspondences_, &graph_);
+  }
+  const int num_augmented =
+      AugmentTranslations(options_.augmentation, priors_, &graph_);
+  EndStep("relative translations",
+          std::to_string(report.num_refined) + " refined, " +
+              std::to_string(report.num_without_direction) +
+              " without direction, " + std::to_string(num_augmented) +
+              " from sensors");
+}
+
+void CoarsePoseEstimator::EstimatePositions() {
+  lengths_ = EstimateLengths();
+  // Unit vectors throughout, as the paper has it: shared points must not
+  // bring the metres back.
+  if (!options_.augmentation.use_metric_lengths) lengths_ = EdgeLengths();
+  ViewGraph directed = graph_;
+  for (ViewGraphEdge& edge : directed.edges) {
+    if (!edge.has_translation) edge.removal = EdgeRemoval::kTranslation;
+  }
+  int num_images = 0;
+  int num_iterations = 0;
+  for (const std::vector<image_t>& images : FindConnectedComponents(directed)) {
+    if (images.size() < 2) break;
+    num_iterations += EstimateComponent(images);
+  }
+  for (const CoarseComponent& component : result_.components) {
+    num_images += component.cams_from_world.size();
+  }
+  const int num_removed = RemoveEdgesOffPositions();
+  EndStep("translation averaging",
+          std::to_string(num_images) + " images in " +
+              std::to_string(result_.components.size()) + " components, " +
+              std::to_string(num_iterations) + " iterations, " +
+              std::to_string(num_removed) + " edges removed");
+}
+
+// Returns the number of iterations.
+int CoarsePoseEstimator::EstimateComponent(const std::vector<image_t>& images) {
+  const ViewGraph subgraph = ExtractSubgraph(graph_, images);
+  const GlobalPositions positions =
+      EstimateGlobalPositions(options_.positions, subgraph, rotations_,
+                              SelectLengths(subgraph), StartFromChain(images));
+  if (!positions.success) return positions.num_iterations;
+  CoarseComponent component;
+  component.metric = positions.metric;
+  component.rotations_converged = rotation_converged_.at(images.front());
+  component.sdp_optimality = sdp_optimality_.at(images.front());
+  for (const image_t image_id : images) {
+    component.cams_from_world[image_id] = CamFromWorldWithCenter(
+        rotations_.at(image_id), positions.centers.at(image_id));
+  }
+  component.direction_agreement = MeasureDirectionAgreement(positions);
+  component.positions_converged =
+      positions.converged &&
+      component.direction_agreement >= options_.min_direction_agreement;
+  result_.components.push_back(std::move(component));
+  return positions.num_iterations;
+}
+
+double CoarsePoseEstimator::MeasureDirectionAgreement(
+    const GlobalPositions& positions) const {
+  const double max_angle_rad = DegToRad(options_.max_agreeing_direction_deg);
+  int num_edges = 0;
+  int num_agreeing = 0;
+  for (const ViewGraphEdge& edge : graph_.edges) {
+    const auto center1 = positions.centers.find(edge.image_id1);
+    const auto center2 = positions.centers.find(edge.image_id2);
+    if (center1 == positions.centers.end() ||
+        center2 == positions.centers.end() || !edge.has_translation ||
+        edge.source == EdgeSource::kSensor ||
+        edge.direction_sigma_rad > max_angle_rad / 3.0) {
+      continue;
+    }
+    if (!edge.IsKept() && edge.removal != EdgeRemoval::kRotation) continue;
+    ++num_edges;
+    num_agreeing +=
+        edge.IsKept() &&
+        AngleBetweenRad(center1->second - center2->second,
+                        rotations_.at(edge.image_id2).conjugate() *
+                            edge.cam2_from_cam1.translation) <= max_angle_rad;
+  }
+  // Where vision has no direction, sensors alone decide.
+  return num_edges == 0 ? 1.0 : static_cast<double>(num_agreeing) / num_edges;
+}
+
+int CoarsePoseEstimator::RemoveEdgesOffPositions() {
+  std::map<image_t, Eigen::Vector3d> centers;
+  std::map<image_t, size_t> component_of;
+  for (size_t k = 0; k < result_.components.size(); ++k) {
+    for (const auto& [image_id, pose] : result_.components[k].cams_from_world) {
+      centers[image_id] = pose.TargetOriginInSource();
+      component_of[image_id] = k;
+    }
+  }
+  int num_removed = 0;
+  for (ViewGraphEdge& edge : graph_.edges) {
+    if (!edge.IsKept()) continue;
+    const auto component1 = component_of.find(edge.image_id1);
+    const auto component2 = component_of.find(edge.image_id2);
+    if (component1 == component_of.end() || component2 == component_of.end() ||
+        component1->second != component2->second) {
+      edge.removal = EdgeRemoval::kDisconnected;
+      ++num_removed;
+    }
+  }
+  // Lengths have one unit only when they are metres.
+  return num_removed +
+         FilterEdgesByPosition(
+             options_.position_filter, rotations_, centers,
+             lengths_.metric ? lengths_.lengths : decltype(lengths_.lengths)(),
+             &graph_);
+}
+
+// Metres of the priors that augment the graph, spread over shared points.
+EdgeLengths CoarsePoseEstimator::EstimateLengths() const {
+  std::map<ImagePair, double> known_lengths_m;
+  for (const RelativePosePrior& prior : priors_) {
+    const double length = prior.cam2_from_cam1.translation.norm();
+    if (prior.HasLength() && length >= options_.min_known_length_m &&
+        std::abs(SecondsFromNs(prior.dt_ns)) <=
+            options_.augmentation.max_prior_time_gap_s) {
+      known_lengths_m[ImagePair(prior.image_id1, prior.image_id2)] = length;
+    }
+  }
+  return EstimateEdgeLengths(options_.lengths, graph_, known_lengths_m,
+                             correspondences_, lengths_);
+}
+
+std::vector<std::optional<EdgeLength>> CoarsePoseEstimator::SelectLengths(
+    const ViewGraph& subgraph) const {
+  std::vector<std::optional<EdgeLength>> selected;
+  if (lengths_.lengths.empty()) return selected;
+  size_t e = 0;
+  for (const ViewGraphEdge& edge : subgraph.edges) {
+    while (graph_.edges[e].Pair() < edge.Pair()) ++e;
+    selected.push_back(lengths_.lengths[e]);
+  }
+  return selected;
+}
+
+// The priors' translations under the global rotations; empty unless they
+// reach all images.
+std::map<image_t, Eigen::Vector3d> CoarsePoseEstimator::StartFromChain(
+    std::vector<image_t> images) const {
+  std::map<image_t, Eigen::Vector3d> centers;
+  if (!options_.augmentation.enabled ||
+      !options_.augmentation.use_metric_lengths) {
+    return centers;
+  }
+  std::sort(images.begin(), images.end(), [this](image_t a, image_t b) {
+    return chain_.Index(a) < chain_.Index(b);
+  });
+  Eigen::Vector3d center = Eigen::Vector3d::Zero();
+  for (size_t k = 0; k < images.size(); ++k) {
+    if (k > 0) {
+      if (!chain_.IsConnected(images[k - 1], images[k])) return {};
+      const ChainMotion motion = chain_.Motion(images[k - 1], images[k]);
+      if (!motion.has_position) return {};
+      center -= rotations_.at(images[k]).conjugate() *
+                motion.cam2_from_cam1.translation;
+    }
+    centers[images[k]] = center;
+  }
+  return centers;
+}
+
+}  // namespace adasfm

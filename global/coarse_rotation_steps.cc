@@ -1,0 +1,167 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <algorithm>
+#include <cmath>
+
+#include "core/so3.h"
+#include "global/coarse_pose_estimator.h"
+#include "global/filter_edges_by_rotation.h"
+
+namespace adasfm {
+
+void CoarsePoseEstimator::RefinePairs() {
+  int num_removed = 0;
+  for (ViewGraphEdge& edge : graph_.edges) {
+    if (!edge.IsKept() || edge.num_inliers >= options_.min_num_inliers) {
+      continue;
+    }
+    edge.removal = EdgeRemoval::kFewInliers;
+    ++num_removed;
+  }
+  const RotationRateReport rates = BuildChain();
+  if (options_.relative_poses.enabled) {
+    RefineRelativePoses(options_.relative_poses, correspondences_,
+                        PredictRotations(), &graph_);
+  }
+  EndStep("relative poses", std::to_string(graph_.edges.size()) + " pairs, " +
+                                std::to_string(num_removed) +
+                                " with few inliers removed, odometry turned "
+                                "by up to " +
+                                std::to_string(rates.max_rate_rad_s) +
+                                " rad/s");
+}
+
+// The chain, after vision has corrected its rotations.
+RotationRateReport CoarsePoseEstimator::BuildChain() {
+  chain_ = OdometryChain(priors_, options_.chain);
+  if (chain_.empty() || !options_.relative_poses.enabled ||
+      !options_.rotation_rates.enabled) {
+    return RotationRateReport();
+  }
+  ViewGraph near = graph_;
+  near.edges.erase(
+      std::remove_if(
+          near.edges.begin(), near.edges.end(),
+          [this](const ViewGraphEdge& edge) {
+            return !chain_.IsConnected(edge.image_id1, edge.image_id2) ||
+                   std::abs(chain_.NumSteps(edge.image_id1, edge.image_id2)) >
+                       options_.rotation_rates.max_num_steps;
+          }),
+      near.edges.end());
+  RefineRelativePoses(options_.relative_poses, correspondences_, {}, &near);
+  const RotationRateReport report =
+      CorrectRotationRates(options_.rotation_rates, chain_, near, &priors_);
+  chain_ = OdometryChain(priors_, options_.chain);
+  return report;
+}
+
+std::vector<std::optional<RotationPrediction>>
+CoarsePoseEstimator::PredictRotations() const {
+  const double floor_rad = DegToRad(options_.min_predicted_rotation_sigma_deg);
+  std::vector<std::optional<RotationPrediction>> predictions;
+  for (const ViewGraphEdge& edge : graph_.edges) {
+    predictions.emplace_back();
+    if (!chain_.IsConnected(edge.image_id1, edge.image_id2)) continue;
+    const ChainMotion motion = chain_.Motion(edge.image_id1, edge.image_id2);
+    if (!motion.has_rotation) continue;
+    predictions.back() = RotationPrediction{
+        motion.cam2_from_cam1.rotation,
+        motion.covariance.topLeftCorner<3, 3>() +
+            floor_rad * floor_rad * Eigen::Matrix3d::Identity()};
+  }
+  return predictions;
+}
+
+void CoarsePoseEstimator::FilterLoops() {
+  if (chain_.empty() || !options_.loops.enabled) {
+    EndStep("loop gating",
+            chain_.empty() ? "skipped: no odometry" : "switched off");
+    return;
+  }
+  lengths_ = EstimateLengths();
+  const LoopFilterReport report =
+      FilterLoopsByOdometry(options_.loops, chain_, lengths_, &graph_);
+  EndStep("loop gating",
+          std::to_string(report.num_tested) + " pairs tested, " +
+              std::to_string(report.num_contradicting) +
+              " contradict the odometry, " +
+              std::to_string(report.num_in_false_runs) + " more lie in its " +
+              std::to_string(report.num_false_runs) + " false runs");
+}
+
+void CoarsePoseEstimator::EstimateRotations() {
+  const int num_added = AddSensorEdges(options_.augmentation, priors_, &graph_);
+  int num_converged = 0;
+  int num_components = 0;
+  for (const std::vector<image_t>& images : FindConnectedComponents(graph_)) {
+    if (images.size() < 2) break;
+    const GlobalRotations rotations = EstimateGlobalRotations(
+        options_.rotations, ExtractSubgraph(graph_, images));
+    if (!rotations.success) continue;
+    for (const auto& [image_id, rotation] : rotations.cams_from_world) {
+      rotations_[image_id] = rotation;
+      rotation_converged_[image_id] = rotations.converged;
+      sdp_optimality_[image_id] = rotations.sdp_optimality;
+    }
+    ++num_components;
+    num_converged += rotations.converged;
+  }
+  EndStep("rotation averaging",
+          std::to_string(num_added) + " sensor edges added, " +
+              std::to_string(rotations_.size()) + " of " +
+              std::to_string(graph_.images.size()) + " images in " +
+              std::to_string(num_components) + " components, " +
+              std::to_string(num_converged) + " converged");
+}
+
+void CoarsePoseEstimator::FilterByRotation() {
+  int num_removed = FilterEdgesByRotation(options_.max_rotation_discrepancy_deg,
+                                          rotations_, &graph_);
+  // Consecutive images that lost their visual edge keep the sensors'.
+  const int num_added = AddSensorEdges(options_.augmentation, priors_, &graph_);
+  num_removed += FilterEdgesByRotation(options_.max_rotation_discrepancy_deg,
+                                       rotations_, &graph_);
+  EndStep("rotation filter", std::to_string(num_removed) + " removed, " +
+                                 std::to_string(num_added) +
+                                 " sensor edges added");
+}
+
+// Global rotations tell the two optima of nearly planar pairs apart, as
+// odometry does for the others. Removed pairs stay removed: bent towards the
+// prediction, a wrong one would look right.
+void CoarsePoseEstimator::RepeatRotations() {
+  for (int round = 1; round < options_.num_rotation_rounds; ++round) {
+    const auto predictions = PredictFromRotations();
+    if (std::none_of(predictions.begin(), predictions.end(),
+                     [](const auto& p) { return p.has_value(); })) {
+      return;
+    }
+    if (options_.relative_poses.enabled) {
+      RefineRelativePoses(options_.relative_poses, correspondences_,
+                          predictions, &graph_);
+    }
+    EstimateRotations();
+    FilterByRotation();
+  }
+}
+
+// For pairs that odometry does not predict.
+std::vector<std::optional<RotationPrediction>>
+CoarsePoseEstimator::PredictFromRotations() const {
+  const double sigma_rad = DegToRad(options_.global_rotation_sigma_deg);
+  std::vector<std::optional<RotationPrediction>> predictions;
+  for (const ViewGraphEdge& edge : graph_.edges) {
+    predictions.emplace_back();
+    const auto rotation1 = rotations_.find(edge.image_id1);
+    const auto rotation2 = rotations_.find(edge.image_id2);
+    if (rotation1 == rotations_.end() || rotation2 == rotations_.end() ||
+        chain_.IsConnected(edge.image_id1, edge.image_id2)) {
+      continue;
+    }
+    predictions.back() =
+        RotationPrediction{rotation2->second * rotation1->second.conjugate(),
+                           sigma_rad * sigma_rad * Eigen::Matrix3d::Identity()};
+  }
+  return predictions;
+}
+
+}  // namespace adasfm
