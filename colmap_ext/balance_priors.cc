@@ -12,6 +12,7 @@ namespace adasfm {
 namespace {
 
 constexpr double kMaxTerm = 25.0;
+constexpr double kTornNumSigmas = 10.0;
 // Fewer terms of a kind than this are no statistic.
 constexpr int kMinNumTerms = 10;
 // Steps of the search: small ones would only repeat the adjustment.
@@ -23,14 +24,42 @@ struct TermMean {
   int num_dof = 1;
   double sum = 0.0;
   int count = 0;
+  int num_torn = 0;
 
   void Add(double error, double sigma) {
     if (!std::isfinite(sigma)) return;
     const double whitened = error / sigma;
+    num_torn += std::abs(whitened) > kTornNumSigmas;
     sum += std::min(kMaxTerm, whitened * whitened / num_dof);
     ++count;
   }
   double Mean() const { return count < kMinNumTerms ? 0.0 : sum / count; }
+};
+
+// The terms of priors at the reconstruction's poses.
+struct PriorTerms {
+  TermMean rotations{3};
+  TermMean directions{2};
+  TermMean lengths{1};
+
+  void Add(const PosePriorEdge& edge,
+           const colmap::Reconstruction& reconstruction) {
+    if (!reconstruction.IsImageRegistered(edge.image_id1) ||
+        !reconstruction.IsImageRegistered(edge.image_id2)) {
+      return;
+    }
+    const Rigid3d cam2_from_cam1 =
+        ComputeCam2FromCam1(CamFromWorld(reconstruction.Image(edge.image_id1)),
+                            CamFromWorld(reconstruction.Image(edge.image_id2)));
+    const Eigen::Vector3d& translation = cam2_from_cam1.translation;
+    const Eigen::Vector3d& prior = edge.cam2_from_cam1.translation;
+    rotations.Add(
+        AngleBetweenRad(cam2_from_cam1.rotation, edge.cam2_from_cam1.rotation),
+        edge.rotation_sigma_rad);
+    directions.Add(AngleBetweenRad(translation, prior),
+                   edge.direction_sigma_rad);
+    lengths.Add(translation.norm() - prior.norm(), edge.length_sigma_m);
+  }
 };
 
 }  // namespace
@@ -51,27 +80,23 @@ bool PriorBalanceOptions::IsValid(std::string* error) const {
 
 double ComputePriorChi2PerDof(const std::vector<PosePriorEdge>& priors,
                               const colmap::Reconstruction& reconstruction) {
-  TermMean rotations{3};
-  TermMean directions{2};
-  TermMean lengths{1};
+  PriorTerms terms;
+  for (const PosePriorEdge& edge : priors) terms.Add(edge, reconstruction);
+  return std::max(
+      {terms.rotations.Mean(), terms.directions.Mean(), terms.lengths.Mean()});
+}
+
+int CountTornPriors(const std::vector<PosePriorEdge>& priors,
+                    const colmap::Reconstruction& reconstruction) {
+  int num_torn = 0;
   for (const PosePriorEdge& edge : priors) {
-    if (!reconstruction.IsImageRegistered(edge.image_id1) ||
-        !reconstruction.IsImageRegistered(edge.image_id2)) {
-      continue;
-    }
-    const Rigid3d cam2_from_cam1 =
-        ComputeCam2FromCam1(CamFromWorld(reconstruction.Image(edge.image_id1)),
-                            CamFromWorld(reconstruction.Image(edge.image_id2)));
-    const Eigen::Vector3d& translation = cam2_from_cam1.translation;
-    const Eigen::Vector3d& prior = edge.cam2_from_cam1.translation;
-    rotations.Add(
-        AngleBetweenRad(cam2_from_cam1.rotation, edge.cam2_from_cam1.rotation),
-        edge.rotation_sigma_rad);
-    directions.Add(AngleBetweenRad(translation, prior),
-                   edge.direction_sigma_rad);
-    lengths.Add(translation.norm() - prior.norm(), edge.length_sigma_m);
+    PriorTerms terms;
+    terms.Add(edge, reconstruction);
+    num_torn += terms.rotations.num_torn + terms.directions.num_torn +
+                    terms.lengths.num_torn >
+                0;
   }
-  return std::max({rotations.Mean(), directions.Mean(), lengths.Mean()});
+  return num_torn;
 }
 
 PriorBundleAdjustmentSummary AdjustBundleInBalance(

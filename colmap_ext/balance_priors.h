@@ -35,6 +35,12 @@ struct PriorBalanceOptions {
 double ComputePriorChi2PerDof(const std::vector<PosePriorEdge>& priors,
                               const colmap::Reconstruction& reconstruction);
 
+// The priors of which a term is more than ten sigmas off: a model that folds
+// two look-alike places together tears a few of them and leaves all others
+// alone.
+int CountTornPriors(const std::vector<PosePriorEdge>& priors,
+                    const colmap::Reconstruction& reconstruction);
+
 // AdjustBundle, with the keypoint sigma balanced against the problem's priors.
 // keypoint_sigma_factor (>= 1) multiplies options.keypoint_sigma_px; it is
 // where the search begins and holds what was found.

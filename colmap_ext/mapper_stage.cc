@@ -309,6 +309,27 @@ void MapperStage::AlignUnit(AlignSimilarityOptions* options) const {
   if (median > 0.0) options->unit = median;
 }
 
+void MapperStage::FallBackToCoarsePoses(const RefineModelOptions& options,
+                                        std::unique_ptr<MapperScene>* scene) {
+  const auto count_torn = [](const MapperScene& candidate) {
+    return CountTornPriors(FindPriorEdges(candidate, candidate.images),
+                           candidate.reconstruction);
+  };
+  if (!options.use_priors_in_adjustment) return;
+  const int num_torn = count_torn(**scene);
+  if (num_torn == 0) return;
+  auto coarse_scene = BuildMapperScene(data_, coarse_, (*scene)->images);
+  RegisterAtCoarsePoses(coarse_scene.get());
+  // Priors that tear in the coarse model too are wrong themselves.
+  if (num_torn <= count_torn(*coarse_scene)) return;
+  Report("the parts contradict the priors; refining the coarse poses", 0.8);
+  const RefineModelSummary refined = RefineModel(options, coarse_scene.get());
+  if (count_torn(*coarse_scene) >= num_torn) return;
+  summary_.refine = refined;
+  summary_.started_from_coarse_poses = true;
+  *scene = std::move(coarse_scene);
+}
+
 StatusOr<colmap::Reconstruction> MapperStage::Merge(bool require_all_parts) {
   if (summary_.plan.parts.empty()) {
     StatusOr<PartitionPlan> plan =
@@ -348,7 +369,7 @@ StatusOr<colmap::Reconstruction> MapperStage::Merge(bool require_all_parts) {
   summary_.aligned = AlignParts(align, coarse_, parts);
   std::set<image_t> images;
   for (const auto& [image_id, image] : data_.images) images.insert(image_id);
-  const auto scene = BuildMapperScene(data_, coarse_, images);
+  auto scene = BuildMapperScene(data_, coarse_, images);
   summary_.merge = MergeParts(summary_.aligned, parts, scene.get());
   summary_.merge_seconds = timer.Seconds();
   if (scene->reconstruction.NumRegImages() < 2) {
@@ -364,6 +385,7 @@ StatusOr<colmap::Reconstruction> MapperStage::Merge(bool require_all_parts) {
   refine.num_threads = EffectiveNumThreads(options_.num_threads);
   refine.join_parts = parts.size() > 1 || !summary_.merge.coarse_images.empty();
   summary_.refine = RefineModel(refine, scene.get());
+  FallBackToCoarsePoses(refine, &scene);
   scene->reconstruction.TearDown();
   summary_.is_level = AlignToGravity(data_, &scene->reconstruction);
   summary_.refine_seconds = refine_timer.Seconds();

@@ -43,6 +43,9 @@ struct MapperStageSummary {
   AlignPartsResult aligned;
   MergeSummary merge;
   RefineModelSummary refine;
+  // The merged parts contradicted the priors far more than the coarse model
+  // does; the model was refined from the coarse poses instead.
+  bool started_from_coarse_poses = false;
   bool is_metric = false;
   bool is_level = false;
   double plan_seconds = 0.0;
@@ -86,6 +89,9 @@ class MapperStage {
   int NumParallelParts() const;
   void Report(const std::string& line, double share_done) const;
   void AlignUnit(AlignSimilarityOptions* options) const;
+  // So that the result is never worse than the prior trajectory.
+  void FallBackToCoarsePoses(const RefineModelOptions& options,
+                             std::unique_ptr<MapperScene>* scene);
 
   const MapperStageOptions options_;
   const SceneData& data_;

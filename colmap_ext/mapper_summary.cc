@@ -47,6 +47,7 @@ std::string FormatMapperSummaryJson(const MapperStageSummary& summary) {
       {"separator_rmse_before", summary.aligned.separator_rmse_before},
       {"separator_rmse_after", summary.aligned.separator_rmse_after},
       {"coarse_images", summary.merge.coarse_images},
+      {"started_from_coarse_poses", summary.started_from_coarse_poses},
       {"num_merged_points", summary.merge.num_merged_points},
       {"num_images_put_back", summary.refine.num_images_put_back},
       {"num_refinement_iterations", summary.refine.num_iterations},
@@ -96,6 +97,10 @@ std::string FormatMapperSummaryText(const MapperStageSummary& summary) {
        << " images started from coarse poses, "
        << summary.refine.num_images_put_back
        << " contradicted the priors and were put back\n";
+  if (summary.started_from_coarse_poses) {
+    text << "the merged parts contradicted the priors: the model was refined "
+            "from the coarse poses\n";
+  }
   text << "seconds: plan " << summary.plan_seconds << ", parts "
        << summary.parts_seconds << ", merge " << summary.merge_seconds
        << ", refinement " << summary.refine_seconds << "\n";

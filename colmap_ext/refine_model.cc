@@ -212,6 +212,14 @@ RefineModelSummary RefineModel(const RefineModelOptions& options,
   return ModelRefiner(options, scene).Run();
 }
 
+void RegisterAtCoarsePoses(MapperScene* scene) {
+  for (const auto& [image_id, cam_from_world] : *scene->coarse) {
+    if (scene->images.count(image_id) == 0) continue;
+    SetCamFromWorld(cam_from_world, &scene->reconstruction.Image(image_id));
+    scene->reconstruction.RegisterImage(image_id);
+  }
+}
+
 bool AlignToGravity(const SceneData& data,
                     colmap::Reconstruction* reconstruction) {
   Eigen::Vector3d down = Eigen::Vector3d::Zero();

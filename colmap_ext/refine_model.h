@@ -48,6 +48,9 @@ struct RefineModelSummary {
 RefineModelSummary RefineModel(const RefineModelOptions& options,
                                MapperScene* scene);
 
+// Registers the scene's images where the coarse model has them, without points.
+void RegisterAtCoarsePoses(MapperScene* scene);
+
 // Turns the world so that gravity, averaged over the images that know it,
 // points along -z; the smallest such turn. False when no image knows it.
 bool AlignToGravity(const SceneData& data,

@@ -56,6 +56,9 @@ TEST(ComputePriorChi2PerDof, IsZeroAtThePriorsAndCapsWhatIsWild) {
   std::vector<PosePriorEdge> wild = priors;
   wild[5].cam2_from_cam1.translation *= 1e3;
   EXPECT_NEAR(ComputePriorChi2PerDof(wild, model), 25.0 / priors.size(), 1e-6);
+  EXPECT_EQ(CountTornPriors(priors, model), 0);
+  EXPECT_EQ(CountTornPriors(longer, model), 0);
+  EXPECT_EQ(CountTornPriors(wild, model), 1);
   EXPECT_EQ(ComputePriorChi2PerDof({}, model), 0.0);
 }
 

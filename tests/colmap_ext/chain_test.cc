@@ -93,6 +93,18 @@ TEST_F(ChainTest, AliasedDriveWithBlackoutEndsInOneMetricModel) {
   EXPECT_FALSE(summary.empty());
 }
 
+// Look-alike places on one street, left in the database: the parts are folded
+// there, the priors are torn, and the coarse poses take over.
+TEST_F(ChainTest, FalseLoopsAloneDoNotSpoilTheMapper) {
+  Make(
+      "--num_images 160 --seed 2 --alias_ratio 0.04 --num_blackouts 1 "
+      "--wheel_slips 1");
+  Import();
+  ExpectSuccess(GlobalArguments() + " --AdaSfmGlobal.refine_matches 0");
+  ExpectSuccess(MapperArguments());
+  ExpectGoodMetricModel(Evaluate("sparse/0"), 160);
+}
+
 TEST_F(ChainTest, TwiceIsOnceAndTheRestorerUndoes) {
   Make("--num_images 40 --seed 3");
   Import();
