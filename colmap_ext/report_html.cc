@@ -132,7 +132,9 @@ std::string FillTemplate(const std::string& text,
     if (begin == std::string::npos) break;
     const size_t end = text.find("}}", begin);
     const auto value =
-        values.find(text.substr(begin + 2, end - std::min(end, begin + 2)));
+        end == std::string::npos
+            ? values.end()
+            : values.find(text.substr(begin + 2, end - begin - 2));
     if (value == values.end()) {
       throw std::invalid_argument("report template: no value for " +
                                   text.substr(begin, 30));

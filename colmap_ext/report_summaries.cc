@@ -187,6 +187,7 @@ ReportTable FormatParts(const ReportSummaries& summaries, bool is_metric) {
   const std::string unit = is_metric ? " [m]" : " [units]";
   ReportTable table;
   table.head = {"part",
+                "outcome",
                 "images",
                 "registered",
                 "by coarse pose",
@@ -197,22 +198,21 @@ ReportTable FormatParts(const ReportSummaries& summaries, bool is_metric) {
                 "fit RMSE" + unit,
                 "threshold" + unit,
                 "scale",
-                "time [s]",
-                "outcome"};
+                "time [s]"};
   for (const Json& part : ListAt(summaries.mapper, "parts")) {
     const auto percent = [&part](const char* key) {
       const double ratio = NumberAt(part, key);
       return std::isfinite(ratio) ? FormatNumber("%.0f", 100.0 * ratio) : "-";
     };
     table.rows.push_back(
-        {Cell("%.0f", part, "part_index"), Cell("%.0f", part, "num_images"),
-         Cell("%.0f", part, "num_registered"),
+        {Cell("%.0f", part, "part_index"), PartOutcome(part),
+         Cell("%.0f", part, "num_images"), Cell("%.0f", part, "num_registered"),
          Cell("%.0f", part, "num_registered_by_global_pose"),
          Cell("%.0f", part, "num_points"),
          Cell("%.2f", part, "mean_reproj_error_px"), percent("overlap_ratio"),
          percent("inlier_ratio"), Cell("%.3f", part, "alignment_rmse"),
          Cell("%.2f", part, "threshold"), Cell("%.4f", part, "scale"),
-         Cell("%.1f", part, "seconds"), PartOutcome(part)});
+         Cell("%.1f", part, "seconds")});
   }
   return table;
 }
