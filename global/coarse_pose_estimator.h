@@ -39,7 +39,8 @@ class CoarsePoseEstimator {
   void EstimateTranslations();
   void EstimatePositions();
   int EstimateComponent(const std::vector<image_t>& images);
-  double MeasureDirectionAgreement(const GlobalPositions& positions) const;
+  void MeasureDirectionAgreement(const GlobalPositions& positions,
+                                 CoarseComponent* component) const;
   int RemoveEdgesOffPositions();
   EdgeLengths EstimateLengths() const;
   std::vector<std::optional<EdgeLength>> SelectLengths(

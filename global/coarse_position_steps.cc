@@ -64,16 +64,21 @@ int CoarsePoseEstimator::EstimateComponent(const std::vector<image_t>& images) {
     component.cams_from_world[image_id] = CamFromWorldWithCenter(
         rotations_.at(image_id), positions.centers.at(image_id));
   }
-  component.direction_agreement = MeasureDirectionAgreement(positions);
+  MeasureDirectionAgreement(positions, &component);
   component.positions_converged =
       positions.converged &&
-      component.direction_agreement >= options_.min_direction_agreement;
+      component.direction_agreement >= options_.min_direction_agreement &&
+      component.least_direction_agreement >=
+          options_.min_image_direction_agreement;
   result_.components.push_back(std::move(component));
   return positions.num_iterations;
 }
 
-double CoarsePoseEstimator::MeasureDirectionAgreement(
-    const GlobalPositions& positions) const {
+void CoarsePoseEstimator::MeasureDirectionAgreement(
+    const GlobalPositions& positions, CoarseComponent* component) const {
+  // Images with fewer edges say nothing of their surroundings.
+  constexpr int kMinNumEdges = 5;
+  std::map<image_t, std::pair<int, int>> by_image;
   const double max_angle_rad = DegToRad(options_.max_agreeing_direction_deg);
   int num_edges = 0;
   int num_agreeing = 0;
@@ -88,14 +93,27 @@ double CoarsePoseEstimator::MeasureDirectionAgreement(
     }
     if (!edge.IsKept() && edge.removal != EdgeRemoval::kRotation) continue;
     ++num_edges;
-    num_agreeing +=
+    const bool agrees =
         edge.IsKept() &&
         AngleBetweenRad(center1->second - center2->second,
                         rotations_.at(edge.image_id2).conjugate() *
                             edge.cam2_from_cam1.translation) <= max_angle_rad;
+    num_agreeing += agrees;
+    for (const image_t image_id : {edge.image_id1, edge.image_id2}) {
+      ++by_image[image_id].first;
+      by_image[image_id].second += agrees;
+    }
   }
   // Where vision has no direction, sensors alone decide.
-  return num_edges == 0 ? 1.0 : static_cast<double>(num_agreeing) / num_edges;
+  component->direction_agreement =
+      num_edges == 0 ? 1.0 : static_cast<double>(num_agreeing) / num_edges;
+  component->least_direction_agreement = 1.0;
+  for (const auto& [image_id, counts] : by_image) {
+    if (counts.first < kMinNumEdges) continue;
+    component->least_direction_agreement =
+        std::min(component->least_direction_agreement,
+                 static_cast<double>(counts.second) / counts.first);
+  }
 }
 
 int CoarsePoseEstimator::RemoveEdgesOffPositions() {

@@ -135,6 +135,31 @@ TEST(EstimateCoarsePoses, KeepsTheScaleAlongLongRoadsWithoutSensors) {
   }
 }
 
+// Consistent look-alikes cannot be told without sensors: the world bends, but
+// poses stay finite, and the report must say that they are of no use.
+TEST(EstimateCoarsePoses, DoesNotCallBentWorldsConverged) {
+  for (uint64_t seed = 1; seed <= 3; ++seed) {
+    SyntheticWorldOptions options = AliasedWorld(seed);
+    options.num_blackouts = 0;
+    const CoarseProblem problem = BuildProblem(options);
+    const CoarsePoses result = EstimateCoarsePoses(
+        CoarsePoseOptions(), problem.graph, problem.correspondences, {});
+    for (const CoarseComponent& component : result.components) {
+      for (const auto& [image_id, pose] : component.cams_from_world) {
+        EXPECT_TRUE(pose.rotation.coeffs().allFinite());
+        EXPECT_TRUE(pose.translation.allFinite());
+      }
+    }
+    ASSERT_FALSE(result.components.empty());
+    const CoarseComponent& largest = result.components.front();
+    const AlignedErrors errors = ComputeAlignedErrors(
+        largest.cams_from_world, problem.truth, AlignmentOptions());
+    EXPECT_TRUE(errors.rmse_m < 10.0 || !largest.positions_converged)
+        << "seed " << seed << ": " << errors.rmse_m << " m, "
+        << largest.least_direction_agreement;
+  }
+}
+
 TEST(EstimateCoarsePoses, SensorsJoinWhatVisionSplits) {
   SyntheticWorldOptions options;
   options.num_images = 70;
