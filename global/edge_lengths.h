@@ -16,7 +16,7 @@ struct EdgeLengthOptions {
   // Matches with rays closer than this say nothing about depth.
   double min_parallax_deg = 1.0;
   // Matches used per edge, those with the largest parallax.
-  int max_num_matches = 300;
+  int max_num_matches = 150;
   // Keypoints with known depth that an edge must share.
   int min_num_shared = 5;
   // Edges that share at least this many come first; without metres, images out

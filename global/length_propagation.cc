@@ -14,7 +14,7 @@
 namespace adasfm {
 namespace {
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
+constexpr float kInfinity = std::numeric_limits<float>::infinity();
 
 }  // namespace
 
@@ -85,10 +85,11 @@ std::vector<LengthPropagation::Observation> LengthPropagation::ObserveEdge(
       continue;
     }
     const double squared = sin_parallax * sin_parallax;
-    const double weight = squared / (squared + kSaturation * kSaturation);
+    const float weight = squared / (squared + kSaturation * kSaturation);
     candidates.push_back(
-        {{begin1 + int(match.point2D_idx1), 0, std::log(depth1), weight},
-         {begin2 + int(match.point2D_idx2), 0, std::log(depth2), weight}});
+        {{begin1 + int(match.point2D_idx1), 0, float(std::log(depth1)), weight},
+         {begin2 + int(match.point2D_idx2), 0, float(std::log(depth2)),
+          weight}});
   }
   std::stable_sort(candidates.begin(), candidates.end(),
                    [](const Candidate& a, const Candidate& b) {

@@ -40,11 +40,12 @@ class LengthPropagation {
 
  private:
   // What an edge sees of a keypoint: log depth = log length(edge) + offset.
+  // There are hundreds for each edge, so they are kept small.
   struct Observation {
     int keypoint = 0;
     int edge = 0;
-    double offset = 0.0;
-    double weight = 0.0;
+    float offset = 0.0f;
+    float weight = 0.0f;
   };
   struct WeightedValue {
     double value = 0.0;
@@ -84,7 +85,7 @@ class LengthPropagation {
   std::vector<double> log_depths_;
   // By observation: the keypoint's log depth by its other edges; infinite where
   // there are none.
-  std::vector<double> predicted_;
+  std::vector<float> predicted_;
 };
 
 }  // namespace adasfm
