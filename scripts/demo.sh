@@ -44,13 +44,17 @@ say '5/6 Partitioned mapping'
 "$colmap" adasfm_mapper --database_path "$database" \
   --input_path "$output/global/0" --output_path "$output/sparse"
 
-say '6/6 Comparing with the ground truth'
+say '6/6 Comparing with the ground truth, drawing the report'
 "$colmap" adasfm_evaluator --input_path "$output/sparse/0" \
   --ground_truth_path "$output/gt.txt"
+"$colmap" adasfm_reporter --output_path "$output/report.html" \
+  --input_path "$output/sparse/0" --coarse_path "$output/global/0" \
+  --database_path "$database" --ground_truth_path "$output/gt.txt"
 
 cat <<TEXT
 
 Where to look:
+  $output/report.html       everything in one page: open it in a browser
   $output/images            the rendered photos
   $output/sparse/0          the model; open it with COLMAP's GUI:
                             colmap gui --import_path $output/sparse/0 \\
