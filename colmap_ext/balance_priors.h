@@ -15,7 +15,7 @@ namespace adasfm {
 // tell: when an adjustment leaves them further off than their covariance
 // allows, vision was believed too much. Its sigma is then raised until both
 // agree (variance component estimation for two groups of observations, of which
-// one is trusted; docs/math.md).
+// one is trusted; docs/mapper.md).
 struct PriorBalanceOptions {
   bool enabled = true;
   // Squared whitened residuals per degree of freedom that priors may have;
