@@ -30,7 +30,7 @@ packages=(
   libopencv-dev libyaml-cpp-dev nlohmann-json3-dev
   libgtest-dev libgmock-dev libbenchmark-dev
   # For the scripts that draw tables and compare models.
-  python3 python3-numpy sqlite3)
+  python3 python3-numpy python3-matplotlib sqlite3)
 
 say() { printf '\n== %s\n' "$*"; }
 die() { printf 'setup: %s\n' "$*" >&2; exit 1; }

@@ -1,0 +1,162 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The methods of the benchmark: COLMAP's mappers, peers, AdaSfM, the limit."""
+
+import json
+import os
+import shutil
+
+from benchmarking.limit import write_true_poses
+from benchmarking.process import Failed, run
+from benchmarking.trajectories import write_prior_trajectory
+
+METHODS = ['mapper', 'hierarchical_mapper', 'adasfm', 'adasfm_no_sensors',
+           'limit']
+
+# AdaSfM with one step changed: what does that step buy?
+ABLATIONS = {
+    'adasfm_no_candidates': {
+        'mapper': ['--AdaSfmMapper.use_global_candidate', '0']},
+    'adasfm_no_priors_in_adjustment': {
+        'mapper': ['--AdaSfmMapper.use_priors_in_adjustment', '0']},
+    'adasfm_fixed_threshold': {
+        'mapper': ['--AdaSfmAlign.adapt_threshold', '0']},
+}
+
+
+def fixed_intrinsics(prefix):
+  return ['--%srefine_focal_length' % prefix, '0',
+          '--%srefine_extra_params' % prefix, '0']
+
+
+def images_of(folder, source):
+  images = os.path.join(source, 'images')
+  return images if os.path.isdir(images) else folder
+
+
+def run_mapper(command, executable, folder, source, args):
+  output = os.path.join(folder, 'model')
+  os.makedirs(output)
+  arguments = [executable, command, '--database_path',
+               os.path.join(folder, 'database.db'), '--output_path', output]
+  if command in ('mapper', 'hierarchical_mapper'):
+    arguments += ['--image_path', images_of(folder, source)]
+    arguments += fixed_intrinsics('Mapper.ba_')
+  usage = run(arguments, os.path.join(folder, 'run.log'), args.timeout)
+  return output, {command: usage}
+
+
+def run_adasfm(folder, source, args, sensors, options):
+  database = os.path.join(folder, 'database.db')
+  log_path = os.path.join(folder, 'run.log')
+  steps = {}
+  if sensors:
+    arguments = [args.colmap, 'adasfm_prior_importer', '--database_path',
+                 database]
+    for option, file in (('image_times', 'times.csv'), ('imu', 'imu.csv'),
+                         ('wheel', 'wheel.csv'), ('sensors', 'sensors.yaml')):
+      arguments += ['--%s_path' % option, os.path.join(source, file)]
+    steps['import'] = run(arguments + options.get('import', []), log_path,
+                          args.timeout)
+  steps['global'] = run([args.colmap, 'adasfm_global', '--database_path',
+                         database, '--output_path',
+                         os.path.join(folder, 'global')] +
+                        options.get('global', []), log_path, args.timeout)
+  output = os.path.join(folder, 'model')
+  steps['mapper'] = run([args.colmap, 'adasfm_mapper', '--database_path',
+                         database, '--input_path',
+                         os.path.join(folder, 'global', '0'),
+                         '--output_path', output] + options.get('mapper', []),
+                        log_path, args.timeout)
+  return output, steps
+
+
+def run_limit(folder, source, args):
+  """Triangulation from the true poses, then one adjustment to convergence."""
+  host = args.host_colmap or args.colmap
+  database = os.path.join(folder, 'database.db')
+  log_path = os.path.join(folder, 'run.log')
+  truth, points, output = (os.path.join(folder, name)
+                           for name in ('truth', 'points', 'model'))
+  write_true_poses(database, os.path.join(source, 'gt.txt'), truth)
+  os.makedirs(points)
+  os.makedirs(output)
+  # COLMAP's triangulator adjusts the points at the true poses too, at least
+  # once: one iteration is all that the limit needs.
+  steps = {'triangulate': run(
+      [host, 'point_triangulator', '--database_path', database, '--image_path',
+       images_of(folder, source), '--input_path', truth, '--output_path',
+       points, '--Mapper.ba_global_max_refinements', '1',
+       '--Mapper.ba_global_max_num_iterations', '1'], log_path,
+      args.timeout)}
+  steps['adjust'] = run(
+      [host, 'bundle_adjuster', '--input_path', points, '--output_path',
+       output, '--BundleAdjustment.function_tolerance', '1e-6',
+       '--BundleAdjustment.max_num_iterations', '200'] +
+      fixed_intrinsics('BundleAdjustment.'), log_path, args.timeout)
+  return output, steps
+
+
+def evaluate(model_path, ground_truth_path, args, log_path):
+  """The evaluator's figures, or None when there is no model."""
+  if not os.path.isdir(model_path) or not os.listdir(model_path):
+    return None
+  json_path = model_path.rstrip('/') + '.evaluation.json'
+  try:
+    run([args.colmap, 'adasfm_evaluator', '--input_path', model_path,
+         '--ground_truth_path', ground_truth_path, '--json_path', json_path],
+        log_path)
+  except Failed:
+    return None
+  with open(json_path) as file:
+    return json.load(file)
+
+
+def _record(name, method, steps, evaluation):
+  record = {'set': name, 'method': method}
+  record['seconds'] = round(sum(u.seconds for u in steps.values()), 2)
+  record['cpu_seconds'] = round(sum(u.cpu_seconds for u in steps.values()), 2)
+  record['peak_mib'] = round(max([u.peak_mib for u in steps.values()] or [0]))
+  record['step_seconds'] = {k: round(u.seconds, 2) for k, u in steps.items()}
+  record['evaluation'] = evaluation
+  return record
+
+
+def _run_steps(method, folder, source, args):
+  if method in args.peers:
+    executable, command = args.peers[method]
+    return run_mapper(command, executable, folder, source, args)
+  if method == 'limit':
+    return run_limit(folder, source, args)
+  if method.startswith('adasfm'):
+    return run_adasfm(folder, source, args, method != 'adasfm_no_sensors',
+                      ABLATIONS.get(method, {}))
+  return run_mapper(method, args.host_colmap or args.colmap, folder, source,
+                    args)
+
+
+def run_method(name, method, folder, source, args):
+  """JSON records of a run: one, or more when it gives several models."""
+  shutil.rmtree(folder, ignore_errors=True)
+  os.makedirs(folder)
+  database = os.path.join(folder, 'database.db')
+  shutil.copy(os.path.join(args.output_path, name, 'database.db'), database)
+  log_path = os.path.join(folder, 'run.log')
+  ground_truth = os.path.join(source, 'gt.txt')
+
+  def score(model):
+    return evaluate(os.path.join(folder, model), ground_truth, args, log_path)
+
+  try:
+    _, steps = _run_steps(method, folder, source, args)
+  except Failed as error:
+    return [dict(_record(name, method, {}, None), error=str(error))]
+  records = [_record(name, method, steps, score('model'))]
+  if method == 'adasfm':
+    coarse = {k: steps[k] for k in ('import', 'global')}
+    records.insert(0, _record(name, 'adasfm_global', coarse,
+                              score(os.path.join('global', '0'))))
+    if write_prior_trajectory(database, os.path.join(folder, 'priors')):
+      records.insert(0, _record(name, 'priors_only',
+                                {'import': steps['import']}, score('priors')))
+  os.remove(database)
+  return records
