@@ -230,24 +230,32 @@ NamedPoses PosesOfModel(const colmap::Reconstruction& reconstruction) {
   return poses;
 }
 
+double ComputeReprojectionRmse(const colmap::Reconstruction& reconstruction) {
+  // In order of ids: a sum depends on its order.
+  std::map<colmap::point3D_t, const colmap::Point3D*> points;
+  for (const auto& [point3D_id, point] : reconstruction.Points3D()) {
+    points[point3D_id] = &point;
+  }
+  int64_t num_observations = 0;
+  double sum_squares = 0.0;
+  for (const auto& [point3D_id, point] : points) {
+    const double error_px =
+        point->HasError() ? point->Error() : MeanError(reconstruction, *point);
+    num_observations += point->Track().Length();
+    sum_squares += error_px * error_px * point->Track().Length();
+  }
+  return num_observations > 0 ? std::sqrt(sum_squares / num_observations) : 0.0;
+}
+
 StatusOr<Evaluation> EvaluateModel(const colmap::Reconstruction& reconstruction,
                                    const NamedPoses& true_cams_from_world) {
   StatusOr<Evaluation> evaluation =
       EvaluatePoses(PosesOfModel(reconstruction), true_cams_from_world);
   if (!evaluation.ok()) return evaluation;
-  int64_t num_observations = 0;
-  double sum_squares = 0.0;
-  for (const auto& [point3D_id, point] : reconstruction.Points3D()) {
-    const double error_px =
-        point.HasError() ? point.Error() : MeanError(reconstruction, point);
-    num_observations += point.Track().Length();
-    sum_squares += error_px * error_px * point.Track().Length();
-  }
   evaluation->num_points = reconstruction.NumPoints3D();
-  if (num_observations > 0) {
-    evaluation->mean_track_length =
-        static_cast<double>(num_observations) / evaluation->num_points;
-    evaluation->rmse_px = std::sqrt(sum_squares / num_observations);
+  if (evaluation->num_points > 0) {
+    evaluation->mean_track_length = reconstruction.ComputeMeanTrackLength();
+    evaluation->rmse_px = ComputeReprojectionRmse(reconstruction);
   }
   return evaluation;
 }

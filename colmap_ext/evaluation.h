@@ -62,7 +62,7 @@ struct Evaluation {
   int num_common_images = 0;  // in both
   int64_t num_points = 0;     // N_p
   double mean_track_length = 0.0;
-  double rmse_px = 0.0;
+  double rmse_px = 0.0;  // ComputeReprojectionRmse
   // The robust ones are refitted to the images within three median errors, so
   // that a few wild cameras do not hide the rest; errors are of all images.
   AlignmentErrors sim3;
@@ -81,6 +81,11 @@ StatusOr<Evaluation> EvaluatePoses(const NamedPoses& cams_from_world,
 // The same, with the figures of the model's points.
 StatusOr<Evaluation> EvaluateModel(const colmap::Reconstruction& reconstruction,
                                    const NamedPoses& true_cams_from_world);
+
+// Root of the mean squared point error, weighted by track length [px]. The
+// error of a point is COLMAP's: the mean over its observations, as the model
+// has it or computed where it has none. 0 without points.
+double ComputeReprojectionRmse(const colmap::Reconstruction& reconstruction);
 
 NamedPoses PosesOfModel(const colmap::Reconstruction& reconstruction);
 

@@ -13,15 +13,13 @@
 namespace adasfm {
 namespace {
 
-// Of all observations of the model's points.
-struct ReprojectionErrors {
-  Histogram histogram = Histogram(0.1, 41);
-  int64_t count = 0;
-  double sum_of_squares_px = 0.0;
-};
+// The matrix of pairs has at most so many cells a side: no screen shows more,
+// and the page stays small whatever the number of pairs.
+constexpr size_t kMaxMatrixSize = 700;
 
-ReprojectionErrors MeasureReprojection(const colmap::Reconstruction& model) {
-  ReprojectionErrors errors;
+// Of all observations of the model's points.
+Histogram MeasureReprojection(const colmap::Reconstruction& model) {
+  Histogram errors(0.1, 41);
   for (const image_t image_id : model.RegImageIds()) {
     const colmap::Image& image = model.Image(image_id);
     const colmap::Camera& camera = model.Camera(image.CameraId());
@@ -31,10 +29,7 @@ ReprojectionErrors MeasureReprojection(const colmap::Reconstruction& model) {
       const std::optional<Eigen::Vector2d> projected = ProjectPoint(
           camera, cam_from_world * model.Point3D(point2D.Point3DId()).XYZ());
       if (!projected) continue;
-      const double error_px = (*projected - point2D.XY()).norm();
-      errors.histogram.Add(error_px);
-      errors.sum_of_squares_px += error_px * error_px;
-      ++errors.count;
+      errors.Add((*projected - point2D.XY()).norm());
     }
   }
   return errors;
@@ -46,8 +41,7 @@ double TotalSeconds(const std::vector<StageTime>& times) {
   return seconds;
 }
 
-std::vector<ReportFigure> ListFigures(const ReportInput& input,
-                                      const ReprojectionErrors& reprojection) {
+std::vector<ReportFigure> ListFigures(const ReportInput& input) {
   std::vector<ReportFigure> figures;
   const colmap::Reconstruction& model = input.model;
   figures.push_back({"Images registered",
@@ -62,12 +56,10 @@ std::vector<ReportFigure> ListFigures(const ReportInput& input,
                        FormatNumber("%.2f", model.ComputeMeanTrackLength()),
                        "images that see a point"});
   }
-  if (reprojection.count > 0) {
-    figures.push_back(
-        {"Reprojection error",
-         FormatNumber("%.2f px", std::sqrt(reprojection.sum_of_squares_px /
-                                           reprojection.count)),
-         "RMSE of " + FormatCount(reprojection.count) + " observations"});
+  if (model.NumPoints3D() > 0) {
+    figures.push_back({"Reprojection error",
+                       FormatNumber("%.2f px", ComputeReprojectionRmse(model)),
+                       "RMSE of the points' errors"});
   }
   const std::optional<bool> metric = IsMetric(input.summaries);
   figures.push_back({"In metres",
@@ -133,16 +125,14 @@ ReportTable FormatErrors(const ReportInput& input) {
 }
 
 nlohmann::json ChartData(const ReportOptions& options, const ReportInput& input,
-                         const ReprojectionErrors& reprojection) {
+                         const Histogram& reprojection) {
   nlohmann::json data;
   data["unit"] = IsMetric(input.summaries).value_or(false) ? "m" : "units";
   data["images"] = SceneToJson(input.scene);
   data["points"] =
       PointsToJson(input.model, input.scene, options.max_num_points);
   data["num_points"] = input.model.NumPoints3D();
-  if (reprojection.count > 0) {
-    data["reprojection"] = reprojection.histogram.ToJson();
-  }
+  if (reprojection.Count() > 0) data["reprojection"] = reprojection.ToJson();
   if (input.removed) {
     std::vector<uint32_t> indices;
     for (const auto& [index1, index2] : input.removed->pairs) {
@@ -152,10 +142,8 @@ nlohmann::json ChartData(const ReportOptions& options, const ReportInput& input,
     data["removed"] = PackUint32(indices);
   }
   if (input.pairs) {
-    data["pairs"] = input.pairs->pairs;
-    data["pairs"]["num_before"] = input.pairs->num_before;
-    data["pairs"]["num_after"] = input.pairs->num_after;
-    data["pairs"]["was_rewritten"] = input.pairs->was_rewritten;
+    data["pairs"] =
+        PairsToJson(*input.pairs, input.scene.images.size(), kMaxMatrixSize);
     data["ratios_before"] = input.pairs->inlier_ratios_before;
     data["ratios_after"] = input.pairs->inlier_ratios_after;
   }
@@ -181,22 +169,30 @@ bool ReportOptions::IsValid(std::string* error) const {
              " must not be negative";
     return false;
   }
+  // More would make a page that no phone opens.
+  if (max_num_examples < 0 || max_num_examples > 50) {
+    *error = "max_num_examples = " + std::to_string(max_num_examples) +
+             " must lie between 0 and 50";
+    return false;
+  }
   return ground_truth.IsValid(error);
 }
 
 StatusOr<std::string> BuildReport(const ReportOptions& options) {
   const StatusOr<ReportInput> input = ReadReportInput(options);
   if (!input.ok()) return input.status();
-  const ReprojectionErrors reprojection = MeasureReprojection(input->model);
+  const Histogram reprojection = MeasureReprojection(input->model);
   const bool is_metric = IsMetric(input->summaries).value_or(false);
   return FillTemplate(
       kReportTemplate,
       {{"SOURCE", EscapeHtml(options.input_path)},
-       {"FIGURES", FormatFigures(ListFigures(*input, reprojection))},
+       {"FIGURES", FormatFigures(ListFigures(*input))},
        {"NOTES", FormatNotes(input->notes)},
        {"SENSORS", FormatTable(FormatSensors(input->summaries))},
        {"STEPS", FormatTable(FormatGlobalSteps(input->summaries))},
        {"PARTS", FormatTable(FormatParts(input->summaries, is_metric))},
+       {"REMOVED_EXAMPLES", input->removed_examples},
+       {"KEPT_EXAMPLES", input->kept_examples},
        {"ERRORS", FormatTable(FormatErrors(*input))},
        {"DATA", JsonForScript(ChartData(options, *input, reprojection))}});
 }

@@ -20,6 +20,10 @@ struct ReportOptions {
   // The 3D view holds at most so many points: more make the file large and
   // turning it slow, without showing more.
   int max_num_points = 20000;
+  // Pairs shown with their matches on the photos, of each of removed and kept
+  // ones; each adds about 60 kB. Without image_path there are none.
+  std::string image_path;
+  int max_num_examples = 4;
 
   bool IsValid(std::string* error) const;
 };

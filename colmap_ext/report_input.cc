@@ -6,6 +6,7 @@
 
 #include "colmap_ext/host/database.h"
 #include "colmap_ext/host/model.h"
+#include "colmap_ext/report_examples.h"
 #include "colmap_ext/report_html.h"
 
 namespace adasfm {
@@ -64,6 +65,38 @@ Status ReadPairs(const std::string& path, ReportInput* input) {
   return Status::Ok();
 }
 
+Status ReadExamples(const ReportOptions& options, ReportInput* input) {
+  if (!fs::is_directory(options.image_path)) {
+    return Status::Error("there is no folder " + options.image_path +
+                         "; check --image_path");
+  }
+  PhotoOptions photos;
+  photos.image_path = options.image_path;
+  const size_t num_images = input->scene.images.size();
+  const std::vector<ReportPair> removed = SelectRemovedExamples(
+      *input->pairs, num_images, options.max_num_examples);
+  const std::vector<ReportPair> kept =
+      SelectKeptExamples(*input->pairs, num_images, options.max_num_examples);
+  int num_removed_unreadable = 0, num_kept_unreadable = 0;
+  try {
+    SqliteConnection database(options.database_path,
+                              SqliteConnection::Mode::kRead);
+    input->removed_examples = FormatExamples(
+        removed, input->scene, photos, &database, &num_removed_unreadable);
+    input->kept_examples = FormatExamples(kept, input->scene, photos, &database,
+                                          &num_kept_unreadable);
+  } catch (const SqliteError& error) {
+    return Status::Error(error.what());
+  }
+  const int num_unreadable = num_removed_unreadable + num_kept_unreadable;
+  if (num_unreadable > 0) {
+    input->notes.push_back(FormatCount(num_unreadable) +
+                           " of the pairs on photos: " + options.image_path +
+                           " lacks a photo of theirs, or it cannot be read");
+  }
+  return Status::Ok();
+}
+
 void ReadRemoved(ReportInput* input) {
   const std::string path = input->coarse_folder + "/removed_pairs.txt";
   if (!fs::exists(path)) {
@@ -110,6 +143,8 @@ void NoteWhatIsMissing(const ReportOptions& options, ReportInput* input) {
   note(options.database_path.empty(),
        "priors, view graph, inlier ratios and sensors: no --database_path was "
        "given");
+  note(options.image_path.empty() || options.database_path.empty(),
+       "pairs on photos: they need --image_path and --database_path");
   note(options.ground_truth_path.empty(),
        "errors: no --ground_truth_path was given");
   const ReportSummaries& summaries = input->summaries;
@@ -160,6 +195,10 @@ StatusOr<ReportInput> ReadReportInput(const ReportOptions& options) {
   MarkParts(input.summaries.parts, &input.scene);
   if (!options.database_path.empty()) {
     const Status read = ReadPairs(options.database_path, &input);
+    if (!read.ok()) return read;
+  }
+  if (input.pairs && !options.image_path.empty()) {
+    const Status read = ReadExamples(options, &input);
     if (!read.ok()) return read;
   }
   if (input.coarse) ReadRemoved(&input);

@@ -29,6 +29,9 @@ struct ReportInput {
   ReportScene scene;
   std::optional<ReportPairs> pairs;
   std::optional<RemovedPairs> removed;
+  // HTML of pairs with their matches on the photos.
+  std::string removed_examples;
+  std::string kept_examples;
   NamedPoses truth;
   std::optional<Evaluation> evaluation;
   // What is not shown, and why.

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <fstream>
 #include <map>
+#include <numeric>
 
 #include "colmap_ext/host/database.h"
 #include "colmap_ext/report_html.h"
@@ -22,31 +23,31 @@ struct PairCounts {
   int64_t raw = 0;
 };
 
-std::map<ImagePair, PairCounts> CountMatches(SqliteConnection* database,
-                                             bool* was_rewritten) {
+std::map<ImagePair, PairCounts> CountAllMatches(SqliteConnection* database,
+                                                bool* was_rewritten) {
   std::map<ImagePair, PairCounts> counts;
-  for (const DatabaseTwoViewGeometry& row :
-       ReadTwoViewGeometries(database, "two_view_geometries", kMinNumInliers)) {
-    PairCounts& pair = counts[row.pair];
-    pair.before = pair.after = row.inlier_matches.size();
-  }
+  CountMatches(database, "two_view_geometries", kMinNumInliers,
+               [&counts](const ImagePair& pair, int64_t count) {
+                 PairCounts& entry = counts[pair];
+                 entry.before = entry.after = count;
+               });
   *was_rewritten = database->HasTable(kTwoViewGeometryBackupTable);
   if (*was_rewritten) {
     std::map<ImagePair, int64_t> originals;
-    for (const DatabaseTwoViewGeometry& row :
-         ReadTwoViewGeometries(database, kTwoViewGeometryBackupTable, 0)) {
-      originals[row.pair] = row.inlier_matches.size();
-    }
+    CountMatches(database, kTwoViewGeometryBackupTable, kMinNumInliers,
+                 [&originals](const ImagePair& pair, int64_t count) {
+                   originals[pair] = count;
+                 });
     for (const ImagePair& pair : FindKeptOriginals(database)) {
-      const int64_t before = originals[pair];
-      counts[pair].before = before >= kMinNumInliers ? before : 0;
+      const auto original = originals.find(pair);
+      counts[pair].before = original == originals.end() ? 0 : original->second;
     }
   }
-  ReadMatches(database, [&counts](const ImagePair& pair,
-                                  const std::vector<FeatureMatch>& matches) {
-    const auto entry = counts.find(pair);
-    if (entry != counts.end()) entry->second.raw = matches.size();
-  });
+  CountMatches(database, "matches", 1,
+               [&counts](const ImagePair& pair, int64_t count) {
+                 const auto entry = counts.find(pair);
+                 if (entry != counts.end()) entry->second.raw = count;
+               });
   return counts;
 }
 
@@ -60,6 +61,10 @@ void Histogram::Add(double value) {
   counts_[bin < last ? std::max(0, static_cast<int>(bin)) : last]++;
 }
 
+int64_t Histogram::Count() const {
+  return std::accumulate(counts_.begin(), counts_.end(), int64_t{0});
+}
+
 nlohmann::json Histogram::ToJson() const {
   return {{"width", bin_width_}, {"counts", counts_}};
 }
@@ -67,13 +72,11 @@ nlohmann::json Histogram::ToJson() const {
 ReportPairs ReadReportPairs(const ReportScene& scene,
                             SqliteConnection* database) {
   ReportPairs report;
-  std::vector<uint32_t> indices;
-  std::vector<uint16_t> before, after;
   Histogram ratios_before(kRatioBinWidth, kNumRatioBins);
   Histogram ratios_after(kRatioBinWidth, kNumRatioBins);
   bool has_raw = false;
   for (const auto& [pair, counts] :
-       CountMatches(database, &report.was_rewritten)) {
+       CountAllMatches(database, &report.was_rewritten)) {
     const auto index1 = scene.index_of_id.find(pair.image_id1);
     const auto index2 = scene.index_of_id.find(pair.image_id2);
     if (index1 == scene.index_of_id.end() ||
@@ -81,10 +84,9 @@ ReportPairs ReadReportPairs(const ReportScene& scene,
         (counts.before == 0 && counts.after == 0)) {
       continue;
     }
-    indices.push_back(index1->second);
-    indices.push_back(index2->second);
-    before.push_back(Clamp16(counts.before));
-    after.push_back(Clamp16(counts.after));
+    report.pairs.push_back({std::min(index1->second, index2->second),
+                            std::max(index1->second, index2->second),
+                            counts.before, counts.after, counts.raw});
     report.num_before += counts.before > 0;
     report.num_after += counts.after > 0;
     if (counts.raw == 0) continue;
@@ -93,14 +95,37 @@ ReportPairs ReadReportPairs(const ReportScene& scene,
     if (counts.before > 0) ratios_before.Add(counts.before / num_raw);
     if (counts.after > 0) ratios_after.Add(counts.after / num_raw);
   }
-  report.pairs = {{"images", PackUint32(indices)},
-                  {"before", PackUint16(before)},
-                  {"after", PackUint16(after)}};
   if (has_raw) {
     report.inlier_ratios_before = ratios_before.ToJson();
     report.inlier_ratios_after = ratios_after.ToJson();
   }
   return report;
+}
+
+nlohmann::json PairsToJson(const ReportPairs& pairs, size_t num_images,
+                           size_t max_size) {
+  const size_t size = std::max<size_t>(1, std::min(num_images, max_size));
+  const auto cell_of = [&](size_t index) { return index * size / num_images; };
+  std::map<std::pair<size_t, size_t>, PairCounts> cells;
+  for (const ReportPair& pair : pairs.pairs) {
+    PairCounts& cell = cells[{cell_of(pair.index1), cell_of(pair.index2)}];
+    cell.before = std::max(cell.before, pair.num_before);
+    cell.after = std::max(cell.after, pair.num_after);
+  }
+  std::vector<uint16_t> indices, before, after;
+  for (const auto& [cell, counts] : cells) {
+    indices.push_back(cell.first);
+    indices.push_back(cell.second);
+    before.push_back(Clamp16(counts.before));
+    after.push_back(Clamp16(counts.after));
+  }
+  return {{"size", size},
+          {"images", PackUint16(indices)},
+          {"before", PackUint16(before)},
+          {"after", PackUint16(after)},
+          {"num_before", pairs.num_before},
+          {"num_after", pairs.num_after},
+          {"was_rewritten", pairs.was_rewritten}};
 }
 
 RemovedPairs ReadRemovedPairs(const std::string& path,

@@ -24,6 +24,9 @@ Status RunAdasfmReporter(int argc, char** argv) {
   command.AddDefault("database_path", &options.database_path,
                      "COLMAP database, for the priors and the view graph; the "
                      "summary of adasfm_prior_importer beside it is read too");
+  command.AddDefault("image_path", &options.image_path,
+                     "folder of the photos, for examples of removed and kept "
+                     "pairs with their matches (needs --database_path)");
   command.AddDefault("ground_truth_path", &options.ground_truth_path,
                      "true poses: a COLMAP model, a TUM trajectory, or lines "
                      "`name qw qx qy qz tx ty tz` (cam_from_world)");
@@ -35,6 +38,9 @@ Status RunAdasfmReporter(int argc, char** argv) {
                      "far apart [s]");
   command.AddDefault("max_num_points", &options.max_num_points,
                      "largest number of points in the 3D view");
+  command.AddDefault("max_num_examples", &options.max_num_examples,
+                     "largest number of pairs on photos, of each of removed "
+                     "and kept ones; each adds about 60 kB");
   const Status parsed = command.Parse(argc, argv);
   if (!parsed.ok() || command.HelpShown()) return parsed;
   const Status valid = CheckOptions(options);

@@ -3,14 +3,10 @@
 
 #include <base/camera_models.h>
 #include <base/database.h>
-#include <estimators/two_view_geometry.h>
 
 #include <algorithm>
 #include <cstring>
 #include <filesystem>
-#include <stdexcept>
-
-#include "core/so3.h"
 
 namespace adasfm {
 namespace {
@@ -78,6 +74,26 @@ std::vector<FeatureMatch> MatchesFromRow(const SqliteStatement& statement,
   return matches;
 }
 
+std::vector<Eigen::Vector2d> KeypointsFromRow(
+    const SqliteStatement& statement) {
+  const int64_t num_rows = statement.Int(1);
+  const int64_t num_cols = statement.Int(2);
+  if (num_rows < 0 || (num_rows > 0 && num_cols < 2) ||
+      statement.NumBytes(3) != num_rows * num_cols * sizeof(float)) {
+    ThrowRowError("keypoints", statement.Int(0), "malformed keypoints");
+  }
+  std::vector<Eigen::Vector2d> points;
+  points.reserve(num_rows);
+  const char* data = static_cast<const char*>(statement.Blob(3));
+  for (int64_t i = 0; i < num_rows; ++i) {
+    Eigen::Vector2f point;
+    std::memcpy(point.data(), data + i * num_cols * sizeof(float),
+                2 * sizeof(float));
+    points.push_back(point.cast<double>());
+  }
+  return points;
+}
+
 // A fixed-size blob of doubles; zeros when the row has none.
 template <typename Matrix>
 Matrix MatrixFromRow(const SqliteStatement& statement, const std::string& table,
@@ -100,41 +116,6 @@ std::optional<Rigid3d> PoseFromBlobs(const Eigen::Vector4d& qvec,
                                      const Eigen::Vector3d& tvec) {
   if (qvec.isZero() || tvec.isZero()) return std::nullopt;
   return Rigid3d(Eigen::Quaterniond(qvec(0), qvec(1), qvec(2), qvec(3)), tvec);
-}
-
-template <typename Matrix>
-void BindMatrix(SqliteStatement* statement, int parameter,
-                const Matrix& matrix) {
-  statement->BindBlob(parameter, matrix.data(), matrix.size() * sizeof(double));
-}
-
-void WriteTwoViewGeometry(const colmap::Camera& camera1,
-                          const colmap::Camera& camera2,
-                          const NewTwoViewGeometry& row,
-                          SqliteStatement* statement) {
-  if (row.cam2_from_cam1.translation.isZero()) {
-    throw std::invalid_argument("NewTwoViewGeometry: translation is zero");
-  }
-  const Eigen::Quaterniond& rotation = row.cam2_from_cam1.rotation;
-  const Eigen::Vector4d qvec(rotation.w(), rotation.x(), rotation.y(),
-                             rotation.z());
-  const Eigen::Vector3d tvec = row.cam2_from_cam1.translation.normalized();
-  const RowMajorMatrix3d E = Hat(tvec) * rotation.toRotationMatrix();
-  const RowMajorMatrix3d F = camera2.CalibrationMatrix().inverse().transpose() *
-                             E * camera1.CalibrationMatrix().inverse();
-  const RowMajorMatrix3d H = RowMajorMatrix3d::Zero();
-  statement->Reset();
-  statement->BindInt(1, PairIdFromImagePair(row.pair));
-  statement->BindInt(2, row.inlier_matches.size());
-  statement->BindBlob(3, row.inlier_matches.data(),
-                      row.inlier_matches.size() * sizeof(FeatureMatch));
-  statement->BindInt(4, colmap::TwoViewGeometry::CALIBRATED);
-  BindMatrix(statement, 5, F);
-  BindMatrix(statement, 6, E);
-  BindMatrix(statement, 7, H);
-  BindMatrix(statement, 8, qvec);
-  BindMatrix(statement, 9, tvec);
-  statement->Step();
 }
 
 }  // namespace
@@ -218,23 +199,19 @@ std::map<image_t, std::vector<Eigen::Vector2d>> ReadKeypoints(
       database,
       "SELECT image_id, rows, cols, data FROM keypoints ORDER BY image_id");
   while (statement.Step()) {
-    const int64_t num_rows = statement.Int(1);
-    const int64_t num_cols = statement.Int(2);
-    if (num_rows < 0 || (num_rows > 0 && num_cols < 2) ||
-        statement.NumBytes(3) != num_rows * num_cols * sizeof(float)) {
-      ThrowRowError("keypoints", statement.Int(0), "malformed keypoints");
-    }
-    std::vector<Eigen::Vector2d>& points = keypoints[statement.Int(0)];
-    points.reserve(num_rows);
-    const char* data = static_cast<const char*>(statement.Blob(3));
-    for (int64_t i = 0; i < num_rows; ++i) {
-      Eigen::Vector2f point;
-      std::memcpy(point.data(), data + i * num_cols * sizeof(float),
-                  2 * sizeof(float));
-      points.push_back(point.cast<double>());
-    }
+    keypoints[statement.Int(0)] = KeypointsFromRow(statement);
   }
   return keypoints;
+}
+
+std::vector<Eigen::Vector2d> ReadKeypointsOfImage(SqliteConnection* database,
+                                                  image_t image_id) {
+  SqliteStatement statement(
+      database,
+      "SELECT image_id, rows, cols, data FROM keypoints WHERE image_id = ?");
+  statement.BindInt(1, image_id);
+  return statement.Step() ? KeypointsFromRow(statement)
+                          : std::vector<Eigen::Vector2d>();
 }
 
 void ReadMatches(
@@ -248,6 +225,27 @@ void ReadMatches(
     function(ImagePairFromPairId(statement.Int(0)),
              MatchesFromRow(statement, "matches", 1));
   }
+}
+
+void CountMatches(
+    SqliteConnection* database, const std::string& table, int min_num_matches,
+    const std::function<void(const ImagePair&, int64_t)>& function) {
+  SqliteStatement statement(database, "SELECT pair_id, rows FROM " + table +
+                                          " WHERE rows >= ? ORDER BY pair_id");
+  statement.BindInt(1, min_num_matches);
+  while (statement.Step()) {
+    function(ImagePairFromPairId(statement.Int(0)), statement.Int(1));
+  }
+}
+
+std::vector<FeatureMatch> ReadMatchesOfPair(SqliteConnection* database,
+                                            const std::string& table,
+                                            const ImagePair& pair) {
+  SqliteStatement statement(database, "SELECT pair_id, rows, cols, data FROM " +
+                                          table + " WHERE pair_id = ?");
+  statement.BindInt(1, PairIdFromImagePair(pair));
+  return statement.Step() ? MatchesFromRow(statement, table, 1)
+                          : std::vector<FeatureMatch>();
 }
 
 std::vector<DatabaseTwoViewGeometry> ReadTwoViewGeometries(
@@ -272,24 +270,6 @@ std::vector<DatabaseTwoViewGeometry> ReadTwoViewGeometries(
     rows.push_back(std::move(row));
   }
   return rows;
-}
-
-void WriteTwoViewGeometries(SqliteConnection* database,
-                            const std::vector<NewTwoViewGeometry>& rows) {
-  const std::map<camera_t, colmap::Camera> cameras = ReadCameras(database);
-  std::map<image_t, camera_t> camera_ids;
-  for (const DatabaseImage& image : ReadImages(database)) {
-    camera_ids[image.image_id] = image.camera_id;
-  }
-  SqliteStatement statement(
-      database,
-      "INSERT OR REPLACE INTO two_view_geometries (pair_id, rows, cols, data, "
-      "config, F, E, H, qvec, tvec) VALUES (?, ?, 2, ?, ?, ?, ?, ?, ?, ?)");
-  for (const NewTwoViewGeometry& row : rows) {
-    WriteTwoViewGeometry(cameras.at(camera_ids.at(row.pair.image_id1)),
-                         cameras.at(camera_ids.at(row.pair.image_id2)), row,
-                         &statement);
-  }
 }
 
 }  // namespace adasfm

@@ -55,12 +55,27 @@ std::vector<DatabaseImage> ReadImages(SqliteConnection* database);
 // Positions only, in pixels.
 std::map<image_t, std::vector<Eigen::Vector2d>> ReadKeypoints(
     SqliteConnection* database);
+// Of one image; empty when there are none.
+std::vector<Eigen::Vector2d> ReadKeypointsOfImage(SqliteConnection* database,
+                                                  image_t image_id);
 
 // Calls function(pair, matches) for every pair in order of the pairs.
 void ReadMatches(
     SqliteConnection* database,
     const std::function<void(const ImagePair&, std::vector<FeatureMatch>)>&
         function);
+
+// Calls function(pair, number of matches) for every pair of `table` (matches,
+// two_view_geometries or one like it) that has at least min_num_matches, in
+// order of the pairs, without reading the matches.
+void CountMatches(
+    SqliteConnection* database, const std::string& table, int min_num_matches,
+    const std::function<void(const ImagePair&, int64_t)>& function);
+
+// The matches of one pair in such a table; empty when there are none.
+std::vector<FeatureMatch> ReadMatchesOfPair(SqliteConnection* database,
+                                            const std::string& table,
+                                            const ImagePair& pair);
 
 // The rows of `table`, which has the columns of two_view_geometries, with at
 // least min_num_matches inliers; sorted by pair.

@@ -160,5 +160,29 @@ TEST_F(DatabaseTest, IgnoresPairsOfDeletedImages) {
   }
 }
 
+TEST_F(DatabaseTest, ReadsSinglePairsAndImagesAsAll) {
+  SqliteConnection database(path_, SqliteConnection::Mode::kRead);
+  std::map<ImagePair, int64_t> counts;
+  CountMatches(&database, "matches", 1,
+               [&counts](const ImagePair& pair, int64_t count) {
+                 counts[pair] = count;
+               });
+  int num_pairs = 0;
+  ReadMatches(
+      &database, [&](const ImagePair& pair, std::vector<FeatureMatch> matches) {
+        ++num_pairs;
+        EXPECT_EQ(counts[pair], matches.size());
+        EXPECT_EQ(ReadMatchesOfPair(&database, "matches", pair), matches);
+      });
+  EXPECT_GT(num_pairs, 0);
+  EXPECT_EQ(counts.size(), num_pairs);
+  for (const auto& [image_id, points] : ReadKeypoints(&database)) {
+    EXPECT_EQ(ReadKeypointsOfImage(&database, image_id), points);
+  }
+  EXPECT_TRUE(ReadKeypointsOfImage(&database, 999).empty());
+  EXPECT_TRUE(
+      ReadMatchesOfPair(&database, "matches", ImagePair(1, 999)).empty());
+}
+
 }  // namespace
 }  // namespace adasfm

@@ -7,7 +7,9 @@
 #include <regex>
 #include <set>
 
+#include "colmap_ext/host/database.h"
 #include "colmap_ext/prior_tables.h"
+#include "colmap_ext/report_examples.h"
 #include "colmap_ext/report_html.h"
 #include "colmap_ext/report_pairs.h"
 #include "colmap_ext/report_scene.h"
@@ -176,7 +178,7 @@ TEST_F(ReportTest, IsSelfContainedAndHoldsTheFigures) {
   ASSERT_TRUE(page.ok()) << page.status().message();
   ExpectSelfContained(*page);
   for (const std::string figure :
-       {"25 of 25", "<b>100</b>", "1.00", "0.25 px", "RMSE of 100 obs",
+       {"25 of 25", "<b>100</b>", "1.00", "0.25 px", "RMSE of the points",
         "0.000 m", "3.8 s", "5 &lt;pairs&gt; tested",
         "does not fit the coarse model", "a &lt; b", "200 Hz", "1 lines of"}) {
     EXPECT_NE(page->find(figure), std::string::npos) << figure;
@@ -198,6 +200,41 @@ TEST_F(ReportTest, IsSelfContainedAndHoldsTheFigures) {
   // All errors are 0.25 px, in the third bin of 0.1 px.
   EXPECT_EQ(data["reprojection"]["counts"][2], 100);
   EXPECT_EQ(*page, *BuildReport(AllInputs()));
+}
+
+TEST_F(ReportTest, DrawsMatchesOnPhotos) {
+  ReportOptions options = AllInputs();
+  options.image_path = folder_.File("photos");
+  options.max_num_examples = 2;
+  // Any picture will do: OpenCV goes by the content and not by the name.
+  std::filesystem::create_directories(options.image_path);
+  for (const SyntheticImage& image : world_.images) {
+    if (image.name == kHostileName) continue;
+    folder_.Write("photos/" + image.name,
+                  "P6 8 5 255\n" + std::string(8 * 5 * 3, '\x60'));
+  }
+  const StatusOr<std::string> page = BuildReport(options);
+  ASSERT_TRUE(page.ok()) << page.status().message();
+  ExpectSelfContained(*page);
+  EXPECT_EQ(Count(*page, "data:image/jpeg"), 3);
+  SqliteConnection database(database_, SqliteConnection::Mode::kRead);
+  const size_t num_inliers =
+      ReadMatchesOfPair(&database, kTwoViewGeometryBackupTable, removed_)
+          .size();
+  EXPECT_NE(page->find(std::to_string(num_inliers) + " inliers, all removed"),
+            std::string::npos);
+  EXPECT_EQ(Count(*page, "<path class=\"kept\""), 2);
+  EXPECT_EQ(*page, *BuildReport(options));
+
+  // Photos that are cut short or missing are counted, and the page stands.
+  for (const SyntheticImage& image : world_.images) {
+    folder_.Write("photos/" + image.name, "P6 8");
+  }
+  const StatusOr<std::string> without = BuildReport(options);
+  ASSERT_TRUE(without.ok()) << without.status().message();
+  ExpectSelfContained(*without);
+  EXPECT_NE(without->find("3 of the pairs on photos"), std::string::npos);
+  EXPECT_EQ(Count(*without, "data:image/jpeg"), 0);
 }
 
 TEST_F(ReportTest, NamesCannotBreakThePage) {
@@ -261,6 +298,10 @@ TEST_F(ReportTest, WrongInputIsOneLine) {
   }
   ExpectError(arguments + " --max_num_points -1", "max_num_points = -1");
   ExpectError(arguments + " --max_time_gap_s -1", "max_time_gap_s");
+  ExpectError(arguments + " --max_num_examples 51", "max_num_examples = 51");
+  ExpectError(
+      arguments + " --database_path " + database_ + " --image_path /nowhere",
+      "/nowhere");
   EXPECT_FALSE(std::filesystem::exists(output));
   ExpectError(
       "adasfm_reporter --output_path /nowhere/report.html "
@@ -364,6 +405,81 @@ TEST(ReportScene, UpIsUpwards) {
                                             Eigen::Vector3d::UnitX()),
                             Eigen::Vector3d::UnitZ()),
             DegToRad(10.0));
+}
+
+// Pairs (i, i + gap) of `num_images` images, every third one removed.
+ReportPairs MakePairs(size_t num_images, size_t max_gap) {
+  ReportPairs pairs;
+  for (size_t i = 0; i < num_images; ++i) {
+    for (size_t gap = 1; gap <= max_gap && i + gap < num_images; ++gap) {
+      const int64_t count = 15 + (i * 7919 + gap * 104729) % 300;
+      pairs.pairs.push_back(
+          {i, i + gap, count, (i + gap) % 3 == 0 ? 0 : count, 2 * count});
+    }
+  }
+  return pairs;
+}
+
+TEST(SelectExamples, TakesTheMostDoubtfulAndSpreadsThem) {
+  const ReportPairs pairs = MakePairs(100, 9);
+  const std::vector<ReportPair> removed = SelectRemovedExamples(pairs, 100, 4);
+  const std::vector<ReportPair> kept = SelectKeptExamples(pairs, 100, 4);
+  ASSERT_EQ(removed.size(), 4);
+  ASSERT_EQ(kept.size(), 4);
+  int64_t most_removed = 0, fewest_kept = 1000;
+  for (const ReportPair& pair : pairs.pairs) {
+    if (pair.num_after == 0) {
+      most_removed = std::max(most_removed, pair.num_before);
+    } else {
+      fewest_kept = std::min(fewest_kept, pair.num_after);
+    }
+  }
+  EXPECT_EQ(removed[0].num_before, most_removed);
+  EXPECT_EQ(kept[0].index2 - kept[0].index1, 9);
+  EXPECT_EQ(kept[1].num_after, fewest_kept);
+  for (const std::vector<ReportPair>* list : {&removed, &kept}) {
+    for (size_t a = 0; a < list->size(); ++a) {
+      EXPECT_EQ((*list)[a].num_after == 0, list == &removed);
+      for (size_t b = 0; b < a; ++b) {
+        EXPECT_GT(
+            std::abs(1.0 * (*list)[a].index1 - 1.0 * (*list)[b].index1) +
+                std::abs(1.0 * (*list)[a].index2 - 1.0 * (*list)[b].index2),
+            5.0);
+      }
+    }
+  }
+}
+
+TEST(SelectExamples, TakesNearOnesRatherThanNone) {
+  const ReportPairs pairs = MakePairs(4, 2);
+  size_t num_removed = 0;
+  for (const ReportPair& pair : pairs.pairs) num_removed += pair.num_after == 0;
+  EXPECT_EQ(SelectRemovedExamples(pairs, 4, 10).size(), num_removed);
+  EXPECT_EQ(SelectKeptExamples(pairs, 4, 10).size(),
+            pairs.pairs.size() - num_removed);
+  EXPECT_TRUE(SelectKeptExamples(pairs, 4, 0).empty());
+  EXPECT_TRUE(SelectKeptExamples(ReportPairs(), 0, 4).empty());
+}
+
+TEST(PairsToJson, SizeIsBounded) {
+  const ReportPairs pairs = MakePairs(1000, 20);
+  const nlohmann::json full = PairsToJson(pairs, 1000, 1000);
+  EXPECT_EQ(full["size"], 1000);
+  EXPECT_EQ(full["before"], PackUint16([&pairs] {
+              std::vector<uint16_t> counts;
+              for (const ReportPair& pair : pairs.pairs) {
+                counts.push_back(pair.num_before);
+              }
+              return counts;
+            }()));
+  // Cells of ten images; those of 20 neighbours lie in three diagonals.
+  const nlohmann::json small = PairsToJson(pairs, 1000, 100);
+  EXPECT_EQ(small["size"], 100);
+  EXPECT_EQ(small["before"]["u16"].get<std::string>().size(),
+            EncodeBase64(std::string(2 * (100 + 99 + 98), ' ').data(),
+                         2 * (100 + 99 + 98))
+                .size());
+  EXPECT_EQ(PairsToJson(ReportPairs(), 0, 10)["size"], 1);
 }
 
 TEST(ReadRemovedPairs, NamesMayHaveSpaces) {
