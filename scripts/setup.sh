@@ -4,8 +4,10 @@
 # COLMAP once into a cache folder, configures and builds the project.
 # Run it again at any time: what is done is not done twice.
 #
-#   scripts/setup.sh [--host-only] [CMake arguments...]
+#   scripts/setup.sh [--host-only] [--for-tests] [CMake arguments...]
 #
+# --host-only stops after the host, --for-tests also installs the browser that
+# the report's test and the screenshots need.
 # Environment: ADASFM_CACHE (default: the user's cache folder) holds the host;
 # ADASFM_BUILD_DIR (default: build/); ADASFM_BUILD_TYPE (default: Release).
 # With -DCOLMAP_DIR=PREFIX/share/colmap that COLMAP is used instead.
@@ -31,15 +33,21 @@ packages=(
   libgtest-dev libgmock-dev libbenchmark-dev
   # For the scripts that draw tables and compare models.
   python3 python3-numpy python3-matplotlib sqlite3)
+test_packages=(chromium chromium-driver python3-selenium file)
 
 say() { printf '\n== %s\n' "$*"; }
 die() { printf 'setup: %s\n' "$*" >&2; exit 1; }
 
 # Runs a command as root: directly, or with sudo.
 as_root() {
-  if [ "$(id -u)" = 0 ]; then "$@"
-  elif command -v sudo > /dev/null; then sudo "$@"
-  else die "'$*' needs root; install sudo or run this script as root"; fi
+  if [ "$(id -u)" = 0 ]; then "$@"; else sudo "$@"; fi
+}
+
+check_root() {
+  [ "$(id -u)" = 0 ] && return
+  command -v sudo > /dev/null ||
+    die 'installing packages needs root: install sudo, or run this script as root'
+  sudo -v || die 'installing packages needs root, and sudo refused; run this script as root'
 }
 
 install_packages() {
@@ -50,11 +58,13 @@ install_packages() {
   done
   if [ ${#missing[@]} = 0 ]; then return; fi
   say "Installing ${#missing[@]} Debian packages (about 2 minutes): ${missing[*]}"
-  as_root apt-get update ||
-    die 'apt-get update failed: installing the packages needs the network'
-  as_root env DEBIAN_FRONTEND=noninteractive apt-get install -y \
-    --no-install-recommends "${missing[@]}" > "$cache/apt.log" 2>&1 || {
-    tail -n 20 "$cache/apt.log" >&2
+  check_root
+  {
+    as_root apt-get -o APT::Update::Error-Mode=any update &&
+      as_root env DEBIAN_FRONTEND=noninteractive apt-get install -y \
+        --no-install-recommends "${missing[@]}"
+  } > "$cache/apt.log" 2>&1 || {
+    tail -n 5 "$cache/apt.log" >&2
     die "installing the packages failed (it needs the network); see $cache/apt.log"
   }
 }
@@ -120,9 +130,17 @@ build_host() {
 
 main() {
   [ -r /etc/debian_version ] || die 'this script knows Debian 12 only; see docs/install.md for other systems'
-  mkdir -p "$cache" || die "cannot write to $cache; set ADASFM_CACHE"
+  mkdir -p "$cache" && [ -w "$cache" ] ||
+    die "cannot write to the cache folder $cache; set ADASFM_CACHE to another one"
   local host_only=0
-  if [ "${1:-}" = --host-only ]; then host_only=1; shift; fi
+  while true; do
+    case ${1:-} in
+      --host-only) host_only=1 ;;
+      --for-tests) packages+=("${test_packages[@]}") ;;
+      *) break ;;
+    esac
+    shift
+  done
   install_packages
   local colmap_dir=$host_prefix/share/colmap argument
   for argument in "$@"; do
@@ -137,7 +155,8 @@ main() {
     tail -n 20 "$cache/configure.log" >&2
     die "configuring failed; see $cache/configure.log"
   }
-  cmake --build "$build" --parallel "$jobs"
+  cmake --build "$build" --parallel "$jobs" ||
+    die 'building the project failed; the messages above say where'
 }
 
 main "$@"

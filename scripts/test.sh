@@ -1,15 +1,16 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: BSD-3-Clause
 # Sets up what is missing and runs all tests: format, layers, unit and
-# command-line tests with warnings as errors, and the pure layers' tests once
-# more under AddressSanitizer and UBSan.
+# command-line tests with warnings as errors, the report in a browser, the
+# packages, the documentation's commands, and the pure layers' tests once more
+# under AddressSanitizer and UBSan.
 #
 #   scripts/test.sh [--no-sanitizers]
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 
 jobs=$(nproc)
-scripts/setup.sh
+scripts/setup.sh --for-tests
 printf '\n== Checking format and layers\n'
 scripts/check_format.sh
 scripts/check_layers.sh
