@@ -4,7 +4,11 @@
 #include "core/parallel.h"
 #include "global/estimate_coarse_poses.h"
 #include "global/match_refinement.h"
+#include "global/refine_relative_poses.h"
+#include "global/rotation_averaging.h"
 #include "global/tracks.h"
+#include "global/translation_averaging.h"
+#include "global/triangulate_tracks.h"
 #include "synthetic/synthetic_world.h"
 
 namespace adasfm {
@@ -84,6 +88,76 @@ void BM_RefineMatches(benchmark::State& state) {
   }
 }
 BENCHMARK(BM_RefineMatches)->Arg(500)->Unit(benchmark::kMillisecond);
+
+// Two-view poses with known rotations, as the coarse stage refines them.
+void BM_RefineRelativePoses(benchmark::State& state) {
+  const Input input = BuildInput(state.range(0));
+  const std::vector<std::optional<RotationPrediction>> predictions(
+      input.graph.edges.size());
+  for (auto _ : state) {
+    ViewGraph graph = input.graph;
+    RefineRelativePoses(RelativePoseRefinementOptions(), input.correspondences,
+                        predictions, &graph);
+    benchmark::DoNotOptimize(graph);
+  }
+  state.counters["pairs/s"] =
+      benchmark::Counter(input.graph.edges.size() * state.iterations(),
+                         benchmark::Counter::kIsRate);
+}
+BENCHMARK(BM_RefineRelativePoses)
+    ->Arg(500)
+    ->UseRealTime()
+    ->Unit(benchmark::kMillisecond);
+
+// Started by the semidefinite program (second argument 1) or a spanning tree.
+void BM_EstimateGlobalRotations(benchmark::State& state) {
+  const Input input = BuildInput(state.range(0));
+  RotationAveragingOptions options;
+  options.use_sdp_start = state.range(1) != 0;
+  for (auto _ : state) {
+    benchmark::DoNotOptimize(EstimateGlobalRotations(options, input.graph));
+  }
+  state.SetComplexityN(state.range(0));
+}
+BENCHMARK(BM_EstimateGlobalRotations)
+    ->ArgsProduct({{500, 1000, 2000}, {0, 1}})
+    ->Unit(benchmark::kMillisecond);
+
+void BM_EstimateGlobalPositions(benchmark::State& state) {
+  const Input input = BuildInput(state.range(0));
+  std::map<image_t, Eigen::Quaterniond> rotations;
+  for (const auto& [image_id, pose] : input.cams_from_world) {
+    rotations[image_id] = pose.rotation;
+  }
+  const std::vector<std::optional<EdgeLength>> lengths(
+      input.graph.edges.size());
+  for (auto _ : state) {
+    benchmark::DoNotOptimize(EstimateGlobalPositions(
+        TranslationAveragingOptions(), input.graph, rotations, lengths, {}));
+  }
+  state.SetComplexityN(state.range(0));
+}
+BENCHMARK(BM_EstimateGlobalPositions)
+    ->Arg(500)
+    ->Arg(1000)
+    ->Arg(2000)
+    ->Unit(benchmark::kMillisecond);
+
+void BM_TriangulateTracks(benchmark::State& state) {
+  const Input input = BuildInput(state.range(0));
+  const std::vector<Track> tracks =
+      BuildTracks(TrackOptions(), input.correspondences.matches);
+  for (auto _ : state) {
+    benchmark::DoNotOptimize(
+        TriangulateTracks(TrackTriangulationOptions(), input.cams_from_world,
+                          input.correspondences.bearings, tracks));
+  }
+  state.counters["tracks"] = tracks.size();
+}
+BENCHMARK(BM_TriangulateTracks)
+    ->Arg(500)
+    ->UseRealTime()
+    ->Unit(benchmark::kMillisecond);
 
 }  // namespace
 }  // namespace adasfm

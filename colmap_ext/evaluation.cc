@@ -3,6 +3,7 @@
 
 #include <base/projection.h>
 
+#include <Eigen/SVD>
 #include <algorithm>
 #include <cmath>
 #include <utility>
@@ -23,6 +24,7 @@ constexpr size_t kMaxNumAucPairs = 2000000;
 constexpr int kNumTrimmedRefits = 5;
 constexpr double kTrimFactor = 3.0;
 constexpr double kMinTrimThreshold = 1e-6;
+constexpr double kMinTrimDeg = 1e-4;
 
 struct PosePair {
   Rigid3d cam_from_world;
@@ -70,19 +72,47 @@ bool Align(const std::vector<PosePair>& poses,
   return EstimateSim3d(centers, true_centers, options, true_from_model);
 }
 
+// The rotation of the world that suits the orientations nearer than the
+// threshold best (chordal mean).
+Eigen::Quaterniond AlignOrientations(const std::vector<PosePair>& poses,
+                                     const std::vector<double>& angles_deg,
+                                     double threshold_deg) {
+  Eigen::Matrix3d sum = Eigen::Matrix3d::Zero();
+  for (size_t i = 0; i < poses.size(); ++i) {
+    if (!(angles_deg[i] < threshold_deg)) continue;
+    sum += (poses[i].true_cam_from_world.rotation.conjugate() *
+            poses[i].cam_from_world.rotation)
+               .toRotationMatrix();
+  }
+  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(
+      sum, Eigen::ComputeFullU | Eigen::ComputeFullV);
+  Eigen::Matrix3d mirror = Eigen::Matrix3d::Identity();
+  mirror(2, 2) =
+      (svd.matrixU() * svd.matrixV().transpose()).determinant() < 0 ? -1 : 1;
+  return Eigen::Quaterniond(svd.matrixU() * mirror * svd.matrixV().transpose());
+}
+
+std::vector<double> ComputeAnglesDeg(
+    const std::vector<PosePair>& poses,
+    const Eigen::Quaterniond& true_from_model) {
+  std::vector<double> angles_deg;
+  angles_deg.reserve(poses.size());
+  for (const PosePair& pose : poses) {
+    angles_deg.push_back(RadToDeg(AngleBetweenRad(
+        pose.cam_from_world.rotation * true_from_model.conjugate(),
+        pose.true_cam_from_world.rotation)));
+  }
+  return angles_deg;
+}
+
 AlignmentErrors ComputeErrors(const std::vector<PosePair>& poses,
                               const Sim3d& true_from_model) {
   const std::vector<double> distances =
       ComputeDistances(poses, true_from_model);
-  std::vector<double> angles_deg;
+  const std::vector<double> angles_deg =
+      ComputeAnglesDeg(poses, true_from_model.rotation);
   double sum_squares = 0.0;
-  for (size_t i = 0; i < poses.size(); ++i) {
-    const Rigid3d aligned =
-        TransformCamFromWorld(true_from_model, poses[i].cam_from_world);
-    angles_deg.push_back(RadToDeg(AngleBetweenRad(
-        aligned.rotation, poses[i].true_cam_from_world.rotation)));
-    sum_squares += distances[i] * distances[i];
-  }
+  for (const double distance : distances) sum_squares += distance * distance;
   AlignmentErrors errors;
   errors.scale = true_from_model.scale;
   errors.translation_rmse_m = std::sqrt(sum_squares / poses.size());
@@ -93,6 +123,19 @@ AlignmentErrors ComputeErrors(const std::vector<PosePair>& poses,
   errors.rotation_mean_deg = Mean(angles_deg);
   errors.rotation_median_deg = Median(angles_deg);
   return errors;
+}
+
+// The median angle after the best rotation of the world, refitted to the
+// images within three medians.
+double ComputeOrientationError(const std::vector<PosePair>& poses) {
+  std::vector<double> angles_deg(poses.size(), 0.0);
+  double threshold_deg = 1.0;
+  for (int i = 0; i <= kNumTrimmedRefits; ++i) {
+    angles_deg = ComputeAnglesDeg(
+        poses, AlignOrientations(poses, angles_deg, threshold_deg));
+    threshold_deg = std::max(kTrimFactor * Median(angles_deg), kMinTrimDeg);
+  }
+  return Median(angles_deg);
 }
 
 // False when the positions do not determine the alignment.
@@ -215,6 +258,7 @@ StatusOr<Evaluation> EvaluatePoses(const NamedPoses& cams_from_world,
         "the images in common with the ground truth lie all in one place, so "
         "the model cannot be aligned to it");
   }
+  evaluation.orientation_median_deg = ComputeOrientationError(poses);
   evaluation.relative_pose_auc = ComputeAuc(poses);
   return evaluation;
 }

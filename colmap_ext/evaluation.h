@@ -70,6 +70,10 @@ struct Evaluation {
   // With scale 1: what a metric model is worth as it is.
   AlignmentErrors se3;
   AlignmentErrors se3_least_squares;
+  // After the rotation of the world that suits the orientations, robustly. The
+  // alignments above suit the positions, which on a straight road leave the
+  // turn about the road open.
+  double orientation_median_deg = 0.0;
   std::vector<RelativePoseAuc> relative_pose_auc;
 };
 

@@ -55,6 +55,8 @@ std::string FormatEvaluation(const Evaluation& evaluation) {
   text += FormatErrors("Sim3, least squares", evaluation.sim3_least_squares);
   text += FormatErrors("SE3, robust", evaluation.se3);
   text += FormatErrors("SE3, least squares", evaluation.se3_least_squares);
+  text += Format("orientations alone   median %.4f deg\n",
+                 evaluation.orientation_median_deg);
   text += "\nrelative poses, area under the recall curve in percent\n";
   text += Format("%-10s %9s %9s\n", "up to deg", "R", "t");
   for (const RelativePoseAuc& auc : evaluation.relative_pose_auc) {
@@ -76,7 +78,8 @@ std::string EvaluationToJson(const Evaluation& evaluation) {
       {"sim3", ErrorsToJson(evaluation.sim3)},
       {"sim3_least_squares", ErrorsToJson(evaluation.sim3_least_squares)},
       {"se3", ErrorsToJson(evaluation.se3)},
-      {"se3_least_squares", ErrorsToJson(evaluation.se3_least_squares)}};
+      {"se3_least_squares", ErrorsToJson(evaluation.se3_least_squares)},
+      {"orientation_median_deg", evaluation.orientation_median_deg}};
   for (const RelativePoseAuc& auc : evaluation.relative_pose_auc) {
     json["relative_pose_auc"].push_back(
         {{"threshold_deg", auc.threshold_deg},

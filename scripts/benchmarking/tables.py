@@ -71,7 +71,7 @@ def long_table(records):
         (name, name_of(method), e['num_images'], e['num_true_images'],
          structure if e['num_points'] else '- | - | -', sim3_error(record),
          e['se3_least_squares']['translation_rmse_m'], e['sim3']['scale'],
-         e['sim3']['rotation_mean_deg'], record['seconds'],
+         e['orientation_median_deg'], record['seconds'],
          record['cpu_seconds'], record['peak_mib'],
          ratio(sim3_error(record), sim3_error(limit)) if has_limit else '',
          ratio(record['seconds'], limit['seconds']) if has_limit else ''))
@@ -117,7 +117,7 @@ def accuracy_table(records, methods):
       records, ['N_c', 'N_p', 'dR deg', 'dt m', 'T'], methods,
       lambda r: ['%d' % r['evaluation']['num_images'],
                  '%d' % r['evaluation']['num_points'],
-                 '%.3f' % r['evaluation']['sim3']['rotation_mean_deg'],
+                 '%.3f' % r['evaluation']['orientation_median_deg'],
                  '%.3f' % sim3_error(r)])
 
 
