@@ -17,7 +17,7 @@ say "1/6 Rendering the world into $output (about 1 minute)"
 rm -rf "$output"
 mkdir -p "$output"
 "$colmap" adasfm_synthesizer --output_path "$output" --render 1 \
-  --num_images 60 --seed 1
+  --num_images 60 --seed 2
 database=$output/database.db
 camera=$(sed -nE 's/^ *intrinsics: *\[(.*)\]/\1/p' "$output/sensors.yaml" | tr -d ' ')
 
@@ -44,12 +44,17 @@ say '5/6 Partitioned mapping'
 "$colmap" adasfm_mapper --database_path "$database" \
   --input_path "$output/global/0" --output_path "$output/sparse"
 
+"$colmap" color_extractor --image_path "$output/images" \
+  --input_path "$output/sparse/0" --output_path "$output/sparse/0" \
+  > "$output/colors.log" 2>&1
+
 say '6/6 Comparing with the ground truth, drawing the report'
 "$colmap" adasfm_evaluator --input_path "$output/sparse/0" \
   --ground_truth_path "$output/gt.txt"
 "$colmap" adasfm_reporter --output_path "$output/report.html" \
   --input_path "$output/sparse/0" --coarse_path "$output/global/0" \
-  --database_path "$database" --ground_truth_path "$output/gt.txt"
+  --database_path "$database" --image_path "$output/images" \
+  --ground_truth_path "$output/gt.txt"
 
 cat <<TEXT
 

@@ -92,6 +92,9 @@ std::string OptionText(const T& value) {
   text << value;
   return text.str();
 }
+inline std::string OptionText(const std::string& value) {
+  return value.empty() ? "none" : value;
+}
 
 template <typename T>
 void CommandOptions::AddRequired(const std::string& name, T* value,

@@ -10,35 +10,67 @@
 #include <cstring>
 #include <filesystem>
 #include <iostream>
+#include <sstream>
 #include <string>
 
 #include "colmap_ext/commands/registry.h"
 
 namespace {
 
+namespace fs = std::filesystem;
+
+constexpr char kHostVariable[] = "ADASFM_HOST_COLMAP";
+
+bool IsProgram(const std::string& path) {
+  std::error_code error;
+  return fs::is_regular_file(path, error) && access(path.c_str(), X_OK) == 0;
+}
+
+// Handing over to ourselves would never end.
+bool IsThisProgram(const std::string& path) {
+  std::error_code error;
+  return fs::equivalent(path, "/proc/self/exe", error);
+}
+
+// The first colmap on the PATH that is another program; empty without one.
+std::string FindOnPath() {
+  const char* path = std::getenv("PATH");
+  std::istringstream folders(path == nullptr ? "" : path);
+  std::string folder;
+  while (std::getline(folders, folder, ':')) {
+    const std::string candidate = folder + "/colmap";
+    if (IsProgram(candidate) && !IsThisProgram(candidate)) return candidate;
+  }
+  return "";
+}
+
+// The host that the environment names, else the one that we were built with,
+// else the one on the PATH: a package does not know where it will be.
 std::string HostPath() {
-  const char* path = std::getenv("ADASFM_HOST_COLMAP");
-  return path != nullptr && *path != '\0' ? path : ADASFM_HOST_COLMAP;
+  const char* chosen = std::getenv(kHostVariable);
+  if (chosen != nullptr && *chosen != '\0') return chosen;
+  if (IsProgram(ADASFM_HOST_COLMAP)) return ADASFM_HOST_COLMAP;
+  const std::string found = FindOnPath();
+  return found.empty() ? ADASFM_HOST_COLMAP : found;
 }
 
 // Whether the host can be run; otherwise prints why not.
 bool CheckHost(const std::string& path) {
-  std::error_code error;
   const char* advice =
       "; set the environment variable ADASFM_HOST_COLMAP to COLMAP's own "
       "colmap";
-  if (!std::filesystem::is_regular_file(path, error) ||
-      access(path.c_str(), X_OK) != 0) {
+  if (!IsProgram(path)) {
     std::cerr << "ERROR: the host's colmap, " << path
               << ", is not an executable file" << advice << std::endl;
     return false;
   }
-  // Handing over to ourselves would never end.
-  if (std::filesystem::equivalent(path, "/proc/self/exe", error)) {
+  if (IsThisProgram(path)) {
     std::cerr << "ERROR: the host's colmap, " << path << ", is this program"
               << advice << std::endl;
     return false;
   }
+  // If the host is another of our kind, it must not hand back to us.
+  setenv(kHostVariable, path.c_str(), /*overwrite=*/1);
   return true;
 }
 

@@ -1,0 +1,119 @@
+# SPDX-License-Identifier: BSD-3-Clause
+
+# What `cmake --install` and CPack put where. Component `runtime` is the program
+# with its documentation, `dev` the libraries. The program is installed as
+# colmap-adasfm, so that it can stand beside another `colmap`; for those who want
+# one `colmap` with everything, lib/adasfm/bin/colmap is a link to it, in a folder
+# to put first on the PATH.
+include(GNUInstallDirs)
+include(CMakePackageConfigHelpers)
+
+set(layers core sensors global partition synthetic)
+set(adasfm_cmake_dir ${CMAKE_INSTALL_LIBDIR}/cmake/adasfm)
+
+# --- dev: libraries, headers, CMake package
+foreach(layer ${layers})
+  set_target_properties(adasfm_${layer} PROPERTIES EXPORT_NAME ${layer})
+  install(TARGETS adasfm_${layer} EXPORT adasfm-targets
+          ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT dev)
+  install(DIRECTORY ${PROJECT_SOURCE_DIR}/${layer}
+          DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/adasfm COMPONENT dev
+          FILES_MATCHING PATTERN "*.h")
+endforeach()
+install(EXPORT adasfm-targets NAMESPACE adasfm:: COMPONENT dev
+        DESTINATION ${adasfm_cmake_dir})
+configure_package_config_file(
+  ${CMAKE_CURRENT_LIST_DIR}/adasfm-config.cmake.in
+  ${PROJECT_BINARY_DIR}/adasfm-config.cmake
+  INSTALL_DESTINATION ${adasfm_cmake_dir})
+write_basic_package_version_file(
+  ${PROJECT_BINARY_DIR}/adasfm-config-version.cmake
+  COMPATIBILITY SameMinorVersion)
+install(FILES ${PROJECT_BINARY_DIR}/adasfm-config.cmake
+              ${PROJECT_BINARY_DIR}/adasfm-config-version.cmake
+        DESTINATION ${adasfm_cmake_dir} COMPONENT dev)
+
+if(NOT TARGET adasfm_launcher)
+  return()
+endif()
+set_target_properties(adasfm_colmap_ext PROPERTIES EXPORT_NAME colmap_ext)
+install(TARGETS adasfm_colmap_ext EXPORT adasfm-colmap-targets
+        ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT dev)
+install(EXPORT adasfm-colmap-targets NAMESPACE adasfm:: COMPONENT dev
+        DESTINATION ${adasfm_cmake_dir})
+install(DIRECTORY ${PROJECT_SOURCE_DIR}/colmap_ext
+        DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/adasfm COMPONENT dev
+        FILES_MATCHING PATTERN "*.h")
+
+# --- runtime: the program, its manual, completion and documentation
+install(PROGRAMS $<TARGET_FILE:adasfm_launcher>
+        DESTINATION ${CMAKE_INSTALL_BINDIR} RENAME colmap-adasfm
+        COMPONENT runtime)
+set(launcher_link ${PROJECT_BINARY_DIR}/install/colmap)
+file(MAKE_DIRECTORY ${PROJECT_BINARY_DIR}/install)
+file(RELATIVE_PATH link_target
+     ${CMAKE_INSTALL_FULL_LIBDIR}/adasfm/bin
+     ${CMAKE_INSTALL_FULL_BINDIR}/colmap-adasfm)
+file(CREATE_LINK ${link_target} ${launcher_link} SYMBOLIC)
+install(FILES ${launcher_link}
+        DESTINATION ${CMAKE_INSTALL_LIBDIR}/adasfm/bin COMPONENT runtime)
+
+find_package(Python3 REQUIRED COMPONENTS Interpreter)
+set(man_page ${PROJECT_BINARY_DIR}/install/colmap-adasfm.1.gz)
+add_custom_command(
+  OUTPUT ${man_page}
+  COMMAND Python3::Interpreter ${PROJECT_SOURCE_DIR}/packaging/make_man_page.py
+          $<TARGET_FILE:adasfm_launcher> ${PROJECT_VERSION} ${man_page}
+  DEPENDS adasfm_launcher ${PROJECT_SOURCE_DIR}/packaging/make_man_page.py
+          ${PROJECT_SOURCE_DIR}/packaging/command_help.py
+  COMMENT "Writing the manual page from the commands' own help")
+add_custom_target(adasfm_man_page ALL DEPENDS ${man_page})
+install(FILES ${man_page} DESTINATION ${CMAKE_INSTALL_MANDIR}/man1
+        COMPONENT runtime)
+install(FILES ${PROJECT_SOURCE_DIR}/packaging/colmap-adasfm.bash
+        DESTINATION ${CMAKE_INSTALL_DATADIR}/bash-completion/completions
+        RENAME colmap-adasfm COMPONENT runtime)
+set(doc_dir ${CMAKE_INSTALL_DATADIR}/doc/colmap-adasfm)
+install(FILES README.md CHANGELOG.md CITATION.cff DESTINATION ${doc_dir}
+        COMPONENT runtime)
+# Debian's form: the licence's text indented, its blank lines as dots.
+file(READ LICENSE license_text)
+string(REGEX REPLACE "\n\n" "\n.\n" license_text "${license_text}")
+string(REGEX REPLACE "\n([^\n])" "\n \\1" license_text "\n${license_text}")
+configure_file(packaging/copyright.in ${PROJECT_BINARY_DIR}/install/copyright
+               @ONLY)
+install(FILES ${PROJECT_BINARY_DIR}/install/copyright DESTINATION ${doc_dir}
+        COMPONENT runtime)
+install(DIRECTORY docs DESTINATION ${doc_dir} COMPONENT runtime)
+if(EXISTS ${PROJECT_SOURCE_DIR}/scripts/adasfm.sh)
+  install(PROGRAMS scripts/adasfm.sh DESTINATION ${doc_dir}/examples
+          COMPONENT runtime)
+endif()
+
+# --- CPack: colmap-adasfm_*.deb and libadasfm-dev_*.deb
+set(CPACK_GENERATOR DEB)
+set(CPACK_PACKAGE_NAME adasfm)
+set(CPACK_PACKAGE_VENDOR "AdaSfM")
+set(CPACK_PACKAGE_CONTACT "The AdaSfM for COLMAP authors")
+set(CPACK_PACKAGING_INSTALL_PREFIX /usr)
+set(CPACK_STRIP_FILES ON)
+set(CPACK_COMPONENTS_ALL runtime dev)
+set(CPACK_DEB_COMPONENT_INSTALL ON)
+set(CPACK_DEBIAN_FILE_NAME DEB-DEFAULT)
+set(CPACK_DEBIAN_PACKAGE_SECTION science)
+set(CPACK_DEBIAN_RUNTIME_PACKAGE_NAME colmap-adasfm)
+set(CPACK_DEBIAN_RUNTIME_PACKAGE_SHLIBDEPS ON)
+set(CPACK_DEBIAN_RUNTIME_PACKAGE_RECOMMENDS "colmap (>= 3.8), colmap (<< 3.9)")
+set(CPACK_COMPONENT_RUNTIME_DESCRIPTION
+  "Structure from Motion with IMU and wheel priors
+ The adasfm_* commands: priors from sensor logs, coarse global SfM and
+ partitioned mapping on ordinary COLMAP databases.")
+set(CPACK_DEBIAN_DEV_PACKAGE_NAME libadasfm-dev)
+set(CPACK_DEBIAN_DEV_PACKAGE_SECTION libdevel)
+set(CPACK_DEBIAN_DEV_PACKAGE_DEPENDS
+  "libeigen3-dev, libceres-dev, libyaml-cpp-dev, libmetis-dev, libopencv-dev, nlohmann-json3-dev")
+set(CPACK_COMPONENT_DEV_DESCRIPTION
+  "AdaSfM, libraries and headers
+ Sensor fusion, rotation and translation averaging and graph partition for
+ Structure from Motion, with a CMake package.")
+include(CPack)

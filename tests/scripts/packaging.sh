@@ -1,0 +1,118 @@
+#!/usr/bin/env bash
+# SPDX-License-Identifier: BSD-3-Clause
+# Installs the build into a temporary folder and uses what is there as others
+# would, then makes the Debian packages and looks into them:
+#   packaging.sh BUILD_DIR COLMAP_DIR
+set -euo pipefail
+build=$1
+colmap_dir=$2
+here=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
+work=$(mktemp -d)
+trap 'rm -rf "$work"' EXIT
+
+fail() { echo "packaging: $*" >&2; exit 1; }
+
+echo '== cmake --install'
+cmake --install "$build" --prefix "$work/root" > /dev/null
+for file in bin/colmap-adasfm lib/adasfm/bin/colmap \
+  share/man/man1/colmap-adasfm.1.gz include/adasfm/core/rigid3d.h \
+  include/adasfm/colmap_ext/adasfm_pipeline.h lib/libadasfm_core.a \
+  lib/cmake/adasfm/adasfm-config.cmake share/doc/colmap-adasfm/README.md \
+  share/doc/colmap-adasfm/docs/math.md share/doc/colmap-adasfm/copyright \
+  share/bash-completion/completions/colmap-adasfm; do
+  [ -e "$work/root/$file" ] || fail "$file is not installed"
+done
+if grep -rlE "$build|${colmap_dir%/share/colmap}" "$work/root/lib/cmake"; then
+  fail 'the files above hold paths of the machine that built them'
+fi
+program=$work/root/bin/colmap-adasfm
+commands=$("$program" help 2> /dev/null | sed -nE 's/^  (adasfm_\w+) .*/\1/p')
+[ -n "$commands" ] || fail 'the installed program lists no commands'
+[ "$("$work/root/lib/adasfm/bin/colmap" adasfm_mapper -h)" = \
+  "$("$program" adasfm_mapper -h)" ] || fail 'the launcher is another program'
+
+echo '== manual page and completion against the help'
+zcat "$work/root/share/man/man1/colmap-adasfm.1.gz" | sed 's/\\-/-/g' \
+  > "$work/page"
+# shellcheck disable=SC1091
+source "$work/root/share/bash-completion/completions/colmap-adasfm"
+# complete WORDS...: what completion offers for the last of them.
+complete_words() {
+  COMP_WORDS=("$@")
+  COMP_CWORD=$(($# - 1))
+  _colmap_adasfm
+  printf '%s\n' "${COMPREPLY[@]}"
+}
+complete_words "$program" '' > "$work/offered"
+for command in $commands; do
+  grep -qx "$command" "$work/offered" || fail "$command is not completed"
+  grep -qx ".SS $command" "$work/page" || fail "$command has no manual"
+done
+for command in $commands; do
+  options=$("$program" "$command" -h | grep -oE '^  (-h \[ )?--[A-Za-z0-9_.]+' |
+    grep -oE -- '--.*')
+  [ "$(wc -l <<< "$options")" -ge 4 ] || fail "$command has no options"
+  complete_words "$program" "$command" -- > "$work/offered"
+  sed -n "/^\.SS $command$/,/^\.S[SH] /p" "$work/page" > "$work/section"
+  for option in $options; do
+    grep -qxe "$option" "$work/offered" || fail "$command $option is not completed"
+    grep -qFe "\\fB$option\\fR" "$work/section" ||
+      fail "$command $option is not in the manual"
+  done
+done
+
+echo '== find_package(adasfm)'
+cmake -S "$here/consumer" -B "$work/consumer" \
+  -DCMAKE_PREFIX_PATH="$work/root" -DCOLMAP_DIR="$colmap_dir" \
+  -DCMAKE_BUILD_TYPE=Release > "$work/log" 2>&1 ||
+  { tail -n 20 "$work/log" >&2; fail 'the consumer is not configured'; }
+cmake --build "$work/consumer" > "$work/log" 2>&1 ||
+  { tail -n 20 "$work/log" >&2; fail 'the consumer is not built'; }
+"$work/consumer/consumer" > /dev/null || fail 'the consumer fails'
+
+echo '== Debian packages'
+(cd "$build" && cpack -G DEB -B "$work/packages") > "$work/log" 2>&1 ||
+  { tail -n 20 "$work/log" >&2; fail 'cpack fails'; }
+runtime=$(echo "$work"/packages/colmap-adasfm_*.deb)
+dev=$(echo "$work"/packages/libadasfm-dev_*.deb)
+dpkg-deb -c "$runtime" > "$work/contents"
+dpkg-deb -c "$dev" > "$work/dev-contents"
+for file in usr/bin/colmap-adasfm usr/lib/adasfm/bin/colmap \
+  usr/share/man/man1/colmap-adasfm.1.gz usr/share/doc/colmap-adasfm/copyright; do
+  grep -qE " \./$file( |$)" "$work/contents" || fail "$runtime lacks $file"
+done
+# Debian's package colmap owns these names and folders.
+if grep -E ' \./usr/(bin/colmap|share/(doc/colmap|applications/.*|man/man1/colmap\.1\.gz))$' \
+  "$work/contents" "$work/dev-contents"; then
+  fail 'the files above belong to the package colmap'
+fi
+if grep -E '\.a$|/include/' "$work/contents"; then
+  fail 'the files above belong to the package libadasfm-dev'
+fi
+grep -q ' ./usr/lib/libadasfm_core.a' "$work/dev-contents" ||
+  fail "$dev lacks the libraries"
+dpkg-deb -f "$runtime" Depends | grep -q 'libopencv-core' ||
+  fail 'the dependencies of the program are missing'
+dpkg -x "$runtime" "$work/deb"
+"$work/deb/usr/bin/colmap-adasfm" adasfm_mapper -h | grep -q 'Options:' ||
+  fail 'the packaged program does not run'
+# Where the COLMAP that it was built with is not there, it takes the one on the
+# PATH, and not itself.
+python3 - "$work/deb/usr/bin/colmap-adasfm" "${colmap_dir%/share/colmap}/bin/colmap" << 'PYTHON'
+import pathlib, sys
+program, host = pathlib.Path(sys.argv[1]), sys.argv[2].encode()
+data = program.read_bytes()
+assert host in data
+program.write_bytes(data.replace(host, b'/nowhere'.ljust(len(host), b'x')))
+PYTHON
+mkdir "$work/host"
+printf '#!/bin/sh\necho "host $*"\n' > "$work/host/colmap"
+chmod +x "$work/host/colmap"
+[ "$(PATH="$work/deb/usr/lib/adasfm/bin:$work/host:$PATH" colmap mapper x)" = \
+  'host mapper x' ] || fail 'the packaged program does not find the host'
+if PATH="$work/deb/usr/lib/adasfm/bin:/usr/sbin:/sbin" ADASFM_HOST_COLMAP='' \
+  "$work/deb/usr/bin/colmap-adasfm" mapper 2> "$work/log"; then
+  fail 'without a host the program should fail'
+fi
+grep -q ADASFM_HOST_COLMAP "$work/log" || fail 'nothing says that the host is missing'
+echo 'packaging: ok'
