@@ -92,6 +92,7 @@ std::string PriorImportToJson(const PriorImport& import) {
       {"distance_m", summary.distance_m},
       {"drift_per_100m_m", summary.drift_per_100m_m},
       {"drift_per_100m_deg", summary.drift_per_100m_deg},
+      {"seconds", import.seconds},
       {"warnings", import.warnings}};
   json["wheel_slips"] = nlohmann::ordered_json::array();
   for (const WheelSlip& slip : summary.wheel_slips) {

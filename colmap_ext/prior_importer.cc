@@ -2,6 +2,7 @@
 #include "colmap_ext/prior_importer.h"
 
 #include <algorithm>
+#include <chrono>
 #include <map>
 #include <tuple>
 #include <utility>
@@ -227,6 +228,7 @@ StatusOr<PriorImport> ComputePriorImport(const PriorImportPaths& paths,
   const StatusOr<SensorCalibration> calibration =
       ReadSensorCalibration(paths.sensors_path);
   if (!calibration.ok()) return calibration.status();
+  const auto start = std::chrono::steady_clock::now();
   PriorImport import;
   SensorLogs logs;
   status = ReadLogs(paths, *calibration, &logs, &import.warnings);
@@ -252,6 +254,9 @@ StatusOr<PriorImport> ComputePriorImport(const PriorImportPaths& paths,
   import.summary = std::move(estimate->summary);
   import.warnings.insert(import.warnings.end(), import.summary.warnings.begin(),
                          import.summary.warnings.end());
+  import.seconds =
+      std::chrono::duration<double>(std::chrono::steady_clock::now() - start)
+          .count();
   return import;
 }
 

@@ -35,6 +35,7 @@ struct PriorImport {
   int num_visual_rotations = 0;
   // Of the import and of the sensors.
   std::vector<std::string> warnings;
+  double seconds = 0.0;  // that it took
 };
 
 // (1) Reads the scene, the calibration and the logs, (2) gives the images their

@@ -119,6 +119,8 @@ std::vector<StageTime> ListStageTimes(const ReportSummaries& summaries) {
                             double seconds) {
     if (std::isfinite(seconds)) times.push_back({stage, step, seconds});
   };
+  add("import", "priors from the logs",
+      NumberAt(summaries.importer, "seconds"));
   for (const Json& step : ListAt(summaries.global, "steps")) {
     add("global", TextAt(step, "name"), NumberAt(step, "seconds"));
   }

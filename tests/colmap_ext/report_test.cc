@@ -155,8 +155,9 @@ class ReportTest : public CommandLineTest {
     std::filesystem::create_directories(folder_.File("sparse/checkpoints"));
     folder_.Write("sparse/checkpoints/plan.json",
                   R"({"parts": [[1, 2, 3], [3, 4]]})");
-    folder_.Write("database.db.priors.json",
-                  R"({"imu_rate_hz": 200.0, "warnings": ["a < b"]})");
+    folder_.Write(
+        "database.db.priors.json",
+        R"({"imu_rate_hz": 200.0, "seconds": 0.5, "warnings": ["a < b"]})");
   }
 
   ReportOptions AllInputs() const {
@@ -179,7 +180,7 @@ TEST_F(ReportTest, IsSelfContainedAndHoldsTheFigures) {
   ExpectSelfContained(*page);
   for (const std::string figure :
        {"25 of 25", "<b>100</b>", "1.00", "0.25 px", "RMSE of the points",
-        "0.000 m", "3.8 s", "5 &lt;pairs&gt; tested",
+        "0.000 m", "4.2 s", "5 &lt;pairs&gt; tested",
         "does not fit the coarse model", "a &lt; b", "200 Hz", "1 lines of"}) {
     EXPECT_NE(page->find(figure), std::string::npos) << figure;
   }
