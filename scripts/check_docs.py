@@ -151,8 +151,9 @@ class Checker:
         for command in self.commands.values():
             for option in command.options:
                 where = '%s --%s' % (command.name, option.name)
-                if not option.help:
-                    fail(where, 'has no help')
+                # One word, or values alone, explain nothing.
+                if len(re.findall(r'[a-z]{2,}', option.help)) < 3:
+                    fail(where, 'is not explained by: ' + option.help)
                 if (option.default is None and '(required)' not in option.help
                         and option.name not in ('help', 'project_path')):
                     fail(where, 'has no default and is not required')

@@ -149,6 +149,10 @@ def check_space(browser):
     webdriver.ActionChains(browser).drag_and_drop_by_offset(
         canvas, 60, 20).perform()
     is_new('dragging')
+    browser.execute_script(
+        'document.getElementById("space").dispatchEvent(new WheelEvent('
+        '"wheel", {deltaY: -80, ctrlKey: true, cancelable: true}))')
+    is_new('the wheel')
     canvas.send_keys(webdriver.Keys.ARROW_LEFT)
     is_new('an arrow key')
     browser.find_element(By.ID, 'show-points').click()

@@ -44,10 +44,10 @@ void AddOptions(GlobalCommandOptions* options, CommandOptions* command) {
       &stage->structure.tracks.min_num_tracks_per_image,
       "tracks are taken while an image has fewer");
   add("max_num_tracks", &stage->structure.tracks.max_num_tracks,
-      "bound of the tracks (-1: none)");
+      "largest number of tracks; -1: no bound");
   add("ba_refine_focal_length", &stage->structure.bundle.refine_focal_length,
-      "0/1");
-  add("num_threads", &stage->num_threads, "-1: all of the machine's");
+      "adjust focal lengths too");
+  add("num_threads", &stage->num_threads, "threads; -1: all of the machine's");
   // What each step buys: ablations.
   add("use_sdp_start", &stage->poses.rotations.use_sdp_start,
       "start the rotations from the SDP");

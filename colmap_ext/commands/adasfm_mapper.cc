@@ -46,21 +46,25 @@ void AddPartitionOptions(MapperStageOptions* options, CommandOptions* command) {
 void AddAlignOptions(AlignSimilarityOptions* align, CommandOptions* command) {
   command->AddDefault("AdaSfmAlign.initial_threshold",
                       &align->initial_threshold,
-                      "tau_init [m, or median image distances]");
+                      "tau_init: first threshold [m, or median distances of "
+                      "neighbouring images]");
   command->AddDefault("AdaSfmAlign.threshold_increase",
-                      &align->threshold_increase, "alpha_inc, same unit");
+                      &align->threshold_increase,
+                      "alpha_inc: step by which it rises [as tau_init]");
   command->AddDefault("AdaSfmAlign.threshold_decrease",
-                      &align->threshold_decrease, "alpha_dec, same unit");
+                      &align->threshold_decrease,
+                      "alpha_dec: step by which it falls [as tau_init]");
   command->AddDefault("AdaSfmAlign.min_threshold", &align->min_threshold,
-                      "no threshold falls below this, same unit");
+                      "no threshold falls below this [as tau_init]");
   command->AddDefault("AdaSfmAlign.min_inlier_ratio", &align->min_inlier_ratio,
                       "r_min: a part below it is not merged");
   command->AddDefault("AdaSfmAlign.max_inlier_ratio", &align->max_inlier_ratio,
                       "r_max: from it on the threshold is lowered");
   command->AddDefault("AdaSfmAlign.max_num_iterations",
-                      &align->max_num_iterations, "thresholds tried");
-  command->AddDefault("AdaSfmAlign.adapt_threshold", &align->adapt_threshold,
-                      "0: tau_init is used as it is");
+                      &align->max_num_iterations, "thresholds tried at most");
+  command->AddDefault(
+      "AdaSfmAlign.adapt_threshold", &align->adapt_threshold,
+      "let the threshold rise and fall; 0: tau_init is used as it is");
 }
 
 void AddMapperOptions(MapperCommandOptions* options, CommandOptions* command) {
@@ -69,9 +73,9 @@ void AddMapperOptions(MapperCommandOptions* options, CommandOptions* command) {
                              const std::string& help) {
     command->AddDefault("AdaSfmMapper." + name, value, help);
   };
-  add("stage", &options->stage, "all, plan, part or merge");
+  add("stage", &options->stage, "what to run: all, plan, part or merge");
   add("part_index", &options->part_index,
-      "the part of --AdaSfmMapper.stage part");
+      "which part --AdaSfmMapper.stage part makes, from 0");
   add("min_num_visible_points", &local.registration.min_num_visible_points,
       "v_p: points that an image must see");
   add("max_reproj_error_px", &local.registration.max_reproj_error_px,
@@ -96,15 +100,16 @@ void AddMapperOptions(MapperCommandOptions* options, CommandOptions* command) {
   add("global_adjustment_growth", &local.global_adjustment_growth,
       "a part is adjusted as a whole when it has grown by this factor");
   add("refine_focal_length", &options->refine_focal_length,
-      "0, 1, or -1: when the camera's focal length is not known");
+      "adjust focal lengths at the end: 0, 1, or -1: when they are not known");
   add("refine_principal_point", &options->mapper.refine.refine_principal_point,
       "adjust principal points at the end");
   add("refine_extra_params", &options->refine_extra_params,
-      "0, 1, or -1: when the camera's focal length is not known");
+      "adjust distortion at the end: 0, 1, or -1: when the focal length is not "
+      "known");
   add("max_num_parallel_parts", &options->mapper.max_num_parallel_parts,
-      "-1: as threads and memory allow");
+      "parts at a time; -1: as threads and memory allow");
   command->AddDefault("num_threads", &options->mapper.num_threads,
-                      "-1: all of the machine");
+                      "threads; -1: all of the machine's");
 }
 
 Status CheckPaths(const MapperCommandOptions& options) {

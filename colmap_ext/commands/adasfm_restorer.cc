@@ -13,7 +13,8 @@ Status RunAdasfmRestorer(int argc, char** argv) {
       "adasfm_restorer",
       "Puts the two-view geometries back that adasfm_global rewrote, byte for "
       "byte.");
-  command.AddRequired("database_path", &database_path, "COLMAP database");
+  command.AddRequired("database_path", &database_path,
+                      "COLMAP database that adasfm_global rewrote");
   const Status parsed = command.Parse(argc, argv);
   if (!parsed.ok() || command.HelpShown()) return parsed;
 

@@ -35,9 +35,11 @@ void AddOptions(SynthesizerOptions* options, CommandOptions* command) {
   command->AddDefault("trajectory", &options->trajectory,
                       "town (bends and revisits) or straight");
   command->AddDefault("camera_model", &options->camera_model,
-                      "PINHOLE or OPENCV_FISHEYE");
-  command->AddDefault("image_width", &world->image_width, "[px]");
-  command->AddDefault("image_height", &world->image_height, "[px]");
+                      "camera of the drive: PINHOLE or OPENCV_FISHEYE");
+  command->AddDefault("image_width", &world->image_width,
+                      "width of an image [px]");
+  command->AddDefault("image_height", &world->image_height,
+                      "height of an image [px]");
   command->AddDefault("num_keypoints", &world->num_keypoints_per_image,
                       "keypoints per image of the database");
   command->AddDefault("pixel_noise", &world->pixel_noise_px,

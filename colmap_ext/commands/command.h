@@ -4,6 +4,7 @@
 #include <boost/program_options.hpp>
 #include <sstream>
 #include <string>
+#include <type_traits>
 
 #include "core/status.h"
 
@@ -96,6 +97,15 @@ inline std::string OptionText(const std::string& value) {
   return value.empty() ? "none" : value;
 }
 
+// The help, which says of a switch what may be given.
+template <typename T>
+std::string OptionHelp(const std::string& help) {
+  const bool is_switch = std::is_same_v<T, bool>;
+  return is_switch && help.find("0 or 1") == std::string::npos
+             ? help + " (0 or 1)"
+             : help;
+}
+
 template <typename T>
 void CommandOptions::AddRequired(const std::string& name, T* value,
                                  const std::string& help) {
@@ -110,7 +120,7 @@ void CommandOptions::AddDefault(const std::string& name, T* value,
   options_.add_options()(name.c_str(),
                          boost::program_options::value<T>(value)->default_value(
                              *value, OptionText(*value)),
-                         help.c_str());
+                         OptionHelp<T>(help).c_str());
 }
 
 }  // namespace adasfm
