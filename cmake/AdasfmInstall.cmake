@@ -106,14 +106,14 @@ set(CPACK_DEBIAN_RUNTIME_PACKAGE_SHLIBDEPS ON)
 set(CPACK_DEBIAN_RUNTIME_PACKAGE_RECOMMENDS "colmap (>= 3.8), colmap (<< 3.9)")
 set(CPACK_COMPONENT_RUNTIME_DESCRIPTION
   "Structure from Motion with IMU and wheel priors
- The adasfm_* commands: priors from sensor logs, coarse global SfM and
- partitioned mapping on ordinary COLMAP databases.")
+The adasfm_* commands: priors from sensor logs, coarse global SfM and
+partitioned mapping on ordinary COLMAP databases.")
 set(CPACK_DEBIAN_DEV_PACKAGE_NAME libadasfm-dev)
 set(CPACK_DEBIAN_DEV_PACKAGE_SECTION libdevel)
 set(CPACK_DEBIAN_DEV_PACKAGE_DEPENDS
   "libeigen3-dev, libceres-dev, libyaml-cpp-dev, libmetis-dev, libopencv-dev, nlohmann-json3-dev")
 set(CPACK_COMPONENT_DEV_DESCRIPTION
   "AdaSfM, libraries and headers
- Sensor fusion, rotation and translation averaging and graph partition for
- Structure from Motion, with a CMake package.")
+Sensor fusion, rotation and translation averaging and graph partition for
+Structure from Motion, with a CMake package.")
 include(CPack)

@@ -96,7 +96,7 @@ std::vector<ReportFigure> ListFigures(const ReportInput& input) {
   const std::vector<StageTime> times = ListStageTimes(input.summaries);
   if (!times.empty()) {
     figures.push_back({"Time", FormatNumber("%.1f s", TotalSeconds(times)),
-                       "import, global and mapper"});
+                       "of the steps below"});
   }
   return figures;
 }

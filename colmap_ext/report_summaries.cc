@@ -10,11 +10,12 @@ namespace {
 
 using Json = nlohmann::json;
 
-Json ReadJson(const std::string& path, std::vector<std::string>* notes) {
+Json ReadJson(const std::string& path, Json::value_t type,
+              std::vector<std::string>* notes) {
   std::ifstream file(path);
   if (!file) return Json();
   Json json = Json::parse(file, nullptr, /*allow_exceptions=*/false);
-  if (json.is_object()) return json;
+  if (json.type() == type) return json;
   notes->push_back(path + " is not a complete JSON file and was left out");
   return Json();
 }
@@ -87,15 +88,21 @@ ReportSummaries ReadReportSummaries(const std::string& database_path,
   ReportSummaries summaries;
   std::vector<std::string>* notes = &summaries.notes;
   if (!database_path.empty()) {
-    summaries.importer = ReadJson(database_path + ".priors.json", notes);
+    summaries.importer =
+        ReadJson(database_path + ".priors.json", Json::value_t::object, notes);
   }
   if (!coarse_folder.empty()) {
-    summaries.global = ReadJson(coarse_folder + "/summary.json", notes);
+    summaries.global =
+        ReadJson(coarse_folder + "/summary.json", Json::value_t::object, notes);
   }
   if (!mapper_folder.empty()) {
-    summaries.mapper = ReadJson(mapper_folder + "/summary.json", notes);
+    summaries.mapper =
+        ReadJson(mapper_folder + "/summary.json", Json::value_t::object, notes);
     summaries.parts =
-        PartsOfPlan(ReadJson(mapper_folder + "/checkpoints/plan.json", notes));
+        PartsOfPlan(ReadJson(mapper_folder + "/checkpoints/plan.json",
+                             Json::value_t::object, notes));
+    summaries.steps =
+        ReadJson(mapper_folder + "/../steps.json", Json::value_t::array, notes);
   }
   return summaries;
 }
@@ -119,6 +126,13 @@ std::vector<StageTime> ListStageTimes(const ReportSummaries& summaries) {
                             double seconds) {
     if (std::isfinite(seconds)) times.push_back({stage, step, seconds});
   };
+  // Our own stages say themselves what they took.
+  for (const Json& step : summaries.steps) {
+    const std::string name = TextAt(step, "name");
+    if (name == "features" || name == "matching") {
+      add("COLMAP", name, NumberAt(step, "seconds"));
+    }
+  }
   add("import", "priors from the logs",
       NumberAt(summaries.importer, "seconds"));
   for (const Json& step : ListAt(summaries.global, "steps")) {

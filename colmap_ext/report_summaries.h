@@ -17,6 +17,7 @@ struct ReportSummaries {
   nlohmann::json importer;  // <database>.priors.json
   nlohmann::json global;    // summary.json beside the coarse model
   nlohmann::json mapper;    // summary.json beside the model
+  nlohmann::json steps;     // steps.json of the workspace above the model
   // Image ids of the mapper's parts, of its checkpoints' plan.
   std::vector<std::vector<image_t>> parts;
   std::vector<std::string> notes;

@@ -155,6 +155,9 @@ class ReportTest : public CommandLineTest {
     std::filesystem::create_directories(folder_.File("sparse/checkpoints"));
     folder_.Write("sparse/checkpoints/plan.json",
                   R"({"parts": [[1, 2, 3], [3, 4]]})");
+    folder_.Write("steps.json",
+                  R"([{"name": "matching", "seconds": 3.0},
+                      {"name": "model", "seconds": 9.0}, 7])");
     folder_.Write(
         "database.db.priors.json",
         R"({"imu_rate_hz": 200.0, "seconds": 0.5, "warnings": ["a < b"]})");
@@ -180,7 +183,7 @@ TEST_F(ReportTest, IsSelfContainedAndHoldsTheFigures) {
   ExpectSelfContained(*page);
   for (const std::string figure :
        {"25 of 25", "<b>100</b>", "1.00", "0.25 px", "RMSE of the points",
-        "0.000 m", "4.2 s", "5 &lt;pairs&gt; tested",
+        "0.000 m", "7.2 s", "5 &lt;pairs&gt; tested",
         "does not fit the coarse model", "a &lt; b", "200 Hz", "1 lines of"}) {
     EXPECT_NE(page->find(figure), std::string::npos) << figure;
   }
@@ -267,6 +270,7 @@ TEST_F(ReportTest, LeavesOutWhatIsNotGiven) {
 
 TEST_F(ReportTest, SummariesThatAreCutShortAreNamed) {
   folder_.Write("sparse/summary.json", "{\"parts\": [");
+  folder_.Write("steps.json", "[{");
   folder_.Write("global/summary.json", "{\"steps\": 3, \"models\": [1]}");
   folder_.Write("database.db.priors.json", "{\"imu_rate_hz\": \"fast\"}");
   folder_.Write("sparse/checkpoints/plan.json", "{\"parts\": [1, [-1, 99]]}");
