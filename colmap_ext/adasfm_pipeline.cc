@@ -3,11 +3,14 @@
 
 #include <unistd.h>
 
+#include <algorithm>
 #include <chrono>
 #include <sstream>
+#include <utility>
 
 #include "colmap_ext/commands/command.h"
 #include "colmap_ext/global_report.h"
+#include "colmap_ext/host/model.h"
 #include "colmap_ext/host/pose_conversion.h"
 #include "colmap_ext/model_folder.h"
 #include "colmap_ext/two_view_geometry_backup.h"
@@ -60,9 +63,7 @@ Status WriteGlobalResult(const GlobalStageOptions& options,
   return status;
 }
 
-// The poses of a coarse model, whose images must be the scene's.
-StatusOr<CoarsePoseMap> ReadCoarsePoses(const std::string& path,
-                                        const SceneData& scene) {
+Status CheckCoarseModel(const std::string& path) {
   for (const char* name : {"cameras", "images", "points3D"}) {
     const std::string file = path + "/" + name;
     if (access((file + ".bin").c_str(), R_OK) != 0 &&
@@ -71,11 +72,17 @@ StatusOr<CoarsePoseMap> ReadCoarsePoses(const std::string& path,
                            ".bin is missing; run adasfm_global first");
     }
   }
-  colmap::Reconstruction reconstruction;
-  reconstruction.Read(path);
-  const CoarsePoseMap poses = CamsFromWorld(reconstruction);
+  return Status::Ok();
+}
+
+// The poses of a coarse model, whose images must be the scene's.
+StatusOr<CoarsePoseMap> ReadCoarsePoses(const std::string& path,
+                                        const SceneData& scene) {
+  const StatusOr<colmap::Reconstruction> reconstruction = ReadModel(path);
+  if (!reconstruction.ok()) return reconstruction.status();
+  const CoarsePoseMap poses = CamsFromWorld(*reconstruction);
   for (const auto& [image_id, pose] : poses) {
-    const std::string& name = reconstruction.Image(image_id).Name();
+    const std::string& name = reconstruction->Image(image_id).Name();
     const auto image = scene.images.find(image_id);
     if (image == scene.images.end() || image->second.name != name) {
       return Status::Error("image " + name + " of the coarse model " + path +
@@ -83,28 +90,95 @@ StatusOr<CoarsePoseMap> ReadCoarsePoses(const std::string& path,
                            "model that adasfm_global made from it");
     }
   }
+  if (poses.size() < 2) {
+    return Status::Error("the coarse model " + path +
+                         " has fewer than two images");
+  }
   return poses;
+}
+
+// The stage's options for this scene's cameras, with the thresholds that local
+// mapping and refinement share.
+MapperStageOptions ResolveOptions(const MapOptions& options,
+                                  const SceneData& scene) {
+  const bool is_calibrated = std::all_of(
+      scene.cameras.begin(), scene.cameras.end(),
+      [](const auto& entry) { return entry.second.HasPriorFocalLength(); });
+  const auto resolve = [is_calibrated](int choice) {
+    return choice < 0 ? !is_calibrated : choice != 0;
+  };
+  MapperStageOptions stage = options.stage;
+  stage.refine.refine_focal_length = resolve(options.refine_focal_length);
+  stage.refine.refine_extra_params = resolve(options.refine_extra_params);
+  const LocalMapperOptions& local = stage.local;
+  stage.refine.use_priors_in_adjustment = local.use_priors_in_adjustment;
+  stage.refine.filter_max_reproj_error_px = local.filter_max_reproj_error_px;
+  stage.refine.min_triangulation_angle_deg = local.min_triangulation_angle_deg;
+  stage.refine.keypoint_sigma_px = local.keypoint_sigma_px;
+  stage.refine.balance = local.balance;
+  return stage;
+}
+
+Status MergeAndWrite(const std::string& output_path, MapperStage* stage) {
+  const StatusOr<colmap::Reconstruction> model =
+      stage->Merge(/*require_all_parts=*/true);
+  if (!model.ok()) return model.status();
+  const Status status = WriteModelFolder(output_path, {&*model});
+  if (!status.ok()) return status;
+  return WriteTextFile(output_path + "/summary.json",
+                       FormatMapperSummaryJson(stage->Summary()));
+}
+
+Status RunMapperSteps(const MapRequest& request, MapperStage* stage) {
+  switch (request.steps) {
+    case MapperSteps::kPlan:
+      return stage->Plan();
+    case MapperSteps::kPart:
+      return stage->RunPart(request.part_index);
+    case MapperSteps::kMerge:
+      return MergeAndWrite(request.output_path, stage);
+    case MapperSteps::kAll:
+      break;
+  }
+  Status status = stage->Plan();
+  if (status.ok()) status = stage->RunAllParts();
+  if (status.ok()) status = MergeAndWrite(request.output_path, stage);
+  return status;
 }
 
 }  // namespace
 
-bool AdaSfmOptions::IsValid(std::string* error) const {
-  return priors.IsValid(error) && global.IsValid(error) &&
-         mapper.IsValid(error);
+bool MapOptions::IsValid(std::string* error) const {
+  const std::pair<const char*, int> choices[] = {
+      {"refine_focal_length", refine_focal_length},
+      {"refine_extra_params", refine_extra_params}};
+  for (const auto& [name, value] : choices) {
+    if (value >= -1 && value <= 1) continue;
+    *error = std::string("AdaSfmMapper.") + name + " = " +
+             std::to_string(value) + " must be -1, 0 or 1";
+    return false;
+  }
+  return stage.IsValid(error);
 }
 
 StatusOr<PriorImport> ImportPriors(const PriorImportOptions& options,
-                                   const PriorImportPaths& paths) {
+                                   const PriorImportPaths& paths,
+                                   const std::string& summary_path) {
   StatusOr<PriorImport> import = ComputePriorImport(paths, options);
   if (!import.ok()) return import;
-  const Status status = WritePriorTables(paths.database_path, import->tables);
+  // The database comes last: an error before leaves it as it was.
+  Status status =
+      WriteTextFile(summary_path, PriorImportToJson(*import) + "\n");
+  if (status.ok()) {
+    status = WritePriorTables(paths.database_path, import->tables);
+  }
   if (!status.ok()) return status;
   return import;
 }
 
 StatusOr<CoarseModelReport> EstimateCoarseModel(
     const GlobalStageOptions& options, const std::string& database_path,
-    const std::string& output_path, const PipelineProgress& progress) {
+    const std::string& output_path, const ProgressCallback& progress) {
   const auto start = std::chrono::steady_clock::now();
   const auto seconds = [start] {
     return std::chrono::duration<double>(std::chrono::steady_clock::now() -
@@ -147,35 +221,28 @@ StatusOr<CoarseModelReport> EstimateCoarseModel(
   return report;
 }
 
-StatusOr<MapReport> MapParts(const MapperStageOptions& options,
-                             const std::string& database_path,
-                             const std::string& input_path,
-                             const std::string& output_path,
-                             const PipelineProgress& progress) {
+StatusOr<MapReport> MapParts(const MapOptions& options,
+                             const MapRequest& request,
+                             const ProgressCallback& progress) {
   Status status = CheckOptions(options);
-  if (status.ok()) status = PrepareOutputFolder(output_path);
+  if (status.ok()) status = CheckDatabase(request.database_path);
+  if (status.ok()) status = CheckCoarseModel(request.input_path);
+  if (status.ok()) status = PrepareOutputFolder(request.output_path);
   if (!status.ok()) return status;
-  const StatusOr<SceneData> scene = ReadSceneData(database_path, {});
+  const StatusOr<SceneData> scene = ReadSceneData(request.database_path, {});
   if (!scene.ok()) return scene.status();
-  const StatusOr<CoarsePoseMap> coarse = ReadCoarsePoses(input_path, *scene);
+  const StatusOr<CoarsePoseMap> coarse =
+      ReadCoarsePoses(request.input_path, *scene);
   if (!coarse.ok()) return coarse.status();
 
   MapReport report;
   report.warnings = scene->warnings;
   if (scene->priors.empty()) report.warnings.push_back(kNoPriorsWarning);
-  MapperStage stage(options, *scene, *coarse, output_path, progress);
-  status = stage.Plan();
-  if (status.ok()) status = stage.RunAllParts();
+  MapperStage stage(ResolveOptions(options, *scene), *scene, *coarse,
+                    request.output_path, progress);
+  status = RunMapperSteps(request, &stage);
   if (!status.ok()) return status;
-  const StatusOr<colmap::Reconstruction> model = stage.Merge(true);
-  if (!model.ok()) return model.status();
   report.summary = stage.Summary();
-  status = WriteModelFolder(output_path, {&*model});
-  if (status.ok()) {
-    status = WriteTextFile(output_path + "/summary.json",
-                           FormatMapperSummaryJson(report.summary));
-  }
-  if (!status.ok()) return status;
   return report;
 }
 

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <functional>
 #include <string>
 #include <vector>
 
 #include "colmap_ext/global_stage.h"
 #include "colmap_ext/mapper_stage.h"
 #include "colmap_ext/prior_importer.h"
+#include "core/progress.h"
 #include "core/status.h"
 
 namespace adasfm {
@@ -34,20 +34,15 @@ namespace adasfm {
 //        3.2 incremental SfM per part       3.4 merge and refine the whole
 //
 // The equations stand in docs/math.md, the files in docs/formats.md.
-struct AdaSfmOptions {
-  PriorImportOptions priors;
-  GlobalStageOptions global;
-  MapperStageOptions mapper;
+// Around them adasfm_pair_generator chooses the pairs to match, and
+// adasfm_automatic_reconstructor runs everything from a folder of photos
+// (automatic_reconstruction.h).
 
-  bool IsValid(std::string* error) const;
-};
-
-// One line of text and the share of the stage that is done.
-using PipelineProgress = std::function<void(const std::string&, double)>;
-
-// Stage 1. Writes the priors to the database at paths.database_path.
+// Stage 1. Writes the summary to summary_path, then the priors to the database
+// at paths.database_path; on error the database is as it was.
 StatusOr<PriorImport> ImportPriors(const PriorImportOptions& options,
-                                   const PriorImportPaths& paths);
+                                   const PriorImportPaths& paths,
+                                   const std::string& summary_path);
 
 // What a run of stage 2 did beside its files.
 struct CoarseModelReport {
@@ -62,7 +57,27 @@ struct CoarseModelReport {
 // equals running once. On error the database is as it was.
 StatusOr<CoarseModelReport> EstimateCoarseModel(
     const GlobalStageOptions& options, const std::string& database_path,
-    const std::string& output_path, const PipelineProgress& progress = {});
+    const std::string& output_path, const ProgressCallback& progress = {});
+
+struct MapOptions {
+  MapperStageOptions stage;
+  // Whether stage.refine adjusts the intrinsics: 0, 1, or -1 for cameras whose
+  // focal length nobody has measured; a calibrated robot's are left alone.
+  int refine_focal_length = -1;
+  int refine_extra_params = -1;
+
+  bool IsValid(std::string* error) const;
+};
+
+// input_path is a coarse model of stage 2; the model goes to output_path/0.
+struct MapRequest {
+  std::string database_path;
+  std::string input_path;
+  std::string output_path;
+  // All steps, or one of them for runs spread over machines.
+  MapperSteps steps = MapperSteps::kAll;
+  int part_index = -1;  // of kPart
+};
 
 // What a run of stage 3 did beside its files.
 struct MapReport {
@@ -70,12 +85,10 @@ struct MapReport {
   std::vector<std::string> warnings;
 };
 
-// Stage 3. input_path is a coarse model of stage 2. Writes the model to
-// output_path/0 and summary.json there; after a crash the same call continues.
-StatusOr<MapReport> MapParts(const MapperStageOptions& options,
-                             const std::string& database_path,
-                             const std::string& input_path,
-                             const std::string& output_path,
-                             const PipelineProgress& progress = {});
+// Stage 3. Writes the model and summary.json with the steps kAll and kMerge,
+// checkpoints with all; after a crash the same call continues.
+StatusOr<MapReport> MapParts(const MapOptions& options,
+                             const MapRequest& request,
+                             const ProgressCallback& progress = {});
 
 }  // namespace adasfm

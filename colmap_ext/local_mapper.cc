@@ -11,6 +11,7 @@
 #include "colmap_ext/host/pose_conversion.h"
 #include "colmap_ext/host/triangulation.h"
 #include "colmap_ext/prior_support.h"
+#include "core/interruption.h"
 
 namespace adasfm {
 namespace {
@@ -39,6 +40,7 @@ class LocalMapper {
     while (RegisterInitialPair()) {  // 1
       while (RegisterBatch()) {      // 2
         AdjustAsGrown();             // 3
+        ThrowIfInterrupted();
       }
       num_registered_at_adjustment_ = 0;
     }  // 4

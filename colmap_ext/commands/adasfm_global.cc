@@ -3,6 +3,7 @@
 #include <string>
 
 #include "colmap_ext/adasfm_pipeline.h"
+#include "colmap_ext/commands/progress_display.h"
 #include "colmap_ext/commands/registry.h"
 #include "colmap_ext/global_report.h"
 
@@ -80,12 +81,13 @@ Status RunAdasfmGlobal(int argc, char** argv) {
   const Status status = command.Parse(argc, argv);
   if (!status.ok() || command.HelpShown()) return status;
 
+  ProgressDisplay display;
   const StatusOr<CoarseModelReport> report = EstimateCoarseModel(
       options.stage, options.database_path, options.output_path,
-      [](const std::string& name, double share_done) {
-        std::cout << "[" << static_cast<int>(100.0 * share_done) << " %] "
-                  << name << std::endl;
+      [&display](const std::string& what, double share_done) {
+        display.Update(what, share_done);
       });
+  display.Finish();
   if (!report.ok()) return report.status();
   for (const std::string& warning : report->warnings) {
     std::cout << "WARNING: " << warning << std::endl;

@@ -1,30 +1,18 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include <unistd.h>
-
-#include <filesystem>
-#include <fstream>
 #include <iostream>
-#include <mutex>
 #include <string>
 
+#include "colmap_ext/adasfm_pipeline.h"
+#include "colmap_ext/commands/progress_display.h"
 #include "colmap_ext/commands/registry.h"
-#include "colmap_ext/host/pose_conversion.h"
-#include "colmap_ext/mapper_stage.h"
-#include "colmap_ext/model_folder.h"
 
 namespace adasfm {
 namespace {
 
 struct MapperCommandOptions {
-  std::string database_path;
-  std::string input_path;
-  std::string output_path;
   std::string stage = "all";
-  int part_index = -1;
-  // -1: refined for cameras without a prior focal length.
-  int refine_focal_length = -1;
-  int refine_extra_params = -1;
-  MapperStageOptions mapper;
+  MapRequest request;
+  MapOptions map;
 };
 
 void AddPartitionOptions(MapperStageOptions* options, CommandOptions* command) {
@@ -68,13 +56,13 @@ void AddAlignOptions(AlignSimilarityOptions* align, CommandOptions* command) {
 }
 
 void AddMapperOptions(MapperCommandOptions* options, CommandOptions* command) {
-  LocalMapperOptions& local = options->mapper.local;
+  LocalMapperOptions& local = options->map.stage.local;
   const auto add = [command](const std::string& name, auto* value,
                              const std::string& help) {
     command->AddDefault("AdaSfmMapper." + name, value, help);
   };
   add("stage", &options->stage, "what to run: all, plan, part or merge");
-  add("part_index", &options->part_index,
+  add("part_index", &options->request.part_index,
       "which part --AdaSfmMapper.stage part makes, from 0");
   add("min_num_visible_points", &local.registration.min_num_visible_points,
       "v_p: points that an image must see");
@@ -99,113 +87,27 @@ void AddMapperOptions(MapperCommandOptions* options, CommandOptions* command) {
       "points below it are removed [deg]");
   add("global_adjustment_growth", &local.global_adjustment_growth,
       "a part is adjusted as a whole when it has grown by this factor");
-  add("refine_focal_length", &options->refine_focal_length,
+  add("refine_focal_length", &options->map.refine_focal_length,
       "adjust focal lengths at the end: 0, 1, or -1: when they are not known");
-  add("refine_principal_point", &options->mapper.refine.refine_principal_point,
+  add("refine_principal_point",
+      &options->map.stage.refine.refine_principal_point,
       "adjust principal points at the end");
-  add("refine_extra_params", &options->refine_extra_params,
+  add("refine_extra_params", &options->map.refine_extra_params,
       "adjust distortion at the end: 0, 1, or -1: when the focal length is not "
       "known");
-  add("max_num_parallel_parts", &options->mapper.max_num_parallel_parts,
+  add("max_num_parallel_parts", &options->map.stage.max_num_parallel_parts,
       "parts at a time; -1: as threads and memory allow");
-  command->AddDefault("num_threads", &options->mapper.num_threads,
+  command->AddDefault("num_threads", &options->map.stage.num_threads,
                       "threads; -1: all of the machine's");
 }
 
-Status CheckPaths(const MapperCommandOptions& options) {
-  if (access(options.database_path.c_str(), R_OK) != 0) {
-    return Status::Error("cannot read the database " + options.database_path);
-  }
-  for (const char* name : {"cameras", "images", "points3D"}) {
-    const std::string path = options.input_path + "/" + name;
-    if (access((path + ".bin").c_str(), R_OK) != 0 &&
-        access((path + ".txt").c_str(), R_OK) != 0) {
-      return Status::Error("no coarse model at --input_path " +
-                           options.input_path + ": " + name +
-                           ".bin is missing; run adasfm_global first");
-    }
-  }
-  return PrepareOutputFolder(options.output_path);
-}
-
-StatusOr<CoarsePoseMap> ReadCoarsePoses(const std::string& path,
-                                        const SceneData& data) {
-  colmap::Reconstruction reconstruction;
-  reconstruction.Read(path);
-  CoarsePoseMap poses;
-  for (const image_t image_id : reconstruction.RegImageIds()) {
-    const colmap::Image& image = reconstruction.Image(image_id);
-    const auto source = data.images.find(image_id);
-    if (source == data.images.end() || source->second.name != image.Name()) {
-      return Status::Error("image " + image.Name() + " of the coarse model " +
-                           path +
-                           " is not in the database under its id; use "
-                           "the model that adasfm_global made from it");
-    }
-    poses[image_id] = CamFromWorld(image);
-  }
-  if (poses.size() < 2) {
-    return Status::Error("the coarse model " + path +
-                         " has fewer than two images");
-  }
-  return poses;
-}
-
-// Intrinsics that nobody has measured are refined; a calibrated robot's are
-// left alone.
-void ResolveIntrinsics(const SceneData& data, MapperCommandOptions* options) {
-  bool is_calibrated = true;
-  for (const auto& [camera_id, camera] : data.cameras) {
-    is_calibrated = is_calibrated && camera.HasPriorFocalLength();
-  }
-  RefineModelOptions& refine = options->mapper.refine;
-  refine.refine_focal_length = options->refine_focal_length < 0
-                                   ? !is_calibrated
-                                   : options->refine_focal_length != 0;
-  refine.refine_extra_params = options->refine_extra_params < 0
-                                   ? !is_calibrated
-                                   : options->refine_extra_params != 0;
-  // The thresholds that local mapping and refinement share.
-  const LocalMapperOptions& local = options->mapper.local;
-  refine.use_priors_in_adjustment = local.use_priors_in_adjustment;
-  refine.filter_max_reproj_error_px = local.filter_max_reproj_error_px;
-  refine.min_triangulation_angle_deg = local.min_triangulation_angle_deg;
-  refine.keypoint_sigma_px = local.keypoint_sigma_px;
-  refine.balance = local.balance;
-}
-
-Status WriteText(const std::string& path, const std::string& text) {
-  std::ofstream file(path + ".tmp");
-  file << text;
-  file.close();
-  std::error_code error;
-  if (file) std::filesystem::rename(path + ".tmp", path, error);
-  if (!file || error) return Status::Error("cannot write " + path);
-  return Status::Ok();
-}
-
-Status MergeAndWrite(const MapperCommandOptions& options,
-                     bool require_all_parts, MapperStage* stage) {
-  const StatusOr<colmap::Reconstruction> model =
-      stage->Merge(require_all_parts);
-  if (!model.ok()) return model.status();
-  Status status = WriteModelFolder(options.output_path, {&*model});
-  if (status.ok()) {
-    status = WriteText(options.output_path + "/summary.json",
-                       FormatMapperSummaryJson(stage->Summary()));
-  }
-  std::cout << FormatMapperSummaryText(stage->Summary()) << std::flush;
-  return status;
-}
-
-Status RunStage(const MapperCommandOptions& options, MapperStage* stage) {
-  if (options.stage == "plan") return stage->Plan();
-  if (options.stage == "part") return stage->RunPart(options.part_index);
-  if (options.stage == "merge") return MergeAndWrite(options, true, stage);
-  Status status = stage->Plan();
-  if (status.ok()) status = stage->RunAllParts();
-  if (status.ok()) status = MergeAndWrite(options, true, stage);
-  return status;
+StatusOr<MapperSteps> StepsFromName(const std::string& name) {
+  if (name == "all") return MapperSteps::kAll;
+  if (name == "plan") return MapperSteps::kPlan;
+  if (name == "part") return MapperSteps::kPart;
+  if (name == "merge") return MapperSteps::kMerge;
+  return Status::Error("AdaSfmMapper.stage = " + name +
+                       " must be all, plan, part or merge");
 }
 
 }  // namespace
@@ -216,44 +118,36 @@ Status RunAdasfmMapper(int argc, char** argv) {
       "adasfm_mapper",
       "Reconstructs overlapping parts incrementally, steered by the coarse "
       "model, and merges them into one.");
-  command.AddRequired("database_path", &options.database_path,
+  command.AddRequired("database_path", &options.request.database_path,
                       "COLMAP database with verified matches");
-  command.AddRequired("input_path", &options.input_path,
+  command.AddRequired("input_path", &options.request.input_path,
                       "coarse model that adasfm_global made");
-  command.AddRequired("output_path", &options.output_path,
+  command.AddRequired("output_path", &options.request.output_path,
                       "folder for the model (0) and checkpoints");
   AddMapperOptions(&options, &command);
-  AddPartitionOptions(&options.mapper, &command);
-  AddAlignOptions(&options.mapper.align, &command);
-  Status status = command.Parse(argc, argv);
-  if (!status.ok() || command.HelpShown()) return status;
-  if (options.stage != "all" && options.stage != "plan" &&
-      options.stage != "part" && options.stage != "merge") {
-    return Status::Error("AdaSfmMapper.stage = " + options.stage +
-                         " must be all, plan, part or merge");
+  AddPartitionOptions(&options.map.stage, &command);
+  AddAlignOptions(&options.map.stage.align, &command);
+  const Status parsed = command.Parse(argc, argv);
+  if (!parsed.ok() || command.HelpShown()) return parsed;
+  const StatusOr<MapperSteps> steps = StepsFromName(options.stage);
+  if (!steps.ok()) return steps.status();
+  options.request.steps = *steps;
+
+  ProgressDisplay display;
+  const StatusOr<MapReport> report =
+      MapParts(options.map, options.request,
+               [&display](const std::string& what, double share_done) {
+                 display.Update(what, share_done);
+               });
+  display.Finish();
+  if (!report.ok()) return report.status();
+  for (const std::string& warning : report->warnings) {
+    std::cout << "WARNING: " << warning << std::endl;
   }
-  status = CheckOptions(options.mapper);
-  if (status.ok()) status = CheckPaths(options);
-  if (!status.ok()) return status;
-  const StatusOr<SceneData> data = ReadSceneData(options.database_path, {});
-  if (!data.ok()) return data.status();
-  const StatusOr<CoarsePoseMap> coarse =
-      ReadCoarsePoses(options.input_path, *data);
-  if (!coarse.ok()) return coarse.status();
-  ResolveIntrinsics(*data, &options);
-  if (data->priors.empty()) {
-    std::cout << "WARNING: the database has no sensor priors; the model will "
-                 "have no metric scale (adasfm_prior_importer adds them)"
-              << std::endl;
+  if (*steps == MapperSteps::kAll || *steps == MapperSteps::kMerge) {
+    std::cout << FormatMapperSummaryText(report->summary) << std::flush;
   }
-  std::mutex mutex;
-  MapperStage stage(options.mapper, *data, *coarse, options.output_path,
-                    [&mutex](const std::string& line, double share_done) {
-                      const std::lock_guard<std::mutex> lock(mutex);
-                      std::cout << "[" << static_cast<int>(100.0 * share_done)
-                                << " %] " << line << std::endl;
-                    });
-  return RunStage(options, &stage);
+  return Status::Ok();
 }
 
 }  // namespace adasfm

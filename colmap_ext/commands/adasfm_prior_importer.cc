@@ -2,9 +2,8 @@
 #include <iostream>
 #include <string>
 
+#include "colmap_ext/adasfm_pipeline.h"
 #include "colmap_ext/commands/registry.h"
-#include "colmap_ext/prior_importer.h"
-#include "colmap_ext/prior_tables.h"
 
 namespace adasfm {
 namespace {
@@ -114,15 +113,9 @@ Status RunAdasfmPriorImporter(int argc, char** argv) {
   options.estimation.check_against_vision = !force;
   if (summary_path.empty()) summary_path = paths.database_path + ".priors.json";
 
-  const StatusOr<PriorImport> import = ComputePriorImport(paths, options);
+  const StatusOr<PriorImport> import =
+      ImportPriors(options, paths, summary_path);
   if (!import.ok()) return import.status();
-  // The database comes last: an error before leaves it as it was.
-  Status status =
-      WriteTextFile(summary_path, PriorImportToJson(*import) + "\n");
-  if (status.ok()) {
-    status = WritePriorTables(paths.database_path, import->tables);
-  }
-  if (!status.ok()) return status;
   std::cout << FormatPriorImport(*import) << "Priors written to "
             << paths.database_path << ", summary to " << summary_path
             << std::endl;

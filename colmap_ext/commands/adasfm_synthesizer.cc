@@ -7,6 +7,7 @@
 #include <string>
 
 #include "colmap_ext/commands/command.h"
+#include "colmap_ext/commands/progress_display.h"
 #include "colmap_ext/commands/registry.h"
 #include "colmap_ext/write_synthetic_world.h"
 #include "synthetic/render_world.h"
@@ -102,6 +103,7 @@ Status WritePhotos(const SyntheticWorld& world, const fs::path& folder) {
   Status status = PrepareOutputFolder(folder.string());
   if (status.ok()) status = CheckPhotoFolder(world, folder);
   if (!status.ok()) return status;
+  ProgressDisplay display;
   WorldRenderer renderer(world);
   for (size_t i = 0; i < world.images.size(); ++i) {
     const fs::path path = folder / world.images[i].name;
@@ -115,10 +117,9 @@ Status WritePhotos(const SyntheticWorld& world, const fs::path& folder) {
       return Status::Error("cannot write " + path.string() +
                            "; check the free space");
     }
-    if ((i + 1) % 25 == 0 || i + 1 == world.images.size()) {
-      std::cout << "Rendered " << i + 1 << " of " << world.images.size()
-                << " photos" << std::endl;
-    }
+    display.Update("rendered " + std::to_string(i + 1) + " of " +
+                       std::to_string(world.images.size()) + " photos",
+                   (i + 1.0) / world.images.size());
   }
   return Status::Ok();
 }

@@ -14,6 +14,9 @@
 #include <new>
 #include <vector>
 
+#include "colmap_ext/commands/progress_display.h"
+#include "core/interruption.h"
+
 namespace adasfm {
 namespace {
 
@@ -131,6 +134,11 @@ int RunCommand(const Command& command, int argc, char** argv) {
     const Status status = command.run(argc, argv);
     if (status.ok()) return EXIT_SUCCESS;
     PrintError(status.message());
+  } catch (const Interruption&) {
+    PrintError(
+        "interrupted; what is finished is kept, and the same command continues "
+        "from there");
+    return 128 + InterruptingSignal();
   } catch (const std::bad_alloc&) {
     PrintError(std::string(command.name) +
                ": out of memory; use fewer threads, or fewer images at a time");

@@ -68,8 +68,8 @@ struct Command {
 };
 
 // Runs the command with logging set up, prints `ERROR: message` on standard
-// error when it fails, and returns the exit code, 0 or 1. No exception and no
-// failed check of the host gets past it as an abort.
+// error when it fails, and returns the exit code: 0, 1, or 130 after Ctrl-C. No
+// exception and no failed check of the host gets past it as an abort.
 int RunCommand(const Command& command, int argc, char** argv);
 
 // An option struct's IsValid as a Status.

@@ -5,6 +5,9 @@ namespace adasfm {
 
 const std::vector<Command>& Commands() {
   static const std::vector<Command> commands = {
+      {"adasfm_automatic_reconstructor",
+       "from photos and sensor logs to a model and its report",
+       RunAdasfmAutomaticReconstructor},
       {"adasfm_evaluator", "compares a model with the ground truth",
        RunAdasfmEvaluator},
       {"adasfm_global",
@@ -13,6 +16,8 @@ const std::vector<Command>& Commands() {
       {"adasfm_mapper",
        "parallel incremental SfM steered by the coarse model, merged into one",
        RunAdasfmMapper},
+      {"adasfm_pair_generator", "chooses the pairs of images to match",
+       RunAdasfmPairGenerator},
       {"adasfm_prior_importer",
        "turns IMU and wheel logs into priors in the database",
        RunAdasfmPriorImporter},

@@ -9,9 +9,11 @@
 namespace adasfm {
 
 // The commands, each in commands/<its name>.cc.
+Status RunAdasfmAutomaticReconstructor(int argc, char** argv);
 Status RunAdasfmEvaluator(int argc, char** argv);
 Status RunAdasfmGlobal(int argc, char** argv);
 Status RunAdasfmMapper(int argc, char** argv);
+Status RunAdasfmPairGenerator(int argc, char** argv);
 Status RunAdasfmPriorImporter(int argc, char** argv);
 Status RunAdasfmReporter(int argc, char** argv);
 Status RunAdasfmRestorer(int argc, char** argv);

@@ -1,0 +1,323 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "colmap_ext/automatic_reconstruction.h"
+
+#include <chrono>
+#include <filesystem>
+#include <sstream>
+#include <stdexcept>
+
+#include "colmap_ext/commands/command.h"
+#include "colmap_ext/digest.h"
+#include "colmap_ext/global_report.h"
+#include "colmap_ext/prepare_reconstruction.h"
+#include "colmap_ext/report.h"
+#include "colmap_ext/reset_workspace.h"
+#include "colmap_ext/step_journal.h"
+
+namespace adasfm {
+namespace {
+
+namespace fs = std::filesystem;
+
+class Reconstructor {
+ public:
+  Reconstructor(const AutomaticReconstructionOptions& options,
+                const AutomaticReconstructionPaths& paths,
+                const ProgressCallback& progress,
+                const MessageCallback& message)
+      : options_(options),
+        paths_(paths),
+        progress_(progress),
+        message_(message) {}
+
+  StatusOr<AutomaticReconstructionResult> Run() {
+    Status status = Prepare();
+    if (status.ok()) status = Features();
+    if (status.ok()) status = Matching();
+    if (status.ok()) status = Priors();
+    if (status.ok()) status = Coarse();
+    if (status.ok()) status = Model();
+    if (status.ok()) status = Report();
+    if (!status.ok()) return status;
+    return result_;
+  }
+
+ private:
+  // The shares of the steps in the time of all; with CPU features matching is
+  // most of it.
+  struct Range {
+    double begin;
+    double end;
+  };
+  static constexpr Range kFeatures{0.0, 0.2}, kMatching{0.2, 0.75},
+      kPriors{0.75, 0.77}, kCoarse{0.77, 0.85}, kModel{0.85, 0.99},
+      kReport{0.99, 1.0};
+
+  std::string InWorkspace(const std::string& name) const {
+    return paths_.workspace_path + "/" + name;
+  }
+
+  ProgressCallback ProgressIn(const Range& range, const std::string& title) {
+    return [this, range, title](const std::string& what, double share_done) {
+      progress_(title + ": " + what,
+                range.begin + (range.end - range.begin) * share_done);
+    };
+  }
+
+  void Warn(const std::vector<std::string>& warnings) {
+    for (const std::string& warning : warnings) {
+      message_("WARNING: " + warning);
+    }
+  }
+
+  // Runs a step unless it is done. `reset` removes what the step left under
+  // other inputs.
+  template <typename Reset, typename Work>
+  Status RunStep(const std::string& name, const StepInputs& inputs,
+                 const Reset& reset, const Work& work) {
+    using State = StepJournal::State;
+    const State state = journal_.GetState(name, inputs);
+    if (state == State::kDone) {
+      result_.steps.push_back({name, 0.0, true});
+      message_(name + ": done before");
+      return Status::Ok();
+    }
+    if (state == State::kChanged) {
+      message_(name + ": " + journal_.DescribeChange(name, inputs) +
+               "; doing this and all that follows anew");
+    }
+    const auto start = std::chrono::steady_clock::now();
+    // What is left to be reset stays outdated until the step has begun.
+    Status status = state == State::kBegun ? Status::Ok() : reset();
+    if (status.ok()) status = journal_.Begin(name, inputs);
+    if (status.ok()) status = work();
+    if (!status.ok()) return status;
+    const std::chrono::duration<double> elapsed =
+        std::chrono::steady_clock::now() - start;
+    result_.steps.push_back({name, elapsed.count(), false});
+    return journal_.Finish(name, elapsed.count());
+  }
+
+  Status Prepare();
+  StatusOr<StepInputs> PathInputs(
+      const std::vector<std::pair<std::string, std::string>>& paths) const;
+  bool HasSensors() const {
+    return !paths_.imu_path.empty() || !paths_.wheel_path.empty();
+  }
+
+  Status Features();
+  Status ExtractAll(const std::vector<std::string>& names);
+  Status Matching();
+  Status Priors();
+  Status Coarse();
+  Status Model();
+  Status Report();
+
+  AutomaticReconstructionOptions options_;
+  AutomaticReconstructionPaths paths_;
+  const ProgressCallback& progress_;
+  const MessageCallback& message_;
+  std::string database_path_;
+  StepJournal journal_;
+  AutomaticReconstructionResult result_;
+};
+
+Status Reconstructor::Prepare() {
+  std::string error;
+  if (!options_.IsValid(&error)) throw std::invalid_argument(error);
+  Status status = PrepareOutputFolder(paths_.workspace_path);
+  if (status.ok()) status = PrepareOutputFolder(InWorkspace("logs"));
+  if (status.ok()) status = PrepareReconstruction(&options_, &paths_);
+  if (!status.ok()) return status;
+  database_path_ = InWorkspace("database.db");
+  result_.model_path = InWorkspace("sparse/0");
+  result_.report_path = InWorkspace("report.html");
+  StatusOr<StepJournal> journal = StepJournal::Read(InWorkspace("steps.json"));
+  if (!journal.ok()) return journal.status();
+  journal_ = std::move(journal).value();
+  if (journal_.Steps().empty() && fs::exists(database_path_)) {
+    return Status::Error("the workspace " + paths_.workspace_path +
+                         " has a database that this command did not make; "
+                         "choose an empty folder");
+  }
+  return Status::Ok();
+}
+
+StatusOr<StepInputs> Reconstructor::PathInputs(
+    const std::vector<std::pair<std::string, std::string>>& paths) const {
+  StepInputs inputs;
+  for (const auto& [name, path] : paths) {
+    const StatusOr<std::string> digest = DigestPath(path);
+    if (!digest.ok()) return digest.status();
+    inputs[name] = *digest;
+  }
+  return inputs;
+}
+
+Status Reconstructor::ExtractAll(const std::vector<std::string>& names) {
+  const ProgressCallback progress = ProgressIn(kFeatures, "features");
+  const StatusOr<ImageRegistration> images = RegisterImages(
+      options_.features, paths_.image_path, names, database_path_,
+      [&progress](const std::string& what, double share_done) {
+        progress(what, 0.1 * share_done);
+      });
+  if (!images.ok()) return images.status();
+  std::ostringstream text;
+  text << "features: " << images->num_images << " photos of "
+       << images->num_cameras << " cameras";
+  if (options_.features.camera_params.empty()) {
+    text << ", " << images->num_known_focal_lengths
+         << " of them with a focal length from EXIF (it is refined)";
+  }
+  message_(text.str());
+  if (!images->unreadable.empty()) {
+    Warn({std::to_string(images->unreadable.size()) +
+          " files are not images (the first one is " +
+          images->unreadable.front() + ")"});
+  }
+  return ExtractFeatures(
+      options_.features, paths_.image_path, database_path_,
+      InWorkspace("logs/features.log"),
+      [&progress](const std::string& what, double share_done) {
+        progress(what, 0.1 + 0.9 * share_done);
+      });
+}
+
+Status Reconstructor::Features() {
+  const StatusOr<std::vector<std::string>> names =
+      ListFilesRecursively(paths_.image_path);
+  if (!names.ok()) return names.status();
+  if (names->empty()) {
+    return Status::Error("the folder " + paths_.image_path +
+                         " has no files; check --image_path");
+  }
+  const FeatureOptions& features = options_.features;
+  const StepInputs inputs = {
+      {"photos", DigestFiles(paths_.image_path, *names)},
+      {"camera_model", features.camera_model},
+      {"camera_params", features.camera_params},
+      {"single_camera", std::to_string(features.single_camera)},
+      {"max_image_size", std::to_string(features.max_image_size)},
+      {"max_num_features", std::to_string(features.max_num_features)}};
+  return RunStep(
+      "features", inputs,
+      [this] { return ResetFeatures(paths_.workspace_path); },
+      [&] { return ExtractAll(*names); });
+}
+
+Status Reconstructor::Matching() {
+  const PairSelectionOptions& pairs = options_.pairs;
+  StatusOr<StepInputs> inputs =
+      PathInputs({{"image_times", paths_.image_times_path},
+                  {"descriptors", pairs.descriptors_path}});
+  if (!inputs.ok()) return inputs.status();
+  inputs.value()["num_temporal_neighbors"] =
+      std::to_string(pairs.num_temporal_neighbors);
+  inputs.value()["num_similar_images"] =
+      std::to_string(pairs.num_similar_images);
+  const auto reset = [this] { return ResetMatches(database_path_); };
+  return RunStep("matching", *inputs, reset, [&] {
+    const ProgressCallback progress = ProgressIn(kMatching, "matching");
+    const StatusOr<PairSelection> selection =
+        SelectPairs(pairs, database_path_,
+                    [&progress](const std::string& what, double share_done) {
+                      progress(what, 0.05 * share_done);
+                    });
+    if (!selection.ok()) return selection.status();
+    Warn(selection->warnings);
+    message_("matching: " + std::to_string(selection->num_temporal) +
+             " pairs of neighbours in time, " +
+             std::to_string(selection->num_similar) +
+             " more of similar images");
+    return MatchPairs(options_.features, selection->pairs, database_path_,
+                      InWorkspace("logs/matching.log"),
+                      [&progress](const std::string& what, double share_done) {
+                        progress(what, 0.05 + 0.95 * share_done);
+                      });
+  });
+}
+
+Status Reconstructor::Priors() {
+  const StatusOr<StepInputs> inputs =
+      PathInputs({{"image_times", paths_.image_times_path},
+                  {"imu", paths_.imu_path},
+                  {"wheel", paths_.wheel_path},
+                  {"sensors", paths_.sensors_path}});
+  if (!inputs.ok()) return inputs.status();
+  const auto reset = [this] { return ResetPriors(database_path_); };
+  return RunStep("priors", *inputs, reset, [this] {
+    if (!HasSensors()) return Status::Ok();
+    ProgressIn(kPriors, "priors")("reading the logs", 0.0);
+    const PriorImportPaths paths = {database_path_, paths_.image_times_path,
+                                    paths_.imu_path, paths_.wheel_path,
+                                    paths_.sensors_path};
+    const StatusOr<PriorImport> import =
+        ImportPriors(options_.priors, paths, database_path_ + ".priors.json");
+    if (!import.ok()) return import.status();
+    message_(FormatPriorImport(*import));
+    return Status::Ok();
+  });
+}
+
+Status Reconstructor::Coarse() {
+  const auto nothing = [] { return Status::Ok(); };
+  return RunStep("coarse", {}, nothing, [this] {
+    const StatusOr<CoarseModelReport> report = EstimateCoarseModel(
+        options_.global, database_path_, InWorkspace("coarse"),
+        ProgressIn(kCoarse, "coarse model"));
+    if (!report.ok()) return report.status();
+    Warn(report->warnings);
+    message_(FormatGlobalReportText(report->result, report->seconds));
+    return Status::Ok();
+  });
+}
+
+Status Reconstructor::Model() {
+  const auto nothing = [] { return Status::Ok(); };
+  return RunStep("model", {}, nothing, [this] {
+    MapRequest request;
+    request.database_path = database_path_;
+    request.input_path = InWorkspace("coarse/0");
+    request.output_path = InWorkspace("sparse");
+    const StatusOr<MapReport> report =
+        MapParts(options_.map, request, ProgressIn(kModel, "model"));
+    if (!report.ok()) return report.status();
+    message_(FormatMapperSummaryText(report->summary));
+    return Status::Ok();
+  });
+}
+
+Status Reconstructor::Report() {
+  const StatusOr<StepInputs> inputs =
+      PathInputs({{"ground_truth", paths_.ground_truth_path}});
+  if (!inputs.ok()) return inputs.status();
+  const auto nothing = [] { return Status::Ok(); };
+  return RunStep("report", *inputs, nothing, [this] {
+    ProgressIn(kReport, "report")("drawing", 0.0);
+    ReportOptions options;
+    options.input_path = InWorkspace("sparse");
+    options.coarse_path = InWorkspace("coarse");
+    options.database_path = database_path_;
+    options.ground_truth_path = paths_.ground_truth_path;
+    options.ground_truth.image_times_path = paths_.image_times_path;
+    const StatusOr<std::string> page = BuildReport(options);
+    if (!page.ok()) return page.status();
+    return WriteTextFile(result_.report_path, *page);
+  });
+}
+
+}  // namespace
+
+bool AutomaticReconstructionOptions::IsValid(std::string* error) const {
+  return features.IsValid(error) && pairs.IsValid(error) &&
+         priors.IsValid(error) && global.IsValid(error) && map.IsValid(error);
+}
+
+StatusOr<AutomaticReconstructionResult> ReconstructAutomatically(
+    const AutomaticReconstructionOptions& options,
+    const AutomaticReconstructionPaths& paths, const ProgressCallback& progress,
+    const MessageCallback& message) {
+  return Reconstructor(options, paths, progress, message).Run();
+}
+
+}  // namespace adasfm

@@ -1,0 +1,109 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <cstdio>
+#include <iostream>
+#include <string>
+
+#include "colmap_ext/automatic_reconstruction.h"
+#include "colmap_ext/commands/progress_display.h"
+#include "colmap_ext/commands/registry.h"
+
+namespace adasfm {
+namespace {
+
+void AddPaths(AutomaticReconstructionPaths* paths, CommandOptions* command) {
+  command->AddRequired("image_path", &paths->image_path,
+                       "folder of the photos or, with --data_format, root "
+                       "folder of the recording");
+  command->AddRequired("workspace_path", &paths->workspace_path,
+                       "folder for all results; the same command on it again "
+                       "continues");
+  command->AddDefault("data_format", &paths->data_format,
+                      "euroc, 4seasons, kitti or tum: logs, times and camera "
+                      "are found in the recording; none when empty");
+  command->AddDefault("image_times_path", &paths->image_times_path,
+                      "times of the images: EuRoC data.csv, 4Seasons times.txt "
+                      "or TUM rgb.txt; when empty, the names' digits are "
+                      "nanoseconds");
+  command->AddDefault("imu_path", &paths->imu_path,
+                      "IMU log: EuRoC CSV, 4Seasons imu.txt or a KITTI oxts "
+                      "folder; none when empty");
+  command->AddDefault("wheel_path", &paths->wheel_path,
+                      "wheel log, told apart by its header line, or a TUM "
+                      "odometry trajectory; none when empty");
+  command->AddDefault("sensors_path", &paths->sensors_path,
+                      "YAML file with the calibration of the sensors");
+  command->AddDefault("ground_truth_path", &paths->ground_truth_path,
+                      "true poses, for the report: a COLMAP model, a TUM "
+                      "trajectory, or lines `name qw qx qy qz tx ty tz`; none "
+                      "when empty");
+}
+
+void AddFeatureOptions(FeatureOptions* features, CommandOptions* command) {
+  command->AddDefault("camera_model", &features->camera_model,
+                      "COLMAP's camera model");
+  command->AddDefault("camera_params", &features->camera_params,
+                      "parameters of the model, comma-separated [px]; they are "
+                      "kept. When empty, the focal length is EXIF's or 1.2 "
+                      "times the longer side, and is refined");
+  command->AddDefault("single_camera", &features->single_camera,
+                      "1: one camera took all photos, 0: each its own, -1: "
+                      "photos of equal size and focal length share one");
+  command->AddDefault("max_image_size", &features->max_image_size,
+                      "larger photos are scaled down for the detector [px]");
+  command->AddDefault("max_num_features", &features->max_num_features,
+                      "features of a photo at most");
+  command->AddDefault("use_gpu", &features->use_gpu,
+                      "SIFT on the GPU: 0, 1, or -1: when COLMAP was built "
+                      "with CUDA and finds a device");
+}
+
+void PrintResult(const AutomaticReconstructionResult& result) {
+  std::cout << "\nTime [s]:";
+  for (const AutomaticReconstructionResult::Step& step : result.steps) {
+    char seconds[32];
+    std::snprintf(seconds, sizeof(seconds), "%.1f", step.seconds);
+    std::cout << "  " << step.name << " "
+              << (step.was_done ? "done before" : seconds);
+  }
+  std::cout << "\nModel:  " << result.model_path
+            << "\nReport: " << result.report_path << std::endl;
+}
+
+}  // namespace
+
+Status RunAdasfmAutomaticReconstructor(int argc, char** argv) {
+  AutomaticReconstructionPaths paths;
+  AutomaticReconstructionOptions options;
+  CommandOptions command(
+      "adasfm_automatic_reconstructor",
+      "From a folder of photos, and the logs of an IMU and wheels where there "
+      "are any, to a model and a report about it.");
+  AddPaths(&paths, &command);
+  AddFeatureOptions(&options.features, &command);
+  command.AddDefault("num_temporal_neighbors",
+                     &options.pairs.num_temporal_neighbors,
+                     "every image is matched with so many of the next ones");
+  command.AddDefault("num_similar_images", &options.pairs.num_similar_images,
+                     "... and with so many of the most similar ones");
+  command.AddDefault("num_threads", &options.num_threads,
+                     "-1: all of the machine's");
+  const Status parsed = command.Parse(argc, argv);
+  if (!parsed.ok() || command.HelpShown()) return parsed;
+  const Status valid = CheckOptions(options);
+  if (!valid.ok()) return valid;
+
+  ProgressDisplay display;
+  const StatusOr<AutomaticReconstructionResult> result =
+      ReconstructAutomatically(
+          options, paths,
+          [&display](const std::string& what, double share_done) {
+            display.Update(what, share_done);
+          },
+          [&display](const std::string& text) { display.Print(text); });
+  display.Finish();
+  if (!result.ok()) return result.status();
+  PrintResult(*result);
+  return Status::Ok();
+}
+
+}  // namespace adasfm

@@ -1,0 +1,61 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <iostream>
+#include <string>
+
+#include "colmap_ext/commands/pair_options.h"
+#include "colmap_ext/commands/progress_display.h"
+#include "colmap_ext/commands/registry.h"
+#include "colmap_ext/select_pairs.h"
+
+namespace adasfm {
+
+Status RunAdasfmPairGenerator(int argc, char** argv) {
+  PairSelectionOptions options;
+  std::string database_path;
+  std::string output_path;
+  CommandOptions command(
+      "adasfm_pair_generator",
+      "Chooses the pairs of images to match: neighbours in time and the most "
+      "similar ones; for matches_importer --match_type pairs.");
+  command.AddRequired("database_path", &database_path,
+                      "COLMAP database with extracted features");
+  command.AddRequired("output_path", &output_path,
+                      "text file for the pairs, a line `name1 name2` each");
+  command.AddDefault("image_times_path", &options.image_times_path,
+                     "times of the images: EuRoC data.csv, 4Seasons times.txt "
+                     "or TUM rgb.txt; when empty, those that "
+                     "adasfm_prior_importer left in the database, else the "
+                     "order of the names");
+  AddPairOptions(&options, &command);
+  command.AddDefault("num_threads", &options.descriptors.num_threads,
+                     "-1: all of the machine's");
+  const Status parsed = command.Parse(argc, argv);
+  if (!parsed.ok() || command.HelpShown()) return parsed;
+  const Status valid = CheckOptions(options);
+  if (!valid.ok()) return valid;
+
+  ProgressDisplay display;
+  const StatusOr<PairSelection> selection =
+      SelectPairs(options, database_path,
+                  [&display](const std::string& what, double share_done) {
+                    display.Update(what, share_done);
+                  });
+  display.Finish();
+  if (!selection.ok()) return selection.status();
+  const StatusOr<std::string> text =
+      FormatPairList(selection->pairs, database_path);
+  if (!text.ok()) return text.status();
+  const Status written = WriteTextFile(output_path, *text);
+  if (!written.ok()) return written;
+  for (const std::string& warning : selection->warnings) {
+    std::cout << "WARNING: " << warning << std::endl;
+  }
+  std::cout << selection->num_images << " images, in the order of their "
+            << (selection->ordered_by_time ? "times" : "names") << ": "
+            << selection->num_temporal << " pairs of neighbours, "
+            << selection->num_similar << " more of similar images\n"
+            << "Pairs written to " << output_path << std::endl;
+  return Status::Ok();
+}
+
+}  // namespace adasfm

@@ -1,0 +1,54 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <chrono>
+#include <mutex>
+#include <ostream>
+#include <string>
+
+namespace adasfm {
+
+// Shows the progress of a command on standard output: a bar with the time left
+// on a terminal, plain lines in a log. While one exists Ctrl-C (and SIGTERM)
+// asks for an interruption, which the next Update follows by throwing; a second
+// one ends the process at once. Commands without a display have nothing to lose
+// and end at the first.
+class ProgressDisplay {
+ public:
+  ProgressDisplay();
+  ~ProgressDisplay();
+  ProgressDisplay(const ProgressDisplay&) = delete;
+  ProgressDisplay& operator=(const ProgressDisplay&) = delete;
+
+  // A ProgressCallback. Throws Interruption when the user wants to stop.
+  void Update(const std::string& what, double share_done);
+  // A text between the steps, as its own lines.
+  void Print(const std::string& text);
+  // Ends the bar's line, so that other text can follow.
+  void Finish();
+
+ private:
+  using Clock = std::chrono::steady_clock;
+
+  void DrawBar(const std::string& what, double share_done);
+  void PrintLine(const std::string& what, double share_done);
+
+  std::mutex mutex_;
+  // Standard output, even while std::cout is redirected.
+  std::ostream out_;
+  const bool is_terminal_;
+  const Clock::time_point start_ = Clock::now();
+  Clock::time_point last_line_;
+  std::string last_what_;
+  bool bar_is_shown_ = false;
+};
+
+// "[#####-----]  50 %  1:05 left  what", cut to the columns of the terminal.
+// The time left follows from the time so far, once that says something.
+std::string FormatProgressBar(const std::string& what, double share_done,
+                              double elapsed_s, int num_columns);
+
+// The signal that was received, 0 when there was none.
+int InterruptingSignal();
+
+}  // namespace adasfm

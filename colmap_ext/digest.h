@@ -1,0 +1,26 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "core/status.h"
+
+namespace adasfm {
+
+// Short texts that change when files do, to tell whether a result is outdated.
+
+// Of a file's bytes or, for a folder, of its files' names and sizes. "none" for
+// an empty path. An error when there is no such file.
+StatusOr<std::string> DigestPath(const std::string& path);
+
+// Of the names and sizes of files below a folder.
+std::string DigestFiles(const std::string& folder,
+                        const std::vector<std::string>& names);
+
+// The regular files below a folder, hidden ones left out, as paths relative to
+// it, sorted.
+StatusOr<std::vector<std::string>> ListFilesRecursively(
+    const std::string& folder);
+
+}  // namespace adasfm

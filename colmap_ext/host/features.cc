@@ -1,0 +1,138 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "colmap_ext/host/features.h"
+
+#include <base/database.h>
+#include <feature/extraction.h>
+#include <feature/matching.h>
+
+#include <algorithm>
+#include <chrono>
+#include <functional>
+#include <thread>
+#include <utility>
+
+#include "colmap_ext/capture_output.h"
+
+#ifdef ADASFM_HOST_HAS_CUDA
+#include <util/cuda.h>
+#endif
+
+namespace adasfm {
+namespace {
+
+// Pairs that are matched in one transaction: lost by a kill, and the time that
+// an interruption takes.
+constexpr size_t kMatchBlockSize = 64;
+constexpr std::chrono::milliseconds kPollInterval(100);
+
+// Images of the database that have no descriptors yet, and how many have.
+std::vector<std::string> ImagesWithoutFeatures(const std::string& path,
+                                               int* num_done) {
+  const colmap::Database database(path);
+  std::vector<std::string> names;
+  *num_done = 0;
+  for (const colmap::Image& image : database.ReadAllImages()) {
+    if (database.ExistsDescriptors(image.ImageId()) &&
+        database.ExistsKeypoints(image.ImageId())) {
+      ++*num_done;
+    } else {
+      names.push_back(image.Name());
+    }
+  }
+  std::sort(names.begin(), names.end());
+  return names;
+}
+
+// Waits for a thread of the host; when the progress callback throws, the thread
+// is asked to stop and waited for.
+void WaitFor(colmap::Thread* thread, const std::function<void()>& report) {
+  try {
+    while (!thread->IsFinished()) {
+      std::this_thread::sleep_for(kPollInterval);
+      report();
+    }
+  } catch (...) {
+    thread->Stop();
+    thread->Wait();
+    throw;
+  }
+  thread->Wait();
+}
+
+}  // namespace
+
+bool UsesGpu(const FeatureOptions& options) {
+  if (options.use_gpu >= 0) return options.use_gpu == 1;
+#ifdef ADASFM_HOST_HAS_CUDA
+  return colmap::GetNumCudaDevices() > 0;
+#else
+  return false;
+#endif
+}
+
+Status ExtractFeatures(const FeatureOptions& options,
+                       const std::string& image_path,
+                       const std::string& database_path,
+                       const std::string& log_path,
+                       const ProgressCallback& progress) {
+  int num_done = 0;
+  colmap::ImageReaderOptions reader;
+  reader.database_path = database_path;
+  reader.image_path = image_path;
+  reader.image_list = ImagesWithoutFeatures(database_path, &num_done);
+  if (reader.image_list.empty()) return Status::Ok();
+  const int num_images = num_done + reader.image_list.size();
+  colmap::SiftExtractionOptions sift;
+  sift.max_image_size = options.max_image_size;
+  sift.max_num_features = options.max_num_features;
+  sift.num_threads = options.num_threads;
+  sift.use_gpu = UsesGpu(options);
+
+  // A line that the host prints for every photo.
+  CaptureOutput capture(log_path, "Processed file");
+  colmap::SiftFeatureExtractor extractor(reader, sift);
+  extractor.Start();
+  WaitFor(&extractor, [&] {
+    const int count = num_done + capture.NumCountedLines();
+    progress("features of image " + std::to_string(count) + " of " +
+                 std::to_string(num_images),
+             static_cast<double>(count) / num_images);
+  });
+  return Status::Ok();
+}
+
+Status MatchPairs(const FeatureOptions& options,
+                  const std::vector<ImagePair>& pairs,
+                  const std::string& database_path, const std::string& log_path,
+                  const ProgressCallback& progress) {
+  colmap::SiftMatchingOptions sift;
+  sift.num_threads = options.num_threads;
+  sift.use_gpu = UsesGpu(options);
+  const CaptureOutput capture(log_path, "");
+  colmap::Database database(database_path);
+  // Blocks are sorted by image: few others come between two uses of one.
+  colmap::FeatureMatcherCache cache(2 * kMatchBlockSize, &database);
+  colmap::SiftFeatureMatcher matcher(sift, &database, &cache);
+  if (!matcher.Setup()) {
+    return Status::Error(
+        "the host cannot match features on the GPU; use --use_gpu 0");
+  }
+  cache.Setup();
+  for (size_t begin = 0; begin < pairs.size(); begin += kMatchBlockSize) {
+    const size_t end = std::min(pairs.size(), begin + kMatchBlockSize);
+    std::vector<std::pair<image_t, image_t>> block;
+    for (size_t i = begin; i < end; ++i) {
+      block.emplace_back(pairs[i].image_id1, pairs[i].image_id2);
+    }
+    {
+      colmap::DatabaseTransaction transaction(&database);
+      matcher.Match(block);
+    }
+    progress("matched " + std::to_string(end) + " of " +
+                 std::to_string(pairs.size()) + " pairs",
+             static_cast<double>(end) / pairs.size());
+  }
+  return Status::Ok();
+}
+
+}  // namespace adasfm

@@ -1,0 +1,71 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "core/progress.h"
+#include "core/status.h"
+#include "core/types.h"
+
+namespace adasfm {
+
+// Features and matches by the host's own classes, into a database of its own
+// making. Work that is in the database already is not done again, so that an
+// interrupted run continues. Interruption (core/interruption.h) by the progress
+// callback leaves the database whole.
+
+struct FeatureOptions {
+  std::string camera_model = "SIMPLE_RADIAL";
+  // Comma-separated, in the model's order; empty: from EXIF, else 1.2 times the
+  // longer side as focal length.
+  std::string camera_params;
+  // 1: all photos are of one camera; 0: each of its own; -1: photos of equal
+  // size and equal first parameters share one.
+  int single_camera = -1;
+  // Larger photos are scaled down for the detector.
+  int max_image_size = 2000;
+  int max_num_features = 4096;
+  // 1, 0, or -1: when the host was built with CUDA and a device is there.
+  int use_gpu = -1;
+  int num_threads = -1;
+
+  bool IsValid(std::string* error) const;
+};
+
+struct ImageRegistration {
+  int num_images = 0;
+  int num_cameras = 0;
+  // With a focal length from EXIF or from the options.
+  int num_known_focal_lengths = 0;
+  // Files that the host cannot read as images.
+  std::vector<std::string> unreadable;
+};
+
+// Whether SIFT runs on the GPU with these options.
+bool UsesGpu(const FeatureOptions& options);
+
+// Creates the database when needed and writes cameras and images, the ids in
+// the order of `names` (relative to image_path). Reading the photos is most of
+// the work. An error for photos of different sizes with single_camera = 1, or
+// when no file is an image.
+StatusOr<ImageRegistration> RegisterImages(
+    const FeatureOptions& options, const std::string& image_path,
+    const std::vector<std::string>& names, const std::string& database_path,
+    const ProgressCallback& progress);
+
+// Keypoints and descriptors of the images registered. What the host prints goes
+// to log_path.
+Status ExtractFeatures(const FeatureOptions& options,
+                       const std::string& image_path,
+                       const std::string& database_path,
+                       const std::string& log_path,
+                       const ProgressCallback& progress);
+
+// Matches the pairs and verifies them (two-view geometries).
+Status MatchPairs(const FeatureOptions& options,
+                  const std::vector<ImagePair>& pairs,
+                  const std::string& database_path, const std::string& log_path,
+                  const ProgressCallback& progress);
+
+}  // namespace adasfm

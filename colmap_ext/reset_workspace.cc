@@ -1,0 +1,58 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "colmap_ext/reset_workspace.h"
+
+#include <filesystem>
+#include <vector>
+
+#include "colmap_ext/sqlite.h"
+
+namespace adasfm {
+namespace {
+
+namespace fs = std::filesystem;
+
+// All statements, or none.
+Status Execute(const std::string& database_path,
+               const std::vector<std::string>& statements) {
+  try {
+    SqliteConnection database(database_path, SqliteConnection::Mode::kWrite);
+    SqliteTransaction transaction(&database);
+    for (const std::string& statement : statements) {
+      database.Execute(statement);
+    }
+    transaction.Commit();
+    return Status::Ok();
+  } catch (const SqliteError& error) {
+    return Status::Error(database_path + ": " + error.what());
+  }
+}
+
+}  // namespace
+
+Status ResetFeatures(const std::string& workspace_path) {
+  for (const char* name : {"database.db", "database.db-wal", "database.db-shm",
+                           "coarse", "sparse"}) {
+    std::error_code error;
+    const std::string path = workspace_path + "/" + name;
+    fs::remove_all(path, error);
+    if (error) {
+      return Status::Error("cannot remove " + path + ": " + error.message());
+    }
+  }
+  return Status::Ok();
+}
+
+Status ResetMatches(const std::string& database_path) {
+  return Execute(database_path,
+                 {"DELETE FROM matches", "DELETE FROM two_view_geometries",
+                  "DROP TABLE IF EXISTS adasfm_two_view_geometries"});
+}
+
+Status ResetPriors(const std::string& database_path) {
+  return Execute(database_path,
+                 {"DROP TABLE IF EXISTS adasfm_image_times",
+                  "DROP TABLE IF EXISTS adasfm_relative_pose_priors",
+                  "DROP TABLE IF EXISTS adasfm_gravity"});
+}
+
+}  // namespace adasfm

@@ -1,0 +1,95 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "colmap_ext/step_journal.h"
+
+#include <algorithm>
+#include <filesystem>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <stdexcept>
+
+#include "colmap_ext/commands/command.h"
+
+namespace adasfm {
+
+StatusOr<StepJournal> StepJournal::Read(const std::string& path) {
+  StepJournal journal;
+  journal.path_ = path;
+  std::error_code error;
+  if (!std::filesystem::exists(path, error)) return journal;
+  try {
+    std::ifstream file(path);
+    for (const nlohmann::json& entry : nlohmann::json::parse(file)) {
+      Step step;
+      step.name = entry.at("name");
+      step.inputs = entry.at("inputs").get<StepInputs>();
+      step.is_done = entry.at("is_done");
+      step.seconds = entry.at("seconds");
+      journal.steps_.push_back(std::move(step));
+    }
+  } catch (const nlohmann::json::exception&) {
+    return Status::Error(path +
+                         " is damaged; remove it to do all steps again, or "
+                         "choose another workspace");
+  }
+  return journal;
+}
+
+const StepJournal::Step* StepJournal::Find(const std::string& name) const {
+  const auto step =
+      std::find_if(steps_.begin(), steps_.end(),
+                   [&name](const Step& entry) { return entry.name == name; });
+  return step == steps_.end() ? nullptr : &*step;
+}
+
+StepJournal::State StepJournal::GetState(const std::string& name,
+                                         const StepInputs& inputs) const {
+  const Step* step = Find(name);
+  if (step == nullptr) return State::kNew;
+  if (step->inputs != inputs) return State::kChanged;
+  return step->is_done ? State::kDone : State::kBegun;
+}
+
+std::string StepJournal::DescribeChange(const std::string& name,
+                                        const StepInputs& inputs) const {
+  const Step* step = Find(name);
+  if (step == nullptr) return "";
+  std::string text;
+  for (const auto& [key, value] : inputs) {
+    const auto old = step->inputs.find(key);
+    const std::string old_value = old == step->inputs.end() ? "" : old->second;
+    if (old_value == value) continue;
+    text += (text.empty() ? "" : ", ") + key + " is '" + value + "', was '" +
+            old_value + "'";
+  }
+  return text;
+}
+
+Status StepJournal::Begin(const std::string& name, const StepInputs& inputs) {
+  const Step* old = Find(name);
+  if (old != nullptr) steps_.resize(old - steps_.data());
+  steps_.push_back({name, inputs, false, 0.0});
+  return Write();
+}
+
+Status StepJournal::Finish(const std::string& name, double seconds) {
+  if (Find(name) == nullptr) {
+    throw std::logic_error("StepJournal: " + name + " has not begun");
+  }
+  Step& step = steps_[Find(name) - steps_.data()];
+  step.is_done = true;
+  step.seconds = seconds;
+  return Write();
+}
+
+Status StepJournal::Write() const {
+  nlohmann::json json = nlohmann::json::array();
+  for (const Step& step : steps_) {
+    json.push_back({{"name", step.name},
+                    {"inputs", step.inputs},
+                    {"is_done", step.is_done},
+                    {"seconds", step.seconds}});
+  }
+  return WriteTextFile(path_, json.dump(2) + "\n");
+}
+
+}  // namespace adasfm
