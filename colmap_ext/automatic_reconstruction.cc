@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "colmap_ext/automatic_reconstruction.h"
 
-#include <chrono>
 #include <filesystem>
 #include <sstream>
 #include <stdexcept>
@@ -70,37 +69,17 @@ class Reconstructor {
     }
   }
 
-  // Runs a step unless it is done. `reset` removes what the step left under
-  // other inputs.
   template <typename Reset, typename Work>
   Status RunStep(const std::string& name, const StepInputs& inputs,
                  const Reset& reset, const Work& work) {
-    using State = StepJournal::State;
-    const State state = journal_.GetState(name, inputs);
-    if (state == State::kDone) {
-      result_.steps.push_back({name, 0.0, true});
-      message_(name + ": done before");
-      return Status::Ok();
-    }
-    if (state == State::kChanged) {
-      message_(name + ": " + journal_.DescribeChange(name, inputs) +
-               "; doing this and all that follows anew");
-    }
-    const auto start = std::chrono::steady_clock::now();
-    // What is left to be reset stays outdated until the step has begun.
-    Status status = state == State::kBegun ? Status::Ok() : reset();
-    if (status.ok()) status = journal_.Begin(name, inputs);
-    if (status.ok()) status = work();
-    if (!status.ok()) return status;
-    const std::chrono::duration<double> elapsed =
-        std::chrono::steady_clock::now() - start;
-    result_.steps.push_back({name, elapsed.count(), false});
-    return journal_.Finish(name, elapsed.count());
+    const StatusOr<double> seconds =
+        journal_.Run(name, inputs, reset, work, message_);
+    if (!seconds.ok()) return seconds.status();
+    result_.steps.push_back({name, *seconds});
+    return Status::Ok();
   }
 
   Status Prepare();
-  StatusOr<StepInputs> PathInputs(
-      const std::vector<std::pair<std::string, std::string>>& paths) const;
   bool HasSensors() const {
     return !paths_.imu_path.empty() || !paths_.wheel_path.empty();
   }
@@ -143,17 +122,6 @@ Status Reconstructor::Prepare() {
   return Status::Ok();
 }
 
-StatusOr<StepInputs> Reconstructor::PathInputs(
-    const std::vector<std::pair<std::string, std::string>>& paths) const {
-  StepInputs inputs;
-  for (const auto& [name, path] : paths) {
-    const StatusOr<std::string> digest = DigestPath(path);
-    if (!digest.ok()) return digest.status();
-    inputs[name] = *digest;
-  }
-  return inputs;
-}
-
 Status Reconstructor::ExtractAll(const std::vector<std::string>& names) {
   const ProgressCallback progress = ProgressIn(kFeatures, "features");
   const StatusOr<ImageRegistration> images = RegisterImages(
@@ -167,7 +135,7 @@ Status Reconstructor::ExtractAll(const std::vector<std::string>& names) {
        << images->num_cameras << " cameras";
   if (options_.features.camera_params.empty()) {
     text << ", " << images->num_known_focal_lengths
-         << " of them with a focal length from EXIF (it is refined)";
+         << " of them with a focal length from EXIF";
   }
   message_(text.str());
   if (!images->unreadable.empty()) {
@@ -208,8 +176,8 @@ Status Reconstructor::Features() {
 Status Reconstructor::Matching() {
   const PairSelectionOptions& pairs = options_.pairs;
   StatusOr<StepInputs> inputs =
-      PathInputs({{"image_times", paths_.image_times_path},
-                  {"descriptors", pairs.descriptors_path}});
+      DigestPaths({{"image_times", paths_.image_times_path},
+                   {"descriptors", pairs.descriptors_path}});
   if (!inputs.ok()) return inputs.status();
   inputs.value()["num_temporal_neighbors"] =
       std::to_string(pairs.num_temporal_neighbors);
@@ -239,10 +207,10 @@ Status Reconstructor::Matching() {
 
 Status Reconstructor::Priors() {
   const StatusOr<StepInputs> inputs =
-      PathInputs({{"image_times", paths_.image_times_path},
-                  {"imu", paths_.imu_path},
-                  {"wheel", paths_.wheel_path},
-                  {"sensors", paths_.sensors_path}});
+      DigestPaths({{"image_times", paths_.image_times_path},
+                   {"imu", paths_.imu_path},
+                   {"wheel", paths_.wheel_path},
+                   {"sensors", paths_.sensors_path}});
   if (!inputs.ok()) return inputs.status();
   const auto reset = [this] { return ResetPriors(database_path_); };
   return RunStep("priors", *inputs, reset, [this] {
@@ -261,7 +229,9 @@ Status Reconstructor::Priors() {
 
 Status Reconstructor::Coarse() {
   const auto nothing = [] { return Status::Ok(); };
-  return RunStep("coarse", {}, nothing, [this] {
+  const StepInputs inputs = {
+      {"refine_intrinsics", std::to_string(options_.map.refine_focal_length)}};
+  return RunStep("coarse", inputs, nothing, [this] {
     const StatusOr<CoarseModelReport> report = EstimateCoarseModel(
         options_.global, database_path_, InWorkspace("coarse"),
         ProgressIn(kCoarse, "coarse model"));
@@ -289,7 +259,7 @@ Status Reconstructor::Model() {
 
 Status Reconstructor::Report() {
   const StatusOr<StepInputs> inputs =
-      PathInputs({{"ground_truth", paths_.ground_truth_path}});
+      DigestPaths({{"ground_truth", paths_.ground_truth_path}});
   if (!inputs.ok()) return inputs.status();
   const auto nothing = [] { return Status::Ok(); };
   return RunStep("report", *inputs, nothing, [this] {
@@ -298,6 +268,7 @@ Status Reconstructor::Report() {
     options.input_path = InWorkspace("sparse");
     options.coarse_path = InWorkspace("coarse");
     options.database_path = database_path_;
+    options.image_path = paths_.image_path;
     options.ground_truth_path = paths_.ground_truth_path;
     options.ground_truth.image_times_path = paths_.image_times_path;
     const StatusOr<std::string> page = BuildReport(options);
@@ -309,6 +280,11 @@ Status Reconstructor::Report() {
 }  // namespace
 
 bool AutomaticReconstructionOptions::IsValid(std::string* error) const {
+  if (refine_intrinsics < -1 || refine_intrinsics > 1) {
+    *error = "refine_intrinsics = " + std::to_string(refine_intrinsics) +
+             " must be -1, 0 or 1";
+    return false;
+  }
   return features.IsValid(error) && pairs.IsValid(error) &&
          priors.IsValid(error) && global.IsValid(error) && map.IsValid(error);
 }

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <functional>
 #include <string>
 #include <vector>
 
 #include "colmap_ext/adasfm_pipeline.h"
 #include "colmap_ext/host/features.h"
 #include "colmap_ext/select_pairs.h"
+#include "colmap_ext/step_journal.h"
 #include "core/progress.h"
 #include "core/status.h"
 
@@ -19,6 +19,9 @@ struct AutomaticReconstructionOptions {
   PriorImportOptions priors;
   GlobalStageOptions global;
   MapOptions map;
+  // Whether the coarse and the final model adjust focal length and distortion:
+  // 0, 1, or -1 for cameras without features.camera_params.
+  int refine_intrinsics = -1;
   // Of all stages; -1: all of the machine's.
   int num_threads = -1;
 
@@ -42,16 +45,12 @@ struct AutomaticReconstructionPaths {
 struct AutomaticReconstructionResult {
   struct Step {
     std::string name;
-    double seconds = 0.0;
-    bool was_done = false;  // by an earlier run
+    double seconds = 0.0;  // of the run that did it, this or an earlier one
   };
   std::vector<Step> steps;
   std::string model_path;
   std::string report_path;
 };
-
-// What a step has to say, for the user: lines of text.
-using MessageCallback = std::function<void(const std::string&)>;
 
 // From a folder of photos, and sensor logs where there are any, to the model
 // and its report, in the workspace:

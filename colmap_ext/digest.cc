@@ -52,6 +52,17 @@ StatusOr<std::string> DigestPath(const std::string& path) {
   return hash.Text();
 }
 
+StatusOr<std::map<std::string, std::string>> DigestPaths(
+    const std::map<std::string, std::string>& paths) {
+  std::map<std::string, std::string> digests;
+  for (const auto& [name, path] : paths) {
+    const StatusOr<std::string> digest = DigestPath(path);
+    if (!digest.ok()) return digest.status();
+    digests[name] = *digest;
+  }
+  return digests;
+}
+
 std::string DigestFiles(const std::string& folder,
                         const std::vector<std::string>& names) {
   Hash hash;

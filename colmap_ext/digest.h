@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <map>
 #include <string>
 #include <vector>
 
@@ -13,6 +14,10 @@ namespace adasfm {
 // Of a file's bytes or, for a folder, of its files' names and sizes. "none" for
 // an empty path. An error when there is no such file.
 StatusOr<std::string> DigestPath(const std::string& path);
+
+// The digests of several paths, each with its name.
+StatusOr<std::map<std::string, std::string>> DigestPaths(
+    const std::map<std::string, std::string>& paths);
 
 // Of the names and sizes of files below a folder.
 std::string DigestFiles(const std::string& folder,

@@ -74,12 +74,13 @@ Status PrepareReconstruction(AutomaticReconstructionOptions* options,
   options->map.stage.num_threads = options->num_threads;
   // EXIF gives a focal length to a few percent and no distortion; a calibration
   // is left alone.
-  if (options->features.camera_params.empty()) {
-    options->global.structure.bundle.refine_focal_length = true;
-    options->global.structure.bundle.refine_extra_params = true;
-    options->map.refine_focal_length = 1;
-    options->map.refine_extra_params = 1;
-  }
+  const bool refine = options->refine_intrinsics < 0
+                          ? options->features.camera_params.empty()
+                          : options->refine_intrinsics == 1;
+  options->global.structure.bundle.refine_focal_length = refine;
+  options->global.structure.bundle.refine_extra_params = refine;
+  options->map.refine_focal_length = refine;
+  options->map.refine_extra_params = refine;
   return Status::Ok();
 }
 

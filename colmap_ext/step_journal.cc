@@ -2,6 +2,7 @@
 #include "colmap_ext/step_journal.h"
 
 #include <algorithm>
+#include <chrono>
 #include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
@@ -79,6 +80,37 @@ Status StepJournal::Finish(const std::string& name, double seconds) {
   step.is_done = true;
   step.seconds = seconds;
   return Write();
+}
+
+StatusOr<double> StepJournal::Run(const std::string& name,
+                                  const StepInputs& inputs,
+                                  const std::function<Status()>& reset,
+                                  const std::function<Status()>& work,
+                                  const MessageCallback& message) {
+  const State state = GetState(name, inputs);
+  if (state == State::kDone) {
+    message(name + ": done before");
+    return Find(name)->seconds;
+  }
+  if (state == State::kChanged) {
+    message(name + ": " + DescribeChange(name, inputs) +
+            "; doing this and all that follows anew");
+  }
+  const auto start = std::chrono::steady_clock::now();
+  Status status;
+  if (state != State::kBegun) {
+    // After a crash in here no inputs are those of the step.
+    status = Begin(name, {{"removing", "old results"}});
+    if (status.ok()) status = reset();
+  }
+  if (status.ok()) status = Begin(name, inputs);
+  if (status.ok()) status = work();
+  if (!status.ok()) return status;
+  const std::chrono::duration<double> elapsed =
+      std::chrono::steady_clock::now() - start;
+  status = Finish(name, elapsed.count());
+  if (!status.ok()) return status;
+  return elapsed.count();
 }
 
 Status StepJournal::Write() const {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <functional>
 #include <map>
 #include <string>
 #include <vector>
@@ -11,6 +12,9 @@ namespace adasfm {
 
 // What a step's result depends on, by name.
 using StepInputs = std::map<std::string, std::string>;
+
+// What a step has to say, for the user: lines of text.
+using MessageCallback = std::function<void(const std::string&)>;
 
 // Which steps of a run are done, in a file, so that a run that was interrupted
 // continues and one with other inputs starts at the first step that they
@@ -41,6 +45,14 @@ class StepJournal {
   // Written at once. Begin forgets the steps after this one.
   Status Begin(const std::string& name, const StepInputs& inputs);
   Status Finish(const std::string& name, double seconds);
+
+  // Does the step, unless it is done with these inputs: `reset`, unless it was
+  // begun with them, removes what other inputs left; `work` does it, continuing
+  // from what is there. Returns the seconds that it took, now or then.
+  StatusOr<double> Run(const std::string& name, const StepInputs& inputs,
+                       const std::function<Status()>& reset,
+                       const std::function<Status()>& work,
+                       const MessageCallback& message);
 
   const std::vector<Step>& Steps() const { return steps_; }
 

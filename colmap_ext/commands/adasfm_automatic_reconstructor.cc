@@ -42,9 +42,9 @@ void AddFeatureOptions(FeatureOptions* features, CommandOptions* command) {
   command->AddDefault("camera_model", &features->camera_model,
                       "COLMAP's camera model");
   command->AddDefault("camera_params", &features->camera_params,
-                      "parameters of the model, comma-separated [px]; they are "
-                      "kept. When empty, the focal length is EXIF's or 1.2 "
-                      "times the longer side, and is refined");
+                      "parameters of the model, comma-separated [px]; when "
+                      "empty, the focal length is EXIF's or 1.2 times the "
+                      "longer side");
   command->AddDefault("single_camera", &features->single_camera,
                       "1: one camera took all photos, 0: each its own, -1: "
                       "photos of equal size and focal length share one");
@@ -62,8 +62,7 @@ void PrintResult(const AutomaticReconstructionResult& result) {
   for (const AutomaticReconstructionResult::Step& step : result.steps) {
     char seconds[32];
     std::snprintf(seconds, sizeof(seconds), "%.1f", step.seconds);
-    std::cout << "  " << step.name << " "
-              << (step.was_done ? "done before" : seconds);
+    std::cout << "  " << step.name << " " << seconds;
   }
   std::cout << "\nModel:  " << result.model_path
             << "\nReport: " << result.report_path << std::endl;
@@ -80,6 +79,9 @@ Status RunAdasfmAutomaticReconstructor(int argc, char** argv) {
       "are any, to a model and a report about it.");
   AddPaths(&paths, &command);
   AddFeatureOptions(&options.features, &command);
+  command.AddDefault("refine_intrinsics", &options.refine_intrinsics,
+                     "adjust focal length and distortion: 0, 1, or -1: when "
+                     "camera_params is empty");
   command.AddDefault("num_temporal_neighbors",
                      &options.pairs.num_temporal_neighbors,
                      "every image is matched with so many of the next ones");

@@ -25,7 +25,8 @@ struct FeatureOptions {
   int single_camera = -1;
   // Larger photos are scaled down for the detector.
   int max_image_size = 2000;
-  int max_num_features = 4096;
+  // Matching on the CPU takes most of the time, and grows with this.
+  int max_num_features = 2048;
   // 1, 0, or -1: when the host was built with CUDA and a device is there.
   int use_gpu = -1;
   int num_threads = -1;
