@@ -18,6 +18,9 @@ namespace {
 
 namespace fs = std::filesystem;
 
+// Steps whose files are replaced have nothing to remove beforehand.
+Status KeepAll() { return Status::Ok(); }
+
 class Reconstructor {
  public:
   Reconstructor(const AutomaticReconstructionOptions& options,
@@ -80,10 +83,6 @@ class Reconstructor {
   }
 
   Status Prepare();
-  bool HasSensors() const {
-    return !paths_.imu_path.empty() || !paths_.wheel_path.empty();
-  }
-
   Status Features();
   Status ExtractAll(const std::vector<std::string>& names);
   Status Matching();
@@ -104,14 +103,17 @@ class Reconstructor {
 Status Reconstructor::Prepare() {
   std::string error;
   if (!options_.IsValid(&error)) throw std::invalid_argument(error);
-  Status status = PrepareOutputFolder(paths_.workspace_path);
-  if (status.ok()) status = PrepareOutputFolder(InWorkspace("logs"));
+  Status status = PrepareOutputFolder(InWorkspace("logs"));
   if (status.ok()) status = PrepareReconstruction(&options_, &paths_);
   if (!status.ok()) return status;
   database_path_ = InWorkspace("database.db");
   result_.model_path = InWorkspace("sparse/0");
   result_.report_path = InWorkspace("report.html");
-  StatusOr<StepJournal> journal = StepJournal::Read(InWorkspace("steps.json"));
+  const std::string journal_path = InWorkspace("steps.json");
+  std::error_code ignored;
+  // Without the database nothing is done, whatever was recorded.
+  if (!fs::exists(database_path_)) fs::remove(journal_path, ignored);
+  StatusOr<StepJournal> journal = StepJournal::Read(journal_path);
   if (!journal.ok()) return journal.status();
   journal_ = std::move(journal).value();
   if (journal_.Steps().empty() && fs::exists(database_path_)) {
@@ -214,7 +216,9 @@ Status Reconstructor::Priors() {
   if (!inputs.ok()) return inputs.status();
   const auto reset = [this] { return ResetPriors(database_path_); };
   return RunStep("priors", *inputs, reset, [this] {
-    if (!HasSensors()) return Status::Ok();
+    if (paths_.imu_path.empty() && paths_.wheel_path.empty()) {
+      return Status::Ok();
+    }
     ProgressIn(kPriors, "priors")("reading the logs", 0.0);
     const PriorImportPaths paths = {database_path_, paths_.image_times_path,
                                     paths_.imu_path, paths_.wheel_path,
@@ -228,10 +232,9 @@ Status Reconstructor::Priors() {
 }
 
 Status Reconstructor::Coarse() {
-  const auto nothing = [] { return Status::Ok(); };
   const StepInputs inputs = {
       {"refine_intrinsics", std::to_string(options_.map.refine_focal_length)}};
-  return RunStep("coarse", inputs, nothing, [this] {
+  return RunStep("coarse", inputs, &KeepAll, [this] {
     const StatusOr<CoarseModelReport> report = EstimateCoarseModel(
         options_.global, database_path_, InWorkspace("coarse"),
         ProgressIn(kCoarse, "coarse model"));
@@ -243,8 +246,7 @@ Status Reconstructor::Coarse() {
 }
 
 Status Reconstructor::Model() {
-  const auto nothing = [] { return Status::Ok(); };
-  return RunStep("model", {}, nothing, [this] {
+  return RunStep("model", {}, &KeepAll, [this] {
     MapRequest request;
     request.database_path = database_path_;
     request.input_path = InWorkspace("coarse/0");
@@ -261,8 +263,7 @@ Status Reconstructor::Report() {
   const StatusOr<StepInputs> inputs =
       DigestPaths({{"ground_truth", paths_.ground_truth_path}});
   if (!inputs.ok()) return inputs.status();
-  const auto nothing = [] { return Status::Ok(); };
-  return RunStep("report", *inputs, nothing, [this] {
+  return RunStep("report", *inputs, &KeepAll, [this] {
     ProgressIn(kReport, "report")("drawing", 0.0);
     ReportOptions options;
     options.input_path = InWorkspace("sparse");

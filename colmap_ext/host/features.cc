@@ -12,6 +12,7 @@
 #include <utility>
 
 #include "colmap_ext/capture_output.h"
+#include "core/parallel.h"
 
 #ifdef ADASFM_HOST_HAS_CUDA
 #include <util/cuda.h>
@@ -20,9 +21,11 @@
 namespace adasfm {
 namespace {
 
-// Pairs that are matched in one transaction: lost by a kill, and the time that
-// an interruption takes.
-constexpr size_t kMatchBlockSize = 64;
+// Pairs that are matched in one transaction, for each thread: lost by a kill,
+// and the time that an interruption takes.
+constexpr size_t kNumPairsPerThread = 8;
+// Whose features are kept in memory; an image's pairs are next to each other.
+constexpr size_t kNumCachedImages = 200;
 constexpr std::chrono::milliseconds kPollInterval(100);
 
 // Images of the database that have no descriptors yet, and how many have.
@@ -108,18 +111,19 @@ Status MatchPairs(const FeatureOptions& options,
   colmap::SiftMatchingOptions sift;
   sift.num_threads = options.num_threads;
   sift.use_gpu = UsesGpu(options);
+  const size_t block_size =
+      kNumPairsPerThread * EffectiveNumThreads(options.num_threads);
   const CaptureOutput capture(log_path, "");
   colmap::Database database(database_path);
-  // Blocks are sorted by image: few others come between two uses of one.
-  colmap::FeatureMatcherCache cache(2 * kMatchBlockSize, &database);
+  colmap::FeatureMatcherCache cache(kNumCachedImages, &database);
   colmap::SiftFeatureMatcher matcher(sift, &database, &cache);
   if (!matcher.Setup()) {
     return Status::Error(
         "the host cannot match features on the GPU; use --use_gpu 0");
   }
   cache.Setup();
-  for (size_t begin = 0; begin < pairs.size(); begin += kMatchBlockSize) {
-    const size_t end = std::min(pairs.size(), begin + kMatchBlockSize);
+  for (size_t begin = 0; begin < pairs.size(); begin += block_size) {
+    const size_t end = std::min(pairs.size(), begin + block_size);
     std::vector<std::pair<image_t, image_t>> block;
     for (size_t i = begin; i < end; ++i) {
       block.emplace_back(pairs[i].image_id1, pairs[i].image_id2);

@@ -65,6 +65,7 @@ TEST_F(CommandLineTest, EveryCommandExplainsItself) {
     const Run run = Call(std::string(command.name) + " -h");
     EXPECT_EQ(run.ExitCode(), 0) << command.name;
     EXPECT_NE(run.out.find("_path"), std::string::npos) << command.name;
+    EXPECT_NE(run.out.find("--log_level"), std::string::npos) << command.name;
     ExpectError(std::string(command.name) + " --no_such_option 1",
                 "no_such_option");
     ExpectError(command.name, "required but missing");
