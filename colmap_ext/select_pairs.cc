@@ -106,16 +106,23 @@ Status AddSimilarPairs(const PairSelectionOptions& options,
   selection->warnings.insert(selection->warnings.end(),
                              descriptors->warnings.begin(),
                              descriptors->warnings.end());
-  const std::vector<std::vector<int>> nearest =
-      FindNearestRows(descriptors->vectors, options.num_similar_images,
-                      options.descriptors.num_threads,
-                      [&progress](const std::string& what, double share_done) {
-                        if (progress) progress(what, 0.7 + 0.3 * share_done);
-                      });
+  // In a drive the next images are the most similar ones, and are chosen
+  // already: a place seen before must not lose its room to them.
+  const std::set<ImagePair> neighbors = *pairs;
+  const std::vector<std::vector<int>> nearest = FindNearestRows(
+      descriptors->vectors,
+      options.num_similar_images + 2 * options.num_temporal_neighbors,
+      options.descriptors.num_threads,
+      [&progress](const std::string& what, double share_done) {
+        if (progress) progress(what, 0.7 + 0.3 * share_done);
+      });
   for (size_t i = 0; i < nearest.size(); ++i) {
+    int num_chosen = 0;
     for (const int k : nearest[i]) {
       const ImagePair pair(descriptors->image_ids[i],
                            descriptors->image_ids[k]);
+      if (neighbors.count(pair) > 0) continue;
+      if (num_chosen++ == options.num_similar_images) break;
       if (pairs->insert(pair).second) ++selection->num_similar;
     }
   }

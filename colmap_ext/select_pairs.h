@@ -14,7 +14,7 @@ namespace adasfm {
 struct PairSelectionOptions {
   // Every image is matched with so many of the next ones in time.
   int num_temporal_neighbors = 10;
-  // ... and with so many of the most similar ones (the paper's 30).
+  // ... and with so many of the most similar ones beyond them (the paper's 30).
   int num_similar_images = 30;
   // Times of the images (sensors/read_image_times.h); empty: those that
   // adasfm_prior_importer left in the database.

@@ -86,7 +86,7 @@ Status RunAdasfmAutomaticReconstructor(int argc, char** argv) {
                      &options.pairs.num_temporal_neighbors,
                      "every image is matched with so many of the next ones");
   command.AddDefault("num_similar_images", &options.pairs.num_similar_images,
-                     "... and with so many of the most similar ones");
+                     "and with so many of the most similar ones beyond them");
   command.AddDefault("num_threads", &options.num_threads,
                      "-1: all of the machine's");
   const Status parsed = command.Parse(argc, argv);

@@ -14,7 +14,7 @@ void AddPairOptions(PairSelectionOptions* options, CommandOptions* command) {
   add("num_temporal_neighbors", &options->num_temporal_neighbors,
       "every image is matched with so many of the next ones in time");
   add("num_similar_images", &options->num_similar_images,
-      "every image is matched with so many of the most similar ones");
+      "and with so many of the most similar ones beyond them");
   add("descriptors_path", &options->descriptors_path,
       "global descriptors from elsewhere, lines `image_name v1 v2 ... vn`; "
       "when "

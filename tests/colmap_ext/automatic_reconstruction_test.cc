@@ -49,7 +49,7 @@ class AutomaticTest : public CommandLineTest {
     return "adasfm_automatic_reconstructor --image_path " +
            drive_->File("images") + " --workspace_path " + workspace_ +
            " --camera_model PINHOLE --camera_params " + camera_params_ +
-           " --max_num_features 800";
+           " --max_num_features 400";
   }
   std::string WithSensors() const {
     return Photos() + " --image_times_path " + drive_->File("times.csv") +
@@ -156,7 +156,7 @@ TEST_F(AutomaticTest, EurocRecording) {
   ExpectSuccess(
       "adasfm_automatic_reconstructor --data_format euroc "
       "--image_path " +
-      root + " --workspace_path " + workspace_ + " --max_num_features 800");
+      root + " --workspace_path " + workspace_ + " --max_num_features 400");
   ExpectModel();
   const StatusOr<LoadedPriorTables> tables =
       ReadPriorTables(workspace_ + "/database.db");
