@@ -141,10 +141,12 @@ TEST_F(ImporterTest, WritesTablesAndSummary) {
       nlohmann::json::parse(ReadBytes(database_ + ".priors.json"));
   EXPECT_EQ(summary["num_priors"], 24);
   EXPECT_EQ(summary["num_images"], 25);
-  // Twice is once.
-  const std::string once = ReadBytes(database_ + ".priors.json");
+  // Twice is once, but for the time that it takes.
   ASSERT_EQ(Call(Arguments()).ExitCode(), 0);
-  EXPECT_EQ(ReadBytes(database_ + ".priors.json"), once);
+  nlohmann::json again =
+      nlohmann::json::parse(ReadBytes(database_ + ".priors.json"));
+  again["seconds"] = summary["seconds"];
+  EXPECT_EQ(again, summary);
   EXPECT_EQ(ReadPriorTables(database_)->tables.priors.size(), 24);
 }
 
