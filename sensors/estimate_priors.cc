@@ -12,6 +12,7 @@
 #include "sensors/check_against_vision.h"
 #include "sensors/compose_prior.h"
 #include "sensors/initial_odometry.h"
+#include "sensors/visual_links.h"
 
 namespace adasfm {
 namespace {
@@ -40,7 +41,7 @@ class PriorEstimator {
  private:
   void SelectLogs(const SensorLogs& logs);
   Status SelectImages(std::vector<ImageStamp> images);
-  Status CheckVision(const std::vector<VisualRotation>& rotations);
+  Status CheckVision();
   void Fuse();
   void BuildPriors();
   void FillSummary();
@@ -52,6 +53,8 @@ class PriorEstimator {
   timestamp_t timeshift_ns_ = 0;
   std::vector<ImageStamp> all_images_;
   std::vector<ImageStamp> images_;  // inside the logs
+  // What vision saw; empty when it contradicts the gyroscope.
+  std::vector<TimedRotation> rotations_;
   bool has_visual_bias_ = false;
   Eigen::Vector3d visual_bias_ = Eigen::Vector3d::Zero();
   OdometryTimeline timeline_;
@@ -119,28 +122,10 @@ Status PriorEstimator::SelectImages(std::vector<ImageStamp> images) {
   return Status::Ok();
 }
 
-Status PriorEstimator::CheckVision(
-    const std::vector<VisualRotation>& rotations) {
-  if (logs_.imu.empty() || rotations.empty()) return Status::Ok();
-  std::map<image_t, timestamp_t> times;
-  for (const ImageStamp& image : all_images_) {
-    times[image.image_id] = image.timestamp_ns;
-  }
-  std::vector<TimedRotation> timed;
-  for (const VisualRotation& rotation : rotations) {
-    const auto first = times.find(rotation.image_id1);
-    const auto second = times.find(rotation.image_id2);
-    if (first == times.end() || second == times.end()) continue;
-    TimedRotation entry{first->second, second->second, rotation.cam2_from_cam1,
-                        static_cast<double>(rotation.num_inliers)};
-    if (entry.start_ns > entry.end_ns) {
-      std::swap(entry.start_ns, entry.end_ns);
-      entry.cam2_from_cam1 = entry.cam2_from_cam1.conjugate();
-    }
-    timed.push_back(entry);
-  }
-  const VisionCheck check =
-      CheckAgainstVision(timed, logs_.imu, calibration_, VisionCheckOptions());
+Status PriorEstimator::CheckVision() {
+  if (logs_.imu.empty() || rotations_.empty()) return Status::Ok();
+  const VisionCheck check = CheckAgainstVision(
+      rotations_, logs_.imu, calibration_, VisionCheckOptions());
   SensorSummary& summary = estimate_.summary;
   if (!check.is_conclusive) {
     summary.warnings.push_back(
@@ -158,6 +143,7 @@ Status PriorEstimator::CheckVision(
       return Status::Error(check.contradiction);
     }
     summary.warnings.push_back(check.contradiction);
+    rotations_.clear();
     return Status::Ok();
   }
   has_visual_bias_ = options_.use_visual_rotations;
@@ -205,6 +191,13 @@ void PriorEstimator::Fuse() {
     problem_.links = BuildOdometryLinks(timeline_.times_ns, logs_, calibration_,
                                         bias, link_options);
   }
+  if (options_.use_visual_rotations) {
+    const VisualLinks visual = AddVisualRotations(
+        rotations_, timeshift_ns_, calibration_.cam_from_imu.rotation,
+        timeline_, &problem_);
+    estimate_.summary.num_visual_links = visual.num_links;
+    estimate_.summary.visual_sigma_deg = RadToDeg(visual.sigma_rad);
+  }
   if (has_visual_bias_) {
     problem_.prior_gyroscope_bias = visual_bias_;
     problem_.prior_gyroscope_bias_sigma = std::min(
@@ -249,31 +242,11 @@ void PriorEstimator::FillSummary() {
         static_cast<double>(summary.num_priors) / (all_images_.size() - 1);
   }
   summary.timeshift_cam_imu_s = SecondsFromNs(timeshift_ns_);
-  for (const OdometryLink& link : problem_.links) {
-    if (link.standstill != StandstillKind::kNone)
-      summary.standstill_s += link.dt_s;
+  const auto first = estimate_.gravity_in_cam.find(images_[0].image_id);
+  if (first != estimate_.gravity_in_cam.end()) {
+    summary.first_gravity_in_cam = first->second;
   }
-  for (size_t k = 0; k < problem_.links.size(); ++k) {
-    if (!problem_.links[k].has_wheel) continue;
-    summary.distance_m += fused_.motions[k].body2_from_body1.translation.norm();
-  }
-  if (!logs_.imu.empty()) {
-    for (const OdometryState& state : fused_.states) {
-      summary.gyroscope_bias += state.bias.gyroscope / fused_.states.size();
-      summary.accelerometer_bias +=
-          state.bias.accelerometer / fused_.states.size();
-    }
-    summary.gyroscope_bias_sigma = fused_.gyroscope_bias_sigma;
-    summary.accelerometer_bias_sigma = fused_.accelerometer_bias_sigma;
-    const auto first = estimate_.gravity_in_cam.find(images_[0].image_id);
-    if (first != estimate_.gravity_in_cam.end()) {
-      summary.first_gravity_in_cam = first->second;
-    }
-  }
-  if (!(logs_.wheel.empty() && logs_.odometry.empty())) {
-    summary.wheel_scale = fused_.wheel_scale;
-    summary.wheel_scale_sigma = fused_.wheel_scale_sigma;
-  }
+  SummarizeFusion(problem_, fused_, logs_, &summary);
   if (!fused_.converged) {
     summary.warnings.push_back(
         "the smoother did not settle: sensors contradict each other; check "
@@ -298,8 +271,13 @@ StatusOr<PriorEstimate> PriorEstimator::Run(
   Status status = SelectImages(images);
   if (!status.ok()) return status;
   // 2. Vision against the gyroscope; it may move the time shift.
+  std::map<image_t, timestamp_t> times_ns;
+  for (const ImageStamp& image : all_images_) {
+    times_ns[image.image_id] = image.timestamp_ns;
+  }
+  rotations_ = ComputeTimedRotations(rotations, times_ns);
   const timestamp_t calibrated_shift = timeshift_ns_;
-  status = CheckVision(rotations);
+  status = CheckVision();
   if (status.ok() && timeshift_ns_ != calibrated_shift) {
     status = SelectImages(images);
   }

@@ -48,10 +48,10 @@ struct PriorEstimationOptions {
   // Logs are used from this long before the first to this long after the last
   // image: a standstill there tells the biases.
   double max_lead_s = 20.0;
-  // Whether two-view rotations give the first gyroscope bias when the machine
-  // never stands still.
+  // Whether two-view rotations help to find the gyroscope's bias: its first
+  // value when the machine never stands still, and its course on the way.
   bool use_visual_rotations = true;
-  // How well they tell it, rad/s.
+  // How well they tell the first value, rad/s.
   double visual_bias_sigma = 0.002;
   // Whether vision and gyroscope are compared before anything is believed
   // (sensors/check_against_vision.h); a contradiction is an error.

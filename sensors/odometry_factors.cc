@@ -1,21 +1,14 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "sensors/odometry_factors.h"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 
 #include "core/so3.h"
+#include "sensors/link_builder.h"
 
 namespace adasfm {
 namespace {
-
-constexpr int kFirst = 0;
-constexpr int kSecond = ChainState::kSize;
-constexpr int kGlobals = 2 * ChainState::kSize;
-// No link has more residuals: IMU 9, biases 6, wheels 3, rotation 3, rest 12,
-// planar 2, weak priors 9.
-constexpr int kMaxResiduals = 48;
 
 // Weak priors: they keep coordinates without any sensor finite.
 constexpr double kWeakSpeedSigma = 50.0;  // m/s
@@ -24,100 +17,7 @@ constexpr double kWeakAngleSigma = 1.0;   // rad
 // Over this time an unaided machine's speed forgets its past, seconds.
 constexpr double kSpeedMemoryS = 10.0;
 
-// Collects whitened rows of one link.
-class LinkBuilder {
- public:
-  LinkBuilder(const LinkContext& context, const OdometryLink& link,
-              const ChainState& first, const ChainState& second,
-              const ChainGlobals& globals)
-      : context_(context),
-        link_(link),
-        first_(first),
-        second_(second),
-        globals_(globals),
-        r1_transposed_(
-            first.state.world_from_imu.toRotationMatrix().transpose()),
-        r2_(second.state.world_from_imu.toRotationMatrix()),
-        a_rotation_(first.state.world_from_imu.conjugate() *
-                    second.state.world_from_imu),
-        a_(a_rotation_.toRotationMatrix()) {
-    values_.setZero();
-    jacobian_.setZero();
-  }
-
-  void AddImu();
-  void AddBiasWalk();
-  void AddWheel(double weight);
-  void AddStandstill();
-  void AddWeakPriors();
-
-  LinkResiduals Finish() const {
-    LinkResiduals result;
-    result.values = values_.head(num_rows_);
-    result.jacobian = jacobian_.topRows(num_rows_);
-    result.wheel_chi2 = wheel_chi2_;
-    return result;
-  }
-
- private:
-  // d v(A) where dA = A Exp(x), x = R2^T (d2 - d1): writes the derivative of a
-  // row block by the two rotations.
-  template <int N>
-  void AddRelativeRotation(int row,
-                           const Eigen::Matrix<double, N, 3>& by_turn) {
-    const Eigen::Matrix<double, N, 3> by_world = by_turn * r2_.transpose();
-    jacobian_.block<N, 3>(row, kSecond + ChainState::kRotation) += by_world;
-    jacobian_.block<N, 3>(row, kFirst + ChainState::kRotation) -= by_world;
-  }
-
-  // A vector residual of the relative rotation alone, sigma per axis.
-  void AddRotationResidual(const Eigen::Quaterniond& measured,
-                           const Eigen::Matrix3d& covariance) {
-    const Eigen::Vector3d error = LogSo3(measured.conjugate() * a_rotation_);
-    values_.segment<3>(num_rows_) = error;
-    AddRelativeRotation<3>(num_rows_, RightJacobianInverseSo3(error));
-    Whiten<3>(covariance);
-  }
-
-  // A scalar prior on one coordinate.
-  void AddScalar(int column, double error, double sigma) {
-    values_[num_rows_] = error / sigma;
-    jacobian_(num_rows_, column) = 1.0 / sigma;
-    ++num_rows_;
-  }
-
-  void AddVector(int column, const Eigen::Vector3d& error, double sigma) {
-    for (int i = 0; i < 3; ++i) AddScalar(column + i, error[i], sigma);
-  }
-
-  // Multiplies the last N rows by the inverse root of their covariance.
-  template <int N>
-  void Whiten(const Eigen::Matrix<double, N, N>& covariance) {
-    const Eigen::LLT<Eigen::Matrix<double, N, N>> llt(covariance);
-    auto values = values_.segment<N>(num_rows_);
-    auto jacobian = jacobian_.middleRows<N>(num_rows_);
-    llt.matrixL().solveInPlace(values);
-    llt.matrixL().solveInPlace(jacobian);
-    num_rows_ += N;
-  }
-
-  void AddWheelYaw(double weight);
-  void AddPlanarRotation();
-
-  const LinkContext& context_;
-  const OdometryLink& link_;
-  const ChainState& first_;
-  const ChainState& second_;
-  const ChainGlobals& globals_;
-  const Eigen::Matrix3d r1_transposed_;
-  const Eigen::Matrix3d r2_;
-  const Eigen::Quaterniond a_rotation_;
-  const Eigen::Matrix3d a_;
-  int num_rows_ = 0;
-  double wheel_chi2_ = 0.0;
-  Eigen::Matrix<double, kMaxResiduals, 1> values_;
-  Eigen::Matrix<double, kMaxResiduals, kLinkSize> jacobian_;
-};
+}  // namespace
 
 void LinkBuilder::AddImu() {
   const ImuPreintegration& imu = link_.imu;
@@ -183,73 +83,12 @@ void LinkBuilder::AddBiasWalk() {
       noise.accelerometer_random_walk * root_dt);
 }
 
-void LinkBuilder::AddWheel(double weight) {
-  const WheelMotion& wheel = link_.wheel;
-  const Eigen::Vector3d& lever = context_.problem->imu_from_wheel.translation;
-  Eigen::Matrix<double, 3, 2> forward_by_mount;
-  const Eigen::Vector3d forward = globals_.Forward(
-      context_.problem->imu_from_wheel.rotation, &forward_by_mount);
-  const double logged_per_true = globals_.values[ChainGlobals::kLoggedLength];
-  const Eigen::Vector3d phi =
-      LogSo3(wheel.profile_rotation.conjugate() * a_rotation_);
-  const Eigen::Matrix3d map =
-      wheel.displacement_map + wheel.rotation_moment * Hat(phi);
-  // What the wheel frame's origin moves by.
-  const Eigen::Vector3d moved = second_.step_in_previous + a_ * lever - lever;
+void LinkBuilder::AddVision(double weight) {
   const int row = num_rows_;
-  values_.segment<3>(row) = logged_per_true * moved - map * forward;
-  jacobian_.block<3, 3>(row, kSecond + ChainState::kStep) =
-      logged_per_true * Eigen::Matrix3d::Identity();
-  AddRelativeRotation<3>(row, -logged_per_true * a_ * Hat(lever) +
-                                  wheel.rotation_moment * Hat(forward) *
-                                      RightJacobianInverseSo3(phi));
-  jacobian_.block<3, 1>(row, kGlobals + ChainGlobals::kLoggedLength) = moved;
-  jacobian_.block<3, 2>(row, kGlobals + ChainGlobals::kMountYaw) =
-      -map * forward_by_mount;
-  Whiten<3>(wheel.covariance / weight);
-  wheel_chi2_ +=
-      weight > 0.0 ? values_.segment<3>(row).squaredNorm() / weight : 0.0;
-  if (wheel.has_rotation) {
-    AddRotationResidual(wheel.rotation, wheel.rotation_covariance / weight);
-    wheel_chi2_ += values_.segment<3>(row + 3).squaredNorm() / weight;
-    return;
-  }
-  if (link_.has_wheel_yaw) AddWheelYaw(weight);
-  if (!link_.has_imu) AddPlanarRotation();
-}
-
-void LinkBuilder::AddWheelYaw(double weight) {
-  const WheelMotion& wheel = link_.wheel;
-  const Eigen::Vector3d up =
-      context_.problem->imu_from_wheel.rotation * Eigen::Vector3d::UnitZ();
-  const Eigen::Vector3d turn = LogSo3(a_rotation_);
-  const double root_weight = std::sqrt(weight / wheel.yaw_variance);
-  const int row = num_rows_++;
-  const double logged_per_true = globals_.values[ChainGlobals::kLoggedYaw];
-  values_[row] = root_weight *
-                 (logged_per_true * up.dot(turn) -
-                  globals_.values[ChainGlobals::kCurvature] * wheel.distance_m -
-                  wheel.yaw_rad);
-  AddRelativeRotation<1>(row, root_weight * logged_per_true * up.transpose() *
-                                  RightJacobianInverseSo3(turn));
-  jacobian_(row, kGlobals + ChainGlobals::kLoggedYaw) =
-      root_weight * up.dot(turn);
-  jacobian_(row, kGlobals + ChainGlobals::kCurvature) =
-      -root_weight * wheel.distance_m;
-  wheel_chi2_ += values_[row] * values_[row] / weight;
-}
-
-void LinkBuilder::AddPlanarRotation() {
-  const Eigen::Matrix3d wheel_from_imu =
-      context_.problem->imu_from_wheel.rotation.toRotationMatrix().transpose();
-  const Eigen::Vector3d turn = LogSo3(a_rotation_);
-  const double sigma = context_.options->planar_rotation_noise *
-                       std::sqrt(std::max(link_.dt_s, 1e-6));
-  const Eigen::Matrix<double, 2, 3> by_turn =
-      wheel_from_imu.topRows<2>() * RightJacobianInverseSo3(turn) / sigma;
-  values_.segment<2>(num_rows_) = wheel_from_imu.topRows<2>() * turn / sigma;
-  AddRelativeRotation<2>(num_rows_, by_turn);
-  num_rows_ += 2;
+  AddRotationResidual(link_.visual_rotation,
+                      link_.visual_sigma_rad * link_.visual_sigma_rad / weight *
+                          Eigen::Matrix3d::Identity());
+  vision_chi2_ = values_.segment<3>(row).squaredNorm() / weight;
 }
 
 void LinkBuilder::AddStandstill() {
@@ -291,56 +130,17 @@ void LinkBuilder::AddWeakPriors() {
       kWeakAngleSigma * kWeakAngleSigma * Eigen::Matrix3d::Identity());
 }
 
-}  // namespace
-
-void ChainState::Retract(const Eigen::Matrix<double, kSize, 1>& delta) {
-  const Eigen::Quaterniond tilt =
-      ExpSo3(Eigen::Vector3d(delta[0], delta[1], 0.0));
-  const Eigen::Quaterniond heading =
-      ExpSo3(Eigen::Vector3d(0.0, 0.0, delta[2]));
-  state.world_from_imu = (heading * tilt * state.world_from_imu).normalized();
-  state.velocity_in_imu += delta.segment<3>(kVelocity);
-  state.bias.gyroscope += delta.segment<3>(kGyro);
-  state.bias.accelerometer += delta.segment<3>(kAccel);
-  step_in_previous += delta.segment<3>(kStep);
-}
-
-ChainGlobals::Vector ChainGlobals::PriorSigmas(
-    const OdometryFusionOptions& options) {
-  // Zero means exactly known: a sigma too small to move anything.
-  constexpr double kFixed = 1e-7;
-  const double mount = DegToRad(options.wheel_mount_sigma_deg);
-  Vector sigmas;
-  sigmas << options.wheel_scale_sigma, options.wheel_track_sigma,
-      options.wheel_curvature_sigma, mount, mount;
-  return sigmas.cwiseMax(kFixed);
-}
-
-Eigen::Vector3d ChainGlobals::Forward(
-    const Eigen::Quaterniond& imu_from_wheel,
-    Eigen::Matrix<double, 3, 2>* jacobian) const {
-  const double cy = std::cos(values[kMountYaw]);
-  const double sy = std::sin(values[kMountYaw]);
-  const double cp = std::cos(values[kMountPitch]);
-  const double sp = std::sin(values[kMountPitch]);
-  const Eigen::Matrix3d rotation = imu_from_wheel.toRotationMatrix();
-  if (jacobian != nullptr) {
-    jacobian->col(0) = rotation * Eigen::Vector3d(-cp * sy, cp * cy, 0.0);
-    jacobian->col(1) = rotation * Eigen::Vector3d(-sp * cy, -sp * sy, -cp);
-  }
-  return rotation * Eigen::Vector3d(cp * cy, cp * sy, -sp);
-}
-
 LinkResiduals ComputeLinkResiduals(const LinkContext& context,
                                    const OdometryLink& link,
                                    const ChainState& first,
                                    const ChainState& second,
                                    const ChainGlobals& globals,
-                                   double wheel_weight) {
+                                   const LinkWeights& weights) {
   LinkBuilder builder(context, link, first, second, globals);
   if (link.has_imu) builder.AddImu();
   builder.AddBiasWalk();
-  if (link.has_wheel) builder.AddWheel(wheel_weight);
+  if (link.has_wheel) builder.AddWheel(weights.wheel);
+  if (link.has_vision) builder.AddVision(weights.vision);
   if (link.standstill != StandstillKind::kNone) builder.AddStandstill();
   builder.AddWeakPriors();
   return builder.Finish();

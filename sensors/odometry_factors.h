@@ -4,55 +4,10 @@
 #include <Eigen/Core>
 #include <vector>
 
+#include "sensors/chain_state.h"
 #include "sensors/odometry_fusion.h"
 
 namespace adasfm {
-
-// The unknowns of one time, in the order of their 15 tangent coordinates.
-// Everything but the heading is local to the machine, so that a drift of
-// kilometres or turns never enters the equations (docs/sensors.md).
-struct ChainState {
-  enum Offset {
-    kRotation = 0,
-    kVelocity = 3,
-    kGyro = 6,
-    kAccel = 9,
-    kStep = 12
-  };
-  static constexpr int kSize = 15;
-
-  OdometryState state;
-  // From the previous state's position to this one's, in the previous frame.
-  Eigen::Vector3d step_in_previous = Eigen::Vector3d::Zero();
-
-  // R <- Exp_z(d_z) Exp((d_x, d_y, 0)) R; the rest is added.
-  void Retract(const Eigen::Matrix<double, kSize, 1>& delta);
-};
-
-// The unknowns of all times.
-struct ChainGlobals {
-  enum Offset {
-    kLoggedLength = 0,
-    kLoggedYaw,
-    kCurvature,
-    kMountYaw,
-    kMountPitch
-  };
-  static constexpr int kSize = 5;
-  using Vector = Eigen::Matrix<double, kSize, 1>;
-
-  // Logged length = first * true length, logged yaw = second * true yaw -
-  // third * distance; the forward direction is turned by the mount angles.
-  // Factors stand with what is estimated, not with what was logged: a factor
-  // of noisy readings would come out too small, the smaller the noise is then.
-  Vector values = (Vector() << 1.0, 1.0, 0.0, 0.0, 0.0).finished();
-
-  static Vector PriorMeans() { return ChainGlobals().values; }
-  static Vector PriorSigmas(const OdometryFusionOptions& options);
-  // Unit vector in the body frame, and its derivative by (yaw, pitch).
-  Eigen::Vector3d Forward(const Eigen::Quaterniond& imu_from_wheel,
-                          Eigen::Matrix<double, 3, 2>* jacobian) const;
-};
 
 // Tangent coordinates of one link: (state k, state k + 1, globals).
 inline constexpr int kLinkSize = 2 * ChainState::kSize + ChainGlobals::kSize;
@@ -64,6 +19,7 @@ inline constexpr int kLinkSize = 2 * ChainState::kSize + ChainGlobals::kSize;
 //   biases    b_k+1 - b_k                             (random walk)
 //   wheels    q (u + A l - l) - (M d + N (phi x d))   (3x3 / weight)
 //   yaw       q' z . Log(A) - curvature * distance - yaw
+//   vision    Log(V^T A)                              (sigma / weight)
 //   rest      Log(A), u, v_k, v_k+1                   (at a standstill)
 // plus weak priors where a link has no sensor for a coordinate.
 struct LinkResiduals {
@@ -71,6 +27,13 @@ struct LinkResiduals {
   Eigen::Matrix<double, Eigen::Dynamic, kLinkSize> jacobian;
   // Squared norm of the wheels' residuals, before their weight.
   double wheel_chi2 = 0.0;
+  double vision_chi2 = 0.0;  // the same for vision
+};
+
+// What a link's sensors count for: 1, less where they contradict the rest.
+struct LinkWeights {
+  double wheel = 1.0;
+  double vision = 1.0;
 };
 
 struct LinkContext {
@@ -83,6 +46,6 @@ LinkResiduals ComputeLinkResiduals(const LinkContext& context,
                                    const ChainState& first,
                                    const ChainState& second,
                                    const ChainGlobals& globals,
-                                   double wheel_weight);
+                                   const LinkWeights& weights);
 
 }  // namespace adasfm

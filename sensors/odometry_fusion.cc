@@ -8,6 +8,7 @@
 #include "core/so3.h"
 #include "sensors/chain_elimination.h"
 #include "sensors/odometry_factors.h"
+#include "sensors/wheel_slips.h"
 
 namespace adasfm {
 namespace {
@@ -18,19 +19,22 @@ constexpr double kFirstSpeedSigma = 50.0;  // m/s
 // Slip thresholds start high and come down, so that links are judged by a
 // solution that is nearly right already.
 constexpr double kFirstThresholdFactor = 8.0;
-// Wheels that leave this much force unexplained at the start are slipping or
-// stuck there: no machine's gravity is off so far.
-constexpr double kMaxFirstForceError = 1.5;  // m/s^2
+// What wheels that are slipping or stuck at the start begin with.
 constexpr double kFirstSlipWeight = 1e-4;
 constexpr double kConvergedStep = 1e-5;  // of a sigma-free unit: rad, m/s, m
+
+// 1 up to the threshold, then falling faster than the residual grows.
+double RobustWeight(double chi2, double threshold_sigma) {
+  const double ratio =
+      threshold_sigma * threshold_sigma / std::max(chi2, 1e-12);
+  return ratio >= 1.0 ? 1.0 : std::max(1e-6, ratio * ratio);
+}
 
 class Smoother {
  public:
   Smoother(const OdometryFusionProblem& problem,
            const OdometryFusionOptions& options)
-      : problem_(problem),
-        options_(options),
-        weights_(problem.links.size(), 1.0) {
+      : problem_(problem), options_(options), weights_(problem.links.size()) {
     context_ = {&problem_, &options_};
     states_.resize(problem.initial_states.size());
     for (size_t k = 0; k < states_.size(); ++k) {
@@ -44,7 +48,6 @@ class Smoother {
   OdometryFusionResult Run();
 
  private:
-  void SetFirstWeights();
   Eigen::Vector3d InitialStep(size_t k) const;
   LinkResiduals Residuals(size_t k) const {
     return ComputeLinkResiduals(context_, problem_.links[k], states_[k],
@@ -55,14 +58,14 @@ class Smoother {
   double Cost() const;
   // One damped Gauss-Newton step; returns the largest coordinate's change.
   double Step();
-  void UpdateWeights(double threshold);
+  // Thresholds are the options' times factor.
+  void UpdateWeights(double factor);
   void FillResult(OdometryFusionResult* result) const;
-  void FindSlips(OdometryFusionResult* result) const;
 
   const OdometryFusionProblem& problem_;
   const OdometryFusionOptions& options_;
   LinkContext context_;
-  std::vector<double> weights_;
+  std::vector<LinkWeights> weights_;
   std::vector<ChainState> states_;
   ChainGlobals globals_;
   double damping_ = 0.0;
@@ -76,28 +79,6 @@ Eigen::Vector3d Smoother::InitialStep(size_t k) const {
       globals_.Forward(problem_.imu_from_wheel.rotation, nullptr);
   return link.wheel.displacement_map * forward + lever -
          link.wheel.profile_rotation * lever;
-}
-
-// The first solution would be pulled far off by grossly wrong wheels: those
-// whose first speeds leave a force that is not gravity, and their neighbours.
-void Smoother::SetFirstWeights() {
-  const size_t num_links = problem_.links.size();
-  for (size_t k = 0; k < num_links; ++k) {
-    const OdometryLink& link = problem_.links[k];
-    if (!link.has_imu || !link.has_wheel || link.dt_s <= 0.0) continue;
-    const OdometryState& first = states_[k].state;
-    const Eigen::Vector3d force =
-        (link.imu.delta_rotation * states_[k + 1].state.velocity_in_imu -
-         first.velocity_in_imu - link.imu.delta_velocity) /
-        link.dt_s;
-    const Eigen::Vector3d expected =
-        first.world_from_imu.conjugate() *
-        Eigen::Vector3d(0.0, 0.0, -options_.gravity_m_s2);
-    if ((force - expected).norm() < kMaxFirstForceError) continue;
-    for (size_t i = k > 0 ? k - 1 : 0; i < std::min(num_links, k + 2); ++i) {
-      if (problem_.links[i].has_wheel) weights_[i] = kFirstSlipWeight;
-    }
-  }
 }
 
 LinkEquations Smoother::Equations(size_t k) const {
@@ -180,39 +161,20 @@ double Smoother::Step() {
   return 0.0;
 }
 
-void Smoother::UpdateWeights(double threshold) {
-  for (size_t k = 0; k < problem_.links.size(); ++k) {
-    if (!problem_.links[k].has_wheel || !problem_.links[k].has_imu) continue;
-    const double chi2 = Residuals(k).wheel_chi2;
-    // 1 up to the threshold, then falling faster than the residual grows.
-    const double ratio = threshold * threshold / std::max(chi2, 1e-12);
-    weights_[k] = ratio >= 1.0 ? 1.0 : std::max(1e-6, ratio * ratio);
-  }
-}
-
-void Smoother::FindSlips(OdometryFusionResult* result) const {
-  const double scale = 1.0 / globals_.values[ChainGlobals::kLoggedLength];
-  const Eigen::Vector3d& lever = problem_.imu_from_wheel.translation;
-  const Eigen::Vector3d forward =
-      globals_.Forward(problem_.imu_from_wheel.rotation, nullptr);
+void Smoother::UpdateWeights(double factor) {
+  const double wheel_threshold = factor * options_.slip_threshold_sigma;
+  const double vision_threshold = factor * options_.vision_threshold_sigma;
   for (size_t k = 0; k < problem_.links.size(); ++k) {
     const OdometryLink& link = problem_.links[k];
-    if (!link.has_wheel || weights_[k] > kSlipWeight || link.dt_s <= 0.0) {
-      continue;
+    // Without the IMU there is nothing that they could contradict.
+    if (!link.has_imu || !(link.has_wheel || link.has_vision)) continue;
+    const LinkResiduals residuals = Residuals(k);
+    if (link.has_wheel) {
+      weights_[k].wheel = RobustWeight(residuals.wheel_chi2, wheel_threshold);
     }
-    const Eigen::Quaterniond rotation =
-        states_[k].state.world_from_imu.conjugate() *
-        states_[k + 1].state.world_from_imu;
-    const Eigen::Vector3d moved =
-        states_[k + 1].step_in_previous + rotation * lever - lever;
-    const Eigen::Vector3d logged =
-        scale * (link.wheel.displacement_map * forward);
-    const double direction = link.wheel.distance_m < 0.0 ? -1.0 : 1.0;
-    const Eigen::Vector3d along =
-        direction * (logged.norm() > 1e-6 ? logged.normalized() : forward);
-    const double speed_error = (logged - moved).dot(along) / link.dt_s;
-    if (std::abs(speed_error) >= options_.slip_min_speed_m_s) {
-      result->slipping_links.emplace_back(k, speed_error);
+    if (link.has_vision) {
+      weights_[k].vision =
+          RobustWeight(residuals.vision_chi2, vision_threshold);
     }
   }
 }
@@ -232,7 +194,7 @@ void Smoother::FillResult(OdometryFusionResult* result) const {
             states_[k].state.world_from_imu;
         const Eigen::Vector3d& step = states_[k + 1].step_in_previous;
         motion.body2_from_body1 = Rigid3d(r21, r21 * -step);
-        motion.wheel_weight = weights_[k];
+        motion.wheel_weight = weights_[k].wheel;
         // dtheta = R2^T (d1 - d2), dt = [R21 u]x dtheta - R21 du.
         Eigen::Matrix<double, 6, kLinkSize> map;
         map.setZero();
@@ -252,20 +214,34 @@ void Smoother::FillResult(OdometryFusionResult* result) const {
         const double length = globals_.values[ChainGlobals::kLoggedLength];
         result->wheel_scale_sigma =
             std::sqrt(covariance(kLength, kLength)) / (length * length);
+        constexpr int kMount = 2 * ChainState::kSize + ChainGlobals::kMountYaw;
+        result->wheel_mount_sigma =
+            covariance.diagonal().segment<2>(kMount).cwiseSqrt();
       });
   result->wheel_scale = 1.0 / globals_.values[ChainGlobals::kLoggedLength];
+  result->wheel_mount = globals_.values.segment<2>(ChainGlobals::kMountYaw);
   if (num_links > 0) {
     result->gyroscope_bias_sigma = std::sqrt(gyro_variance / num_links);
     result->accelerometer_bias_sigma = std::sqrt(accel_variance / num_links);
   }
   for (const ChainState& state : states_) result->states.push_back(state.state);
-  FindSlips(result);
+  for (size_t k = 0; k < num_links; ++k) {
+    const OdometryLink& link = problem_.links[k];
+    if (!link.has_wheel || weights_[k].wheel > kSlipWeight) continue;
+    const double speed_error = ComputeWheelSpeedError(problem_, k, states_[k],
+                                                      states_[k + 1], globals_);
+    if (std::abs(speed_error) >= options_.slip_min_speed_m_s) {
+      result->slipping_links.emplace_back(k, speed_error);
+    }
+  }
 }
 
 OdometryFusionResult Smoother::Run() {
   OdometryFusionResult result;
   double factor = kFirstThresholdFactor;
-  SetFirstWeights();
+  for (const size_t k : FindSuspectWheels(problem_, options_.gravity_m_s2)) {
+    weights_[k].wheel = kFirstSlipWeight;
+  }
   while (result.num_iterations < options_.max_num_iterations) {
     ++result.num_iterations;
     const double change = Step();
@@ -275,7 +251,7 @@ OdometryFusionResult Smoother::Run() {
     }
     // The threshold comes down once the solution has settled at it.
     if (change < 1e-2) factor = std::max(1.0, 0.5 * factor);
-    UpdateWeights(factor * options_.slip_threshold_sigma);
+    UpdateWeights(factor);
   }
   FillResult(&result);
   return result;

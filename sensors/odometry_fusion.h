@@ -36,6 +36,8 @@ struct OdometryFusionOptions {
   double planar_rotation_noise = 0.03;
   // A wheel interval further than this from the IMU (in sigmas) loses weight.
   double slip_threshold_sigma = 4.0;
+  // The same for a two-view rotation.
+  double vision_threshold_sigma = 3.0;
   // Reported as slip when also the speed is off by more than this.
   double slip_min_speed_m_s = 0.2;
   // A machine at rest moves no more than this.
@@ -71,6 +73,10 @@ struct OdometryLink {
   // The wheels see no turn (WheelType::kSpeed).
   bool has_wheel_yaw = false;
   StandstillKind standstill = StandstillKind::kNone;
+  // The body's rotation over the link (first_from_second) as cameras saw it.
+  bool has_vision = false;
+  Eigen::Quaterniond visual_rotation = Eigen::Quaterniond::Identity();
+  double visual_sigma_rad = 0.0;
 };
 
 struct OdometryFusionProblem {
@@ -112,6 +118,10 @@ struct OdometryFusionResult {
   std::vector<std::pair<size_t, double>> slipping_links;
   double wheel_scale = 1.0;
   double wheel_scale_sigma = 0.0;
+  // How the direction of driving is turned against T_imu_wheel: about its z
+  // (to the left) and its y axis (down), rad.
+  Eigen::Vector2d wheel_mount = Eigen::Vector2d::Zero();
+  Eigen::Vector2d wheel_mount_sigma = Eigen::Vector2d::Zero();
   double gyroscope_bias_sigma = 0.0;      // mean of states and axes
   double accelerometer_bias_sigma = 0.0;  // mean of states and axes
   int num_iterations = 0;

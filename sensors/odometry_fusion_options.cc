@@ -17,6 +17,7 @@ bool OdometryFusionOptions::IsValid(std::string* error) const {
       {"vertical_speed_noise", vertical_speed_noise},
       {"planar_rotation_noise", planar_rotation_noise},
       {"slip_threshold_sigma", slip_threshold_sigma},
+      {"vision_threshold_sigma", vision_threshold_sigma},
       {"standstill_speed_sigma", standstill_speed_sigma},
       {"standstill_rate_sigma", standstill_rate_sigma},
       {"unaided_speed_sigma", unaided_speed_sigma},

@@ -41,6 +41,34 @@ void SummarizeRates(const MotionLogs& logs, SensorSummary* summary) {
   }
 }
 
+void SummarizeFusion(const OdometryFusionProblem& problem,
+                     const OdometryFusionResult& fused, const MotionLogs& logs,
+                     SensorSummary* summary) {
+  for (const OdometryLink& link : problem.links) {
+    if (link.standstill != StandstillKind::kNone)
+      summary->standstill_s += link.dt_s;
+  }
+  for (size_t k = 0; k < problem.links.size(); ++k) {
+    if (!problem.links[k].has_wheel) continue;
+    summary->distance_m += fused.motions[k].body2_from_body1.translation.norm();
+  }
+  if (!logs.imu.empty()) {
+    for (const OdometryState& state : fused.states) {
+      summary->gyroscope_bias += state.bias.gyroscope / fused.states.size();
+      summary->accelerometer_bias +=
+          state.bias.accelerometer / fused.states.size();
+    }
+    summary->gyroscope_bias_sigma = fused.gyroscope_bias_sigma;
+    summary->accelerometer_bias_sigma = fused.accelerometer_bias_sigma;
+  }
+  if (!(logs.wheel.empty() && logs.odometry.empty())) {
+    summary->wheel_scale = fused.wheel_scale;
+    summary->wheel_scale_sigma = fused.wheel_scale_sigma;
+    summary->wheel_mount_deg = RadToDeg(1.0) * fused.wheel_mount;
+    summary->wheel_mount_sigma_deg = RadToDeg(1.0) * fused.wheel_mount_sigma;
+  }
+}
+
 std::vector<WheelSlip> ListWheelSlips(const OdometryFusionResult& fused,
                                       const OdometryTimeline& timeline,
                                       timestamp_t timeshift_ns) {

@@ -33,9 +33,16 @@ struct SensorSummary {
   // True speed = scale * logged speed.
   double wheel_scale = 1.0;
   double wheel_scale_sigma = 0.0;
+  // The direction of driving against T_imu_wheel: to the left and down.
+  Eigen::Vector2d wheel_mount_deg = Eigen::Vector2d::Zero();
+  Eigen::Vector2d wheel_mount_sigma_deg = Eigen::Vector2d::Zero();
   // The time shift in use, and what vision would add to it (0 when unknown).
   double timeshift_cam_imu_s = 0.0;
   double visual_timeshift_correction_s = 0.0;
+  // Pairs whose two-view rotation took part in the smoother, and with which
+  // sigma an axis.
+  int num_visual_links = 0;
+  double visual_sigma_deg = 0.0;
   std::vector<WheelSlip> wheel_slips;  // camera clock
   double distance_m = 0.0;
   // Expected error of the chained priors after 100 m, 1 sigma.
@@ -46,6 +53,11 @@ struct SensorSummary {
 
 // Rates and gaps of the logs.
 void SummarizeRates(const MotionLogs& logs, SensorSummary* summary);
+
+// Biases, scale, mounting, distance and standstill as the smoother found them.
+void SummarizeFusion(const OdometryFusionProblem& problem,
+                     const OdometryFusionResult& fused, const MotionLogs& logs,
+                     SensorSummary* summary);
 
 // Slips between the first and the last image, on the camera's clock.
 std::vector<WheelSlip> ListWheelSlips(const OdometryFusionResult& fused,

@@ -75,14 +75,15 @@ Eigen::VectorXd ResidualsAfter(
   second.Retract(delta.segment<ChainState::kSize>(ChainState::kSize));
   globals.values += delta.tail<ChainGlobals::kSize>();
   const LinkContext context{&r.problem, &r.options};
-  return ComputeLinkResiduals(context, r.link, first, second, globals, 0.5)
+  return ComputeLinkResiduals(context, r.link, first, second, globals,
+                              LinkWeights{0.5, 0.5})
       .values;
 }
 
 void ExpectJacobianIsNumeric(const RandomLink& r) {
   const LinkContext context{&r.problem, &r.options};
-  const LinkResiduals residuals =
-      ComputeLinkResiduals(context, r.link, r.first, r.second, r.globals, 0.5);
+  const LinkResiduals residuals = ComputeLinkResiduals(
+      context, r.link, r.first, r.second, r.globals, LinkWeights{0.5, 0.5});
   constexpr double kStep = 1e-6;
   for (int column = 0; column < kLinkSize; ++column) {
     Eigen::Matrix<double, kLinkSize, 1> delta;
@@ -107,6 +108,10 @@ TEST(LinkResiduals, JacobianMatchesNumericDerivative) {
     r.link.wheel.rotation = r.link.imu.delta_rotation;
     ExpectJacobianIsNumeric(r);
     r.link.wheel.has_rotation = false;
+    r.link.has_vision = true;
+    r.link.visual_rotation = r.link.imu.delta_rotation;
+    r.link.visual_sigma_rad = 1e-3;
+    ExpectJacobianIsNumeric(r);
     r.link.has_imu = false;
     ExpectJacobianIsNumeric(r);
     r.link.has_wheel = false;

@@ -1,0 +1,109 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "sensors/visual_links.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/so3.h"
+
+namespace adasfm {
+namespace {
+
+// Fewer say too little of a bias to be worth their risk.
+constexpr int kMinNumLinks = 20;
+constexpr int kMinNumInliers = 20;
+constexpr double kMaxSigma = 0.0175;  // rad
+// Two-view geometries are never more exact than this.
+constexpr double kMinSigma = 3e-4;  // rad
+constexpr double kSigmaFactor = 1.5;
+// The median of a three-dimensional normal vector's length.
+constexpr double kMedianNorm = 1.538;
+
+double Median(std::vector<double>* values) {
+  const auto middle = values->begin() + values->size() / 2;
+  std::nth_element(values->begin(), middle, values->end());
+  return *middle;
+}
+
+// Vision against the gyroscope over the links: the errors' sigma per axis.
+double EstimateSigma(const std::vector<OdometryLink>& links,
+                     const std::vector<size_t>& indices) {
+  std::vector<Eigen::Vector3d> errors;
+  for (const size_t k : indices) {
+    errors.push_back(LogSo3(links[k].imu.delta_rotation.conjugate() *
+                            links[k].visual_rotation));
+  }
+  Eigen::Vector3d rate;
+  std::vector<double> values(indices.size());
+  for (int axis = 0; axis < 3; ++axis) {
+    for (size_t i = 0; i < indices.size(); ++i) {
+      values[i] = errors[i][axis] / links[indices[i]].dt_s;
+    }
+    rate[axis] = Median(&values);
+  }
+  for (size_t i = 0; i < indices.size(); ++i) {
+    values[i] = (errors[i] - rate * links[indices[i]].dt_s).norm();
+  }
+  return Median(&values) / kMedianNorm;
+}
+
+}  // namespace
+
+std::vector<TimedRotation> ComputeTimedRotations(
+    const std::vector<VisualRotation>& rotations,
+    const std::map<image_t, timestamp_t>& image_times_ns) {
+  std::vector<TimedRotation> timed;
+  for (const VisualRotation& rotation : rotations) {
+    const auto first = image_times_ns.find(rotation.image_id1);
+    const auto second = image_times_ns.find(rotation.image_id2);
+    if (first == image_times_ns.end() || second == image_times_ns.end()) {
+      continue;
+    }
+    TimedRotation entry{first->second, second->second, rotation.cam2_from_cam1,
+                        static_cast<double>(rotation.num_inliers)};
+    if (entry.start_ns > entry.end_ns) {
+      std::swap(entry.start_ns, entry.end_ns);
+      entry.cam2_from_cam1 = entry.cam2_from_cam1.conjugate();
+    }
+    timed.push_back(entry);
+  }
+  return timed;
+}
+
+VisualLinks AddVisualRotations(const std::vector<TimedRotation>& rotations,
+                               timestamp_t timeshift_ns,
+                               const Eigen::Quaterniond& cam_from_imu,
+                               const OdometryTimeline& timeline,
+                               OdometryFusionProblem* problem) {
+  const std::vector<timestamp_t>& times = timeline.times_ns;
+  std::vector<size_t> indices;
+  for (const TimedRotation& rotation : rotations) {
+    if (rotation.weight < kMinNumInliers) continue;
+    const timestamp_t start = rotation.start_ns + timeshift_ns;
+    const auto it = std::lower_bound(times.begin(), times.end(), start);
+    const size_t k = it - times.begin();
+    if (k + 1 >= times.size() || times[k] != start ||
+        times[k + 1] != rotation.end_ns + timeshift_ns ||
+        !problem->links[k].has_imu || problem->links[k].dt_s <= 0.0) {
+      continue;
+    }
+    // cam2_from_cam1 turns against the body's motion.
+    problem->links[k].visual_rotation = cam_from_imu.conjugate() *
+                                        rotation.cam2_from_cam1.conjugate() *
+                                        cam_from_imu;
+    indices.push_back(k);
+  }
+  if (indices.size() < kMinNumLinks) return VisualLinks();
+  const double sigma = EstimateSigma(problem->links, indices);
+  if (sigma > kMaxSigma) return VisualLinks();
+  VisualLinks result;
+  result.num_links = static_cast<int>(indices.size());
+  result.sigma_rad = kSigmaFactor * std::max(kMinSigma, sigma);
+  for (const size_t k : indices) {
+    problem->links[k].has_vision = true;
+    problem->links[k].visual_sigma_rad = result.sigma_rad;
+  }
+  return result;
+}
+
+}  // namespace adasfm

@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <map>
+#include <vector>
+
+#include "sensors/build_odometry_links.h"
+#include "sensors/check_against_vision.h"
+#include "sensors/estimate_priors.h"
+#include "sensors/odometry_fusion.h"
+
+namespace adasfm {
+
+// The rotations between images with a time (camera clock), forwards in time.
+std::vector<TimedRotation> ComputeTimedRotations(
+    const std::vector<VisualRotation>& rotations,
+    const std::map<image_t, timestamp_t>& image_times_ns);
+
+struct VisualLinks {
+  int num_links = 0;
+  // 1 sigma of an axis in use, rad.
+  double sigma_rad = 0.0;
+};
+
+// Gives the links of `problem` that join two images in a row what vision saw of
+// their rotation, as a further observation: over many links it holds the
+// gyroscope's bias, which nothing else on a moving machine observes about the
+// vertical. How exact vision is follows from its distance to the gyroscope
+// (less a constant, by medians) and is taken for half as much again, because errors of
+// neighbouring pairs are alike (lens, shutter) and because vision itself is
+// used again later. Vision with too few pairs, or off by more than 1 deg in the
+// median, changes nothing.
+VisualLinks AddVisualRotations(const std::vector<TimedRotation>& rotations,
+                               timestamp_t timeshift_ns,
+                               const Eigen::Quaterniond& cam_from_imu,
+                               const OdometryTimeline& timeline,
+                               OdometryFusionProblem* problem);
+
+}  // namespace adasfm
