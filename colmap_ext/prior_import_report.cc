@@ -7,8 +7,8 @@
 namespace adasfm {
 namespace {
 
-std::vector<double> ToList(const Eigen::Vector3d& vector) {
-  return {vector.x(), vector.y(), vector.z()};
+std::vector<double> ToList(const Eigen::Ref<const Eigen::VectorXd>& vector) {
+  return {vector.data(), vector.data() + vector.size()};
 }
 
 std::string ToText(const Eigen::Vector3d& vector) {
@@ -42,13 +42,19 @@ std::string FormatPriorImport(const PriorImport& import) {
          << " +- " << summary.accelerometer_bias_sigma << " m/s^2\n"
          << "gravity             " << ToText(summary.first_gravity_in_cam)
          << " in the first camera\n"
-         << "standstill          " << summary.standstill_s << " s\n";
+         << "standstill          " << summary.standstill_s << " s\n"
+         << "vision in smoother  " << summary.num_visual_links << " pairs, +- "
+         << summary.visual_sigma_deg << " deg\n";
   }
   if (summary.wheel_rate_hz > 0.0) {
     text << "wheels              " << summary.wheel_rate_hz << " Hz, "
          << summary.num_wheel_gaps << " gaps (longest "
          << summary.max_wheel_gap_s << " s), scale " << summary.wheel_scale
          << " +- " << summary.wheel_scale_sigma << "\n"
+         << "driving direction   " << summary.wheel_mount_deg.x() << " left, "
+         << summary.wheel_mount_deg.y() << " down of T_imu_wheel's, +- "
+         << summary.wheel_mount_sigma_deg.x() << " and "
+         << summary.wheel_mount_sigma_deg.y() << " deg\n"
          << "distance            " << summary.distance_m << " m, "
          << summary.wheel_slips.size() << " slips\n";
     for (const WheelSlip& slip : summary.wheel_slips) {
@@ -75,6 +81,8 @@ std::string PriorImportToJson(const PriorImport& import) {
       {"num_visual_rotations", import.num_visual_rotations},
       {"timeshift_cam_imu_s", summary.timeshift_cam_imu_s},
       {"visual_timeshift_correction_s", summary.visual_timeshift_correction_s},
+      {"num_visual_links", summary.num_visual_links},
+      {"visual_sigma_deg", summary.visual_sigma_deg},
       {"imu_rate_hz", summary.imu_rate_hz},
       {"num_imu_gaps", summary.num_imu_gaps},
       {"max_imu_gap_s", summary.max_imu_gap_s},
@@ -89,6 +97,8 @@ std::string PriorImportToJson(const PriorImport& import) {
       {"max_wheel_gap_s", summary.max_wheel_gap_s},
       {"wheel_scale", summary.wheel_scale},
       {"wheel_scale_sigma", summary.wheel_scale_sigma},
+      {"wheel_mount_deg", ToList(summary.wheel_mount_deg)},
+      {"wheel_mount_sigma_deg", ToList(summary.wheel_mount_sigma_deg)},
       {"distance_m", summary.distance_m},
       {"drift_per_100m_m", summary.drift_per_100m_m},
       {"drift_per_100m_deg", summary.drift_per_100m_deg},

@@ -30,6 +30,7 @@ packages=(
   libgl1-mesa-dev libeigen3-dev libceres-dev libsuitesparse-dev
   # Ours.
   libopencv-dev libyaml-cpp-dev nlohmann-json3-dev
+  librosbag-storage-dev libsensor-msgs-dev libnav-msgs-dev
   libgtest-dev libgmock-dev libbenchmark-dev
   # For the scripts that draw tables and compare models.
   python3 python3-numpy python3-matplotlib sqlite3)

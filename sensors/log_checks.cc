@@ -139,7 +139,8 @@ Status CheckLogTimes(const std::vector<timestamp_t>& times_ns,
         origin.Locate(first) + ": first of " + std::to_string(num_gaps) +
         Format(" gaps of more than 3 periods; the longest lasts %.3f s",
                longest_s) +
-        " before line " + std::to_string(origin.line_numbers[longest]) +
+        " before " + origin.unit + " " +
+        std::to_string(origin.line_numbers[longest]) +
         "; samples were lost in the recording");
   }
   return Status::Ok();

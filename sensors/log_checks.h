@@ -13,9 +13,18 @@ namespace adasfm {
 struct LogOrigin {
   std::string path;
   std::vector<size_t> line_numbers;
+  const char* unit = "line";  // what is counted
+
+  // Number 1, 2, ... of a log that is not made of lines.
+  static LogOrigin Numbered(const std::string& path, size_t num_samples,
+                            const char* unit) {
+    LogOrigin origin{path, {}, unit};
+    for (size_t i = 1; i <= num_samples; ++i) origin.line_numbers.push_back(i);
+    return origin;
+  }
 
   std::string Locate(size_t index) const {
-    return path + ", line " + std::to_string(line_numbers[index]);
+    return path + ", " + unit + " " + std::to_string(line_numbers[index]);
   }
 };
 

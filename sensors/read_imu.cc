@@ -6,6 +6,7 @@
 #include "sensors/log_checks.h"
 #include "sensors/log_file.h"
 #include "sensors/read_kitti_oxts.h"
+#include "sensors/read_rosbag.h"
 
 namespace adasfm {
 
@@ -16,14 +17,17 @@ StatusOr<std::vector<ImuSample>> ReadImu(const std::string& path,
   std::vector<ImuSample> samples;
   std::vector<timestamp_t> times;
   std::error_code error;
-  if (std::filesystem::is_directory(path, error)) {
+  if (IsRosbagPath(path)) {
+    StatusOr<std::vector<ImuSample>> bag = ReadRosbagImu(path);
+    if (!bag.ok()) return bag.status();
+    samples = std::move(*bag);
+    origin = LogOrigin::Numbered(path, samples.size(), "message");
+  } else if (std::filesystem::is_directory(path, error)) {
     StatusOr<std::vector<ImuSample>> oxts = ReadKittiOxts(path);
     if (!oxts.ok()) return oxts.status();
     samples = std::move(*oxts);
-    origin.path = path + "/timestamps.txt";
-    for (size_t i = 0; i < samples.size(); ++i) {
-      origin.line_numbers.push_back(i + 1);
-    }
+    origin =
+        LogOrigin::Numbered(path + "/timestamps.txt", samples.size(), "line");
   } else {
     StatusOr<LogFile> file = LogFile::Read(path);
     if (!file.ok()) return file.status();

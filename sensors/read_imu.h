@@ -10,11 +10,12 @@
 namespace adasfm {
 
 // Reads an IMU log: EuRoC CSV (commas), 4Seasons imu.txt (spaces), both
-// "ns wx wy wz ax ay az"; or a KITTI raw oxts folder (timestamps.txt and
-// data/). Times that go back, duplicates, NaN, a wrong number of columns,
-// degrees for radians, g for m/s^2 and |a| at rest off by more than 5 % are
-// errors that name file, line, cause and remedy. Gaps of more than three
-// periods are added to warnings (may be null).
+// "ns wx wy wz ax ay az"; a KITTI raw oxts folder (timestamps.txt and
+// data/); or a ROS 1 bag (sensors/read_rosbag.h). Times that go back,
+// duplicates, NaN, a wrong number of columns, degrees for radians, g for m/s^2
+// and |a| at rest off by more than 5 % are errors that name file, line, cause
+// and remedy. Gaps of more than three periods are added to warnings (may be
+// null).
 StatusOr<std::vector<ImuSample>> ReadImu(
     const std::string& path, std::vector<std::string>* warnings = nullptr);
 

@@ -6,6 +6,7 @@
 
 #include "sensors/log_checks.h"
 #include "sensors/log_file.h"
+#include "sensors/read_rosbag.h"
 
 namespace adasfm {
 namespace {
@@ -123,9 +124,20 @@ Status ParsePose(const LogFile& file, const LogLine& line, OdometryPose* pose) {
   return Status::Ok();
 }
 
+StatusOr<std::vector<OdometryPose>> CheckPoseTimes(
+    std::vector<OdometryPose> poses, const LogOrigin& origin,
+    std::vector<std::string>* warnings) {
+  std::vector<timestamp_t> times;
+  for (const OdometryPose& pose : poses) times.push_back(pose.timestamp_ns);
+  const Status status = CheckLogTimes(times, origin, warnings);
+  if (!status.ok()) return status;
+  return poses;
+}
+
 }  // namespace
 
 StatusOr<WheelType> ReadWheelType(const std::string& path) {
+  if (IsRosbagPath(path)) return WheelType::kOdometry;
   const StatusOr<LogFile> file = LogFile::Read(path);
   if (!file.ok()) return file.status();
   return FindType(*file);
@@ -134,6 +146,10 @@ StatusOr<WheelType> ReadWheelType(const std::string& path) {
 StatusOr<std::vector<WheelSample>> ReadWheel(
     const std::string& path, WheelType expected_type,
     std::vector<std::string>* warnings) {
+  if (IsRosbagPath(path)) {
+    return Status::Error(path + ": a ROS bag holds nav_msgs/Odometry; set " +
+                         "wheel0/type to odometry in the calibration");
+  }
   const StatusOr<LogFile> file = LogFile::Read(path);
   if (!file.ok()) return file.status();
   const StatusOr<WheelType> type = FindType(*file);
@@ -177,24 +193,26 @@ StatusOr<std::vector<WheelSample>> ReadWheel(
 
 StatusOr<std::vector<OdometryPose>> ReadOdometry(
     const std::string& path, std::vector<std::string>* warnings) {
+  if (IsRosbagPath(path)) {
+    StatusOr<std::vector<OdometryPose>> bag = ReadRosbagOdometry(path);
+    if (!bag.ok()) return bag.status();
+    const LogOrigin origin = LogOrigin::Numbered(path, bag->size(), "message");
+    return CheckPoseTimes(std::move(*bag), origin, warnings);
+  }
   const StatusOr<LogFile> file = LogFile::Read(path);
   if (!file.ok()) return file.status();
   LogOrigin origin;
   origin.path = path;
   std::vector<OdometryPose> poses;
-  std::vector<timestamp_t> times;
   for (size_t i = 0; i < file->num_lines(); ++i) {
     const LogLine line = file->Line(i);
     OdometryPose pose;
     const Status status = ParsePose(*file, line, &pose);
     if (!status.ok()) return status;
     poses.push_back(pose);
-    times.push_back(pose.timestamp_ns);
     origin.line_numbers.push_back(line.number);
   }
-  const Status status = CheckLogTimes(times, origin, warnings);
-  if (!status.ok()) return status;
-  return poses;
+  return CheckPoseTimes(std::move(poses), origin, warnings);
 }
 
 }  // namespace adasfm

@@ -20,7 +20,7 @@ StatusOr<std::vector<WheelSample>> ReadWheel(
     std::vector<std::string>* warnings = nullptr);
 
 // Reads a trajectory of lines "t tx ty tz qx qy qz qw", t in seconds (TUM) or
-// nanoseconds (4Seasons' result.txt).
+// nanoseconds (4Seasons' result.txt), or a ROS 1 bag (sensors/read_rosbag.h).
 StatusOr<std::vector<OdometryPose>> ReadOdometry(
     const std::string& path, std::vector<std::string>* warnings = nullptr);
 

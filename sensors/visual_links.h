@@ -26,10 +26,10 @@ struct VisualLinks {
 // their rotation, as a further observation: over many links it holds the
 // gyroscope's bias, which nothing else on a moving machine observes about the
 // vertical. How exact vision is follows from its distance to the gyroscope
-// (less a constant, by medians) and is taken for half as much again, because errors of
-// neighbouring pairs are alike (lens, shutter) and because vision itself is
-// used again later. Vision with too few pairs, or off by more than 1 deg in the
-// median, changes nothing.
+// (less a constant, by medians) and is taken for half as much again, because
+// errors of neighbouring pairs are alike (lens, shutter) and because vision
+// itself is used again later. Vision with too few pairs, or off by more than 1
+// deg in the median, changes nothing.
 VisualLinks AddVisualRotations(const std::vector<TimedRotation>& rotations,
                                timestamp_t timeshift_ns,
                                const Eigen::Quaterniond& cam_from_imu,

@@ -50,6 +50,8 @@ void AddFusionOptions(OdometryFusionOptions* fusion, CommandOptions* command) {
       "roll and pitch of a machine without IMU [rad/sqrt(s)]");
   add("slip_threshold_sigma", &fusion->slip_threshold_sigma,
       "wheels further than this from the IMU lose weight [sigma]");
+  add("vision_threshold_sigma", &fusion->vision_threshold_sigma,
+      "two-view rotations further than this from the rest lose weight [sigma]");
   add("slip_min_speed_m_s", &fusion->slip_min_speed_m_s,
       "slip is reported beyond this error of the speed [m/s]");
   add("standstill_speed_sigma", &fusion->standstill_speed_sigma,
@@ -76,10 +78,10 @@ void AddOptions(PriorImportOptions* options, CommandOptions* command) {
   add("max_lead_s", &estimation->max_lead_s,
       "logs are used from this long before the first image on [s]");
   add("use_visual_rotations", &estimation->use_visual_rotations,
-      "two-view rotations give the first gyroscope bias when the machine never "
-      "stands still (0 or 1)");
+      "two-view rotations help to find the gyroscope's bias: its first value "
+      "when the machine never stands still, and its course (0 or 1)");
   add("visual_bias_sigma", &estimation->visual_bias_sigma,
-      "how well they give it, 1 sigma [rad/s]");
+      "how well they give the first value, 1 sigma [rad/s]");
   add("estimate_time_shift", &estimation->estimate_time_shift,
       "add the time shift that vision and gyroscope agree on to the "
       "calibration's (0 or 1)");

@@ -6,6 +6,7 @@
 
 #include "core/random.h"
 #include "core/so3.h"
+#include "sensors/log_checks.h"
 #include "sensors/rotation_comparison.h"
 #include "synthetic_dataset.h"
 
@@ -26,6 +27,16 @@ TEST_P(Mistakes, AreNamed) {
     const SyntheticWorld world = BuildSyntheticWorld(SmallWorld(seed, 120));
     Dataset data = ToDataset(world);
     GetParam().make(&data);
+    // As the importer does: first the reader's checks of the log alone.
+    const Status units = CheckImuUnits(
+        data.logs.imu,
+        LogOrigin::Numbered("imu.csv", data.logs.imu.size(), "line"));
+    if (!units.ok()) {
+      EXPECT_NE(units.message().find(GetParam().words), std::string::npos)
+          << units.message();
+      EXPECT_NE(units.message().find("imu.csv, line"), std::string::npos);
+      continue;
+    }
     const std::vector<VisualRotation> vision = SimulateVision(world, seed);
     const StatusOr<PriorEstimate> estimate =
         EstimatePriors(data.images, data.logs, data.calibration, vision, {});
@@ -67,6 +78,13 @@ INSTANTIATE_TEST_SUITE_P(
                               }
                             },
                             "deg/s"},
+                    Mistake{"GravitiesForMetres",
+                            [](Dataset* data) {
+                              for (ImuSample& s : data->logs.imu) {
+                                s.specific_force /= 9.81;
+                              }
+                            },
+                            "m/s^2"},
                     Mistake{"OneSecond",
                             [](Dataset* data) {
                               for (ImuSample& s : data->logs.imu) {
