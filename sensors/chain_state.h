@@ -35,16 +35,19 @@ struct ChainGlobals {
     kLoggedYaw,
     kCurvature,
     kMountYaw,
-    kMountPitch
+    kMountPitch,
+    kVisualTurn
   };
-  static constexpr int kSize = 5;
+  static constexpr int kSize = 6;
   using Vector = Eigen::Matrix<double, kSize, 1>;
 
   // Logged length = first * true length, logged yaw = second * true yaw -
-  // third * distance; the forward direction is turned by the mount angles.
+  // third * distance; the forward direction is turned by the mount angles;
+  // two-view rotation vectors are the last times the true ones (a wrong focal
+  // length).
   // Factors stand with what is estimated, not with what was logged: a factor
   // of noisy readings would come out too small, the smaller the noise is then.
-  Vector values = (Vector() << 1.0, 1.0, 0.0, 0.0, 0.0).finished();
+  Vector values = (Vector() << 1.0, 1.0, 0.0, 0.0, 0.0, 1.0).finished();
 
   static Vector PriorMeans() { return ChainGlobals().values; }
   static Vector PriorSigmas(const OdometryFusionOptions& options);

@@ -247,11 +247,6 @@ void PriorEstimator::FillSummary() {
     summary.first_gravity_in_cam = first->second;
   }
   SummarizeFusion(problem_, fused_, logs_, &summary);
-  if (!fused_.converged) {
-    summary.warnings.push_back(
-        "the smoother did not settle: sensors contradict each other; check "
-        "T_cam_imu, T_imu_wheel and the noise figures");
-  }
   PredictDrift(problem_, !logs_.imu.empty(), &summary);
   summary.wheel_slips = ListWheelSlips(fused_, timeline_, timeshift_ns_);
 }
@@ -291,25 +286,6 @@ StatusOr<PriorEstimate> PriorEstimator::Run(
 }
 
 }  // namespace
-
-bool PriorEstimationOptions::IsValid(std::string* error) const {
-  const std::pair<const char*, double> positive[] = {
-      {"max_imu_gap_s", max_imu_gap_s},
-      {"max_wheel_gap_s", max_wheel_gap_s},
-      {"max_link_s", max_link_s},
-      {"visual_bias_sigma", visual_bias_sigma}};
-  for (const auto& [name, value] : positive) {
-    if (value > 0.0) continue;
-    *error = "AdaSfmPriors." + std::string(name) + " is " +
-             std::to_string(value) + "; it must be positive";
-    return false;
-  }
-  if (!(max_lead_s >= 0.0)) {
-    *error = "AdaSfmPriors.max_lead_s must not be negative";
-    return false;
-  }
-  return fusion.IsValid(error);
-}
 
 StatusOr<PriorEstimate> EstimatePriors(
     const std::vector<ImageStamp>& images, const SensorLogs& logs,

@@ -85,9 +85,15 @@ void LinkBuilder::AddBiasWalk() {
 
 void LinkBuilder::AddVision(double weight) {
   const int row = num_rows_;
-  AddRotationResidual(link_.visual_rotation,
-                      link_.visual_sigma_rad * link_.visual_sigma_rad / weight *
-                          Eigen::Matrix3d::Identity());
+  const double visual_per_true = globals_.values[ChainGlobals::kVisualTurn];
+  const Eigen::Vector3d turn = LogSo3(link_.visual_rotation) / visual_per_true;
+  const Eigen::Quaterniond measured = ExpSo3(turn);
+  const Eigen::Vector3d error = LogSo3(measured.conjugate() * a_rotation_);
+  jacobian_.block<3, 1>(row, kGlobals + ChainGlobals::kVisualTurn) =
+      RightJacobianInverseSo3(-error) * turn / visual_per_true;
+  AddRotationResidual(measured, link_.visual_sigma_rad *
+                                    link_.visual_sigma_rad / weight *
+                                    Eigen::Matrix3d::Identity());
   vision_chi2_ = values_.segment<3>(row).squaredNorm() / weight;
 }
 

@@ -19,7 +19,7 @@ inline constexpr int kLinkSize = 2 * ChainState::kSize + ChainGlobals::kSize;
 //   biases    b_k+1 - b_k                             (random walk)
 //   wheels    q (u + A l - l) - (M d + N (phi x d))   (3x3 / weight)
 //   yaw       q' z . Log(A) - curvature * distance - yaw
-//   vision    Log(V^T A)                              (sigma / weight)
+//   vision    Log(Exp(Log(V) / s)^T A)                (sigma / weight)
 //   rest      Log(A), u, v_k, v_k+1                   (at a standstill)
 // plus weak priors where a link has no sensor for a coordinate.
 struct LinkResiduals {

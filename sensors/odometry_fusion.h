@@ -38,6 +38,9 @@ struct OdometryFusionOptions {
   double slip_threshold_sigma = 4.0;
   // The same for a two-view rotation.
   double vision_threshold_sigma = 3.0;
+  // Two-view rotations may all be too large or too small by this share: a wrong
+  // focal length.
+  double visual_turn_sigma = 0.01;
   // Reported as slip when also the speed is off by more than this.
   double slip_min_speed_m_s = 0.2;
   // A machine at rest moves no more than this.

@@ -18,6 +18,7 @@ bool OdometryFusionOptions::IsValid(std::string* error) const {
       {"planar_rotation_noise", planar_rotation_noise},
       {"slip_threshold_sigma", slip_threshold_sigma},
       {"vision_threshold_sigma", vision_threshold_sigma},
+      {"visual_turn_sigma", visual_turn_sigma},
       {"standstill_speed_sigma", standstill_speed_sigma},
       {"standstill_rate_sigma", standstill_rate_sigma},
       {"unaided_speed_sigma", unaided_speed_sigma},

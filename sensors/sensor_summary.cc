@@ -67,6 +67,11 @@ void SummarizeFusion(const OdometryFusionProblem& problem,
     summary->wheel_mount_deg = RadToDeg(1.0) * fused.wheel_mount;
     summary->wheel_mount_sigma_deg = RadToDeg(1.0) * fused.wheel_mount_sigma;
   }
+  if (!fused.converged) {
+    summary->warnings.push_back(
+        "the smoother did not settle: sensors contradict each other; check "
+        "T_cam_imu, T_imu_wheel and the noise figures");
+  }
 }
 
 std::vector<WheelSlip> ListWheelSlips(const OdometryFusionResult& fused,

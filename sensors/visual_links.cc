@@ -16,6 +16,8 @@ constexpr double kMaxSigma = 0.0175;  // rad
 // Two-view geometries are never more exact than this.
 constexpr double kMinSigma = 3e-4;  // rad
 constexpr double kSigmaFactor = 1.5;
+// Of the turn: a slightly turned T_cam_imu moves whole bends.
+constexpr double kTurnShare = 0.05;
 // The median of a three-dimensional normal vector's length.
 constexpr double kMedianNorm = 1.538;
 
@@ -101,7 +103,9 @@ VisualLinks AddVisualRotations(const std::vector<TimedRotation>& rotations,
   result.sigma_rad = kSigmaFactor * std::max(kMinSigma, sigma);
   for (const size_t k : indices) {
     problem->links[k].has_vision = true;
-    problem->links[k].visual_sigma_rad = result.sigma_rad;
+    const double turn = LogSo3(problem->links[k].visual_rotation).norm();
+    problem->links[k].visual_sigma_rad =
+        std::hypot(result.sigma_rad, kTurnShare * turn);
   }
   return result;
 }

@@ -18,7 +18,7 @@ std::vector<TimedRotation> ComputeTimedRotations(
 
 struct VisualLinks {
   int num_links = 0;
-  // 1 sigma of an axis in use, rad.
+  // 1 sigma of an axis when not turning, rad.
   double sigma_rad = 0.0;
 };
 
@@ -27,9 +27,10 @@ struct VisualLinks {
 // gyroscope's bias, which nothing else on a moving machine observes about the
 // vertical. How exact vision is follows from its distance to the gyroscope
 // (less a constant, by medians) and is taken for half as much again, because
-// errors of neighbouring pairs are alike (lens, shutter) and because vision
-// itself is used again later. Vision with too few pairs, or off by more than 1
-// deg in the median, changes nothing.
+// errors of neighbouring pairs are alike (shutter) and because vision is used
+// again later; turning adds a share of the turn (a slightly turned T_cam_imu).
+// Vision with too few pairs, or off by more than 1 deg in the median, changes
+// nothing.
 VisualLinks AddVisualRotations(const std::vector<TimedRotation>& rotations,
                                timestamp_t timeshift_ns,
                                const Eigen::Quaterniond& cam_from_imu,

@@ -52,6 +52,8 @@ void AddFusionOptions(OdometryFusionOptions* fusion, CommandOptions* command) {
       "wheels further than this from the IMU lose weight [sigma]");
   add("vision_threshold_sigma", &fusion->vision_threshold_sigma,
       "two-view rotations further than this from the rest lose weight [sigma]");
+  add("visual_turn_sigma", &fusion->visual_turn_sigma,
+      "scale of all two-view rotations before any data, 1 sigma [1 = 100 %]");
   add("slip_min_speed_m_s", &fusion->slip_min_speed_m_s,
       "slip is reported beyond this error of the speed [m/s]");
   add("standstill_speed_sigma", &fusion->standstill_speed_sigma,

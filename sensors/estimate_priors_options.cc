@@ -1,0 +1,25 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "sensors/estimate_priors.h"
+
+namespace adasfm {
+
+bool PriorEstimationOptions::IsValid(std::string* error) const {
+  const std::pair<const char*, double> positive[] = {
+      {"max_imu_gap_s", max_imu_gap_s},
+      {"max_wheel_gap_s", max_wheel_gap_s},
+      {"max_link_s", max_link_s},
+      {"visual_bias_sigma", visual_bias_sigma}};
+  for (const auto& [name, value] : positive) {
+    if (value > 0.0) continue;
+    *error = "AdaSfmPriors." + std::string(name) + " is " +
+             std::to_string(value) + "; it must be positive";
+    return false;
+  }
+  if (!(max_lead_s >= 0.0)) {
+    *error = "AdaSfmPriors.max_lead_s must not be negative";
+    return false;
+  }
+  return fusion.IsValid(error);
+}
+
+}  // namespace adasfm

@@ -1,0 +1,159 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "sensors/shift_search.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/so3.h"
+
+namespace adasfm {
+namespace {
+
+// Only rotations over short times: the gyroscope's drift and the order of
+// turns do not matter there.
+constexpr double kMaxIntervalS = 1.0;
+constexpr double kMaxAngleRad = 1.0;
+// That many suffice; more would only take time.
+constexpr size_t kMaxNumRotations = 500;
+constexpr double kCoarseStepS = 0.02;
+
+}  // namespace
+
+void ShiftSearch::SelectRotations(const std::vector<TimedRotation>& rotations) {
+  std::vector<TimedRotation> usable;
+  for (const TimedRotation& rotation : rotations) {
+    const double dt = SecondsFromNs(rotation.end_ns - rotation.start_ns);
+    if (dt <= 0.0 || dt > kMaxIntervalS) continue;
+    if (LogSo3(rotation.cam2_from_cam1).norm() > kMaxAngleRad) continue;
+    usable.push_back(rotation);
+  }
+  std::stable_sort(usable.begin(), usable.end(),
+                   [](const TimedRotation& a, const TimedRotation& b) {
+                     return a.start_ns < b.start_ns;
+                   });
+  const size_t stride = usable.size() / kMaxNumRotations + 1;
+  for (size_t i = 0; i < usable.size(); i += stride) {
+    rotations_.push_back(usable[i]);
+  }
+  std::vector<timestamp_t> lengths;
+  for (const TimedRotation& rotation : usable) {
+    lengths.push_back(rotation.end_ns - rotation.start_ns);
+  }
+  std::sort(lengths.begin(), lengths.end());
+  for (const TimedRotation& rotation : usable) {
+    // Up to two frames: the tenth part of the lengths is one frame's, however
+    // far the matching reached.
+    const timestamp_t max_length = lengths[lengths.size() / 10] * 5 / 2;
+    if (rotation.end_ns - rotation.start_ns <= max_length &&
+        short_rotations_.size() < kMaxNumRotations) {
+      short_rotations_.push_back(rotation);
+    }
+  }
+}
+
+RotationComparison ShiftSearch::Compare(
+    const std::vector<TimedRotation>& rotations, double shift_s) const {
+  const timestamp_t shift = std::llround(1e9 * (timeshift_s_ + shift_s));
+  RotationComparison data;
+  for (const TimedRotation& rotation : rotations) {
+    const timestamp_t start = rotation.start_ns + shift;
+    const timestamp_t end = rotation.end_ns + shift;
+    if (!integral_.Covers(start) || !integral_.Covers(end)) continue;
+    data.visual.push_back(LogSo3(rotation.cam2_from_cam1));
+    // cam2_from_cam1 turns against the body's motion.
+    data.gyro.push_back(integral_.At(start) - integral_.At(end));
+    data.dt_s.push_back(SecondsFromNs(end - start));
+  }
+  return data;
+}
+
+void ShiftSearch::SearchShifts(std::vector<Explanation>* explanations) const {
+  const int num_steps =
+      static_cast<int>(std::ceil(options_.max_time_shift_s / kCoarseStepS));
+  const size_t min_num =
+      std::max<size_t>(options_.min_num_rotations, rotations_.size() / 2);
+  // From no shift outwards: the nearest of equals wins.
+  for (int step = 0; step <= 2 * num_steps; ++step) {
+    const int magnitude = (step + 1) / 2;
+    const double shift =
+        kCoarseStepS * (step % 2 == 1 ? magnitude : -magnitude);
+    const RotationComparison data = Compare(shift);
+    if (data.visual.size() < min_num) continue;
+    for (Explanation& explanation : *explanations) {
+      const RotationFit fit = ComputeRotationFit(data, explanation.mistake.map);
+      if (fit.cost < explanation.fit.cost) {
+        explanation.fit = fit;
+        explanation.shift_s = shift;
+      }
+    }
+  }
+}
+
+// Golden section.
+void ShiftSearch::RefineShift(Explanation* explanation) const {
+  constexpr double kRatio = 0.6180339887498949;
+  double low = explanation->shift_s - kCoarseStepS;
+  double high = explanation->shift_s + kCoarseStepS;
+  const bool has_short =
+      short_rotations_.size() >= 2 * options_.min_num_rotations;
+  const auto cost = [&](double shift) {
+    const RotationComparison data =
+        Compare(has_short ? short_rotations_ : rotations_, shift);
+    return ComputeRotationFit(data, explanation->mistake.map).cost;
+  };
+  double a = high - kRatio * (high - low), b = low + kRatio * (high - low);
+  double cost_a = cost(a), cost_b = cost(b);
+  while (high - low > 1e-4) {
+    if (cost_a < cost_b) {
+      high = b;
+      b = a;
+      cost_b = cost_a;
+      a = high - kRatio * (high - low);
+      cost_a = cost(a);
+    } else {
+      low = a;
+      a = b;
+      cost_a = cost_b;
+      b = low + kRatio * (high - low);
+      cost_b = cost(b);
+    }
+  }
+  explanation->shift_s = 0.5 * (low + high);
+  explanation->fit = ComputeRotationFit(Compare(explanation->shift_s),
+                                        explanation->mistake.map);
+}
+
+double ShiftSearch::Evidence(const Explanation& worse,
+                             const Explanation& better) const {
+  RotationComparison worse_data, better_data;
+  timestamp_t end_ns = rotations_.front().start_ns;
+  double covered_s = 0.0, sum_s = 0.0;
+  for (const TimedRotation& rotation : rotations_) {
+    const RotationComparison a = Compare({rotation}, worse.shift_s);
+    const RotationComparison b = Compare({rotation}, better.shift_s);
+    if (a.visual.empty() || b.visual.empty()) continue;
+    worse_data.Append(a);
+    better_data.Append(b);
+    sum_s += SecondsFromNs(rotation.end_ns - rotation.start_ns);
+    const timestamp_t new_ns = std::max(end_ns, rotation.end_ns);
+    covered_s += SecondsFromNs(new_ns - std::max(end_ns, rotation.start_ns));
+    end_ns = new_ns;
+  }
+  if (covered_s <= 0.0) return 0.0;
+  return ComputeEvidence(ComputeRateDistances(worse_data, worse.mistake.map,
+                                              worse.fit.rate_offset),
+                         ComputeRateDistances(better_data, better.mistake.map,
+                                              better.fit.rate_offset),
+                         sum_s / covered_s);
+}
+
+double ComputeTurningDeg(const RotationComparison& data) {
+  Eigen::Vector3d mean = Eigen::Vector3d::Zero();
+  for (const Eigen::Vector3d& v : data.visual) mean += v;
+  mean /= static_cast<double>(data.visual.size());
+  double sum = 0.0;
+  for (const Eigen::Vector3d& v : data.visual) sum += (v - mean).squaredNorm();
+  return RadToDeg(std::sqrt(sum / data.visual.size()));
+}
+
+}  // namespace adasfm

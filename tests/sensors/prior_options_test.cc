@@ -1,0 +1,156 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <gtest/gtest.h>
+
+
+#include "synthetic_dataset.h"
+
+namespace adasfm {
+namespace {
+
+enum class Sensors { kBoth, kImu, kWheels };
+
+// An option, another value for it, and the sensors with which it matters.
+struct OptionChange {
+  const char* name;
+  void (*change)(PriorEstimationOptions*);
+  Sensors sensors = Sensors::kBoth;
+};
+
+// A short drive with a standstill, a slip, a gap in both logs, a time shift and
+// two-view rotations, a few of them wrong.
+class Drive {
+ public:
+  explicit Drive(Sensors sensors) {
+    SyntheticWorldOptions options = SmallWorld(3, 60);
+    options.num_wheel_slips = 1;
+    options.timeshift_cam_imu_s = 0.01;
+    const SyntheticWorld world = BuildSyntheticWorld(options);
+    data_ = ToDataset(world);
+    data_.calibration.timeshift_cam_imu_s = 0.0;
+    vision_ = SimulateVision(world, 3, {1e-3, 1, 0.05});
+    const timestamp_t gap_ns = data_.images[20].timestamp_ns;
+    Cut(gap_ns, 60'000'000, &data_.logs.imu);
+    Cut(gap_ns, 120'000'000, &data_.logs.wheel);
+    if (sensors == Sensors::kImu) {
+      data_.calibration.has_wheel = false;
+      data_.logs.wheel.clear();
+    } else if (sensors == Sensors::kWheels) {
+      data_.calibration.has_imu = false;
+      data_.logs.imu.clear();
+    }
+  }
+
+  // All that comes out, as numbers.
+  std::vector<double> Outcome(const PriorEstimationOptions& options) const {
+    const StatusOr<PriorEstimate> estimate = EstimatePriors(
+        data_.images, data_.logs, data_.calibration, vision_, options);
+    if (!estimate.ok()) throw std::runtime_error(estimate.status().message());
+    const SensorSummary& summary = estimate->summary;
+    std::vector<double> values = {
+        static_cast<double>(summary.num_priors),
+        static_cast<double>(summary.wheel_slips.size()),
+        summary.timeshift_cam_imu_s, summary.gyroscope_bias_sigma};
+    for (const RelativePosePrior& prior : estimate->priors) {
+      values.push_back(prior.cam2_from_cam1.translation.norm());
+      for (int i = 0; i < 6; ++i) values.push_back(prior.covariance(i, i));
+    }
+    return values;
+  }
+
+ private:
+  template <typename Sample>
+  static void Cut(timestamp_t start_ns, timestamp_t length_ns,
+                  std::vector<Sample>* samples) {
+    std::vector<Sample> kept;
+    for (const Sample& sample : *samples) {
+      const timestamp_t since = sample.timestamp_ns - start_ns;
+      if (since < 0 || since > length_ns) kept.push_back(sample);
+    }
+    *samples = std::move(kept);
+  }
+
+  Dataset data_;
+  std::vector<VisualRotation> vision_;
+};
+
+class EveryOption : public testing::TestWithParam<OptionChange> {};
+
+TEST_P(EveryOption, ChangesTheOutcome) {
+  const Drive drive(GetParam().sensors);
+  PriorEstimationOptions options;
+  const std::vector<double> before = drive.Outcome(options);
+  GetParam().change(&options);
+  const std::vector<double> after = drive.Outcome(options);
+  EXPECT_NE(before, after);
+  // And back again.
+  EXPECT_EQ(drive.Outcome({}), before);
+}
+
+using Options = PriorEstimationOptions;
+
+INSTANTIATE_TEST_SUITE_P(
+    Priors, EveryOption,
+    testing::Values(
+        OptionChange{"MaxImuGap", [](Options* o) { o->max_imu_gap_s = 0.04; }},
+        OptionChange{"MaxWheelGap",
+                     [](Options* o) { o->max_wheel_gap_s = 0.1; }},
+        OptionChange{"MaxLink", [](Options* o) { o->max_link_s = 0.05; }},
+        OptionChange{"MaxLead", [](Options* o) { o->max_lead_s = 0.5; }},
+        OptionChange{"UseVisualRotations",
+                     [](Options* o) { o->use_visual_rotations = false; }},
+        OptionChange{"VisualBiasSigma",
+                     [](Options* o) { o->visual_bias_sigma = 2e-5; }},
+        OptionChange{"EstimateTimeShift",
+                     [](Options* o) { o->estimate_time_shift = true; }}),
+    [](const auto& change) { return change.param.name; });
+
+INSTANTIATE_TEST_SUITE_P(
+    Fusion, EveryOption,
+    testing::Values(
+        OptionChange{"Gravity",
+                     [](Options* o) { o->fusion.gravity_m_s2 = 9.7; }},
+        OptionChange{"GyroscopeBias",
+                     [](Options* o) { o->fusion.gyroscope_bias_sigma = 1e-5; }},
+        OptionChange{
+            "AccelerometerBias",
+            [](Options* o) { o->fusion.accelerometer_bias_sigma = 0.01; }},
+        OptionChange{"WheelScale",
+                     [](Options* o) { o->fusion.wheel_scale_sigma = 0.001; }},
+        OptionChange{"WheelTrack",
+                     [](Options* o) { o->fusion.wheel_track_sigma = 0.001; }},
+        OptionChange{
+            "WheelCurvature",
+            [](Options* o) { o->fusion.wheel_curvature_sigma = 1e-5; }},
+        OptionChange{"WheelMount",
+                     [](Options* o) { o->fusion.wheel_mount_sigma_deg = 0; }},
+        OptionChange{"LateralSpeed",
+                     [](Options* o) { o->fusion.lateral_speed_noise = 0.5; }},
+        OptionChange{"VerticalSpeed",
+                     [](Options* o) { o->fusion.vertical_speed_noise = 0.02; }},
+        OptionChange{"PlanarRotation",
+                     [](Options* o) { o->fusion.planar_rotation_noise = 0.1; },
+                     Sensors::kWheels},
+        OptionChange{"SlipThreshold",
+                     [](Options* o) { o->fusion.slip_threshold_sigma = 50.0; }},
+        OptionChange{"SlipMinSpeed",
+                     [](Options* o) { o->fusion.slip_min_speed_m_s = 100.0; }},
+        OptionChange{
+            "VisionThreshold",
+            [](Options* o) { o->fusion.vision_threshold_sigma = 100.0; }},
+        OptionChange{"VisualTurn",
+                     [](Options* o) { o->fusion.visual_turn_sigma = 1e-5; }},
+        OptionChange{
+            "StandstillSpeed",
+            [](Options* o) { o->fusion.standstill_speed_sigma = 0.5; }},
+        OptionChange{
+            "StandstillRate",
+            [](Options* o) { o->fusion.standstill_rate_sigma = 0.01; }},
+        OptionChange{"UnaidedSpeed",
+                     [](Options* o) { o->fusion.unaided_speed_sigma = 1.0; },
+                     Sensors::kImu},
+        OptionChange{"MaxNumIterations",
+                     [](Options* o) { o->fusion.max_num_iterations = 1; }}),
+    [](const auto& change) { return change.param.name; });
+
+}  // namespace
+}  // namespace adasfm
