@@ -33,7 +33,6 @@ struct PriorImport {
   SensorSummary summary;
   int num_images_without_time = 0;
   int num_visual_rotations = 0;
-  double seconds = 0.0;  // what reading and estimating took
   // Of the import and of the sensors.
   std::vector<std::string> warnings;
   double seconds = 0.0;  // that it took

@@ -237,10 +237,8 @@ void PriorEstimator::FillSummary() {
   summary.num_images = static_cast<int>(all_images_.size());
   summary.num_images_in_logs = static_cast<int>(images_.size());
   summary.num_priors = static_cast<int>(estimate_.priors.size());
-  if (all_images_.size() > 1) {
-    summary.prior_ratio =
-        static_cast<double>(summary.num_priors) / (all_images_.size() - 1);
-  }
+  summary.prior_ratio = static_cast<double>(summary.num_priors) /
+                        std::max<size_t>(1, all_images_.size() - 1);
   summary.timeshift_cam_imu_s = SecondsFromNs(timeshift_ns_);
   const auto first = estimate_.gravity_in_cam.find(images_[0].image_id);
   if (first != estimate_.gravity_in_cam.end()) {

@@ -54,8 +54,8 @@ struct SensorSummary {
 // Rates and gaps of the logs.
 void SummarizeRates(const MotionLogs& logs, SensorSummary* summary);
 
-// Biases, scale, mounting, distance and standstill as the smoother found them; a
-// warning when it did not settle.
+// Biases, scale, mounting, distance and standstill as the smoother found them,
+// and a warning when it did not settle.
 void SummarizeFusion(const OdometryFusionProblem& problem,
                      const OdometryFusionResult& fused, const MotionLogs& logs,
                      SensorSummary* summary);

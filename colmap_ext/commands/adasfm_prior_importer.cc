@@ -17,12 +17,14 @@ void AddPathOptions(PriorImportPaths* paths, CommandOptions* command) {
                       "times of the images: EuRoC data.csv, 4Seasons times.txt "
                       "or TUM rgb.txt; when empty, the names' digits are "
                       "nanoseconds");
-  command->AddDefault("imu_path", &paths->imu_path,
-                      "IMU log: EuRoC CSV, 4Seasons imu.txt or a KITTI oxts "
-                      "folder; none when empty");
-  command->AddDefault("wheel_path", &paths->wheel_path,
-                      "wheel log, told apart by its header line, or a TUM "
-                      "odometry trajectory; none when empty");
+  command->AddDefault(
+      "imu_path", &paths->imu_path,
+      "IMU log: EuRoC CSV, 4Seasons imu.txt, a KITTI oxts folder "
+      "or a ROS 1 bag; none when empty");
+  command->AddDefault(
+      "wheel_path", &paths->wheel_path,
+      "wheel log, told apart by its header line, a TUM odometry "
+      "trajectory or a ROS 1 bag with one; none when empty");
 }
 
 void AddFusionOptions(OdometryFusionOptions* fusion, CommandOptions* command) {
