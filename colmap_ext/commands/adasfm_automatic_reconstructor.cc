@@ -40,7 +40,7 @@ void AddPaths(AutomaticReconstructionPaths* paths, CommandOptions* command) {
 
 void AddFeatureOptions(FeatureOptions* features, CommandOptions* command) {
   command->AddDefault("camera_model", &features->camera_model,
-                      "COLMAP's camera model");
+                      "COLMAP's camera model, such as PINHOLE or OPENCV");
   command->AddDefault("camera_params", &features->camera_params,
                       "parameters of the model, comma-separated [px]; when "
                       "empty, the focal length is EXIF's or 1.2 times the "
