@@ -19,8 +19,9 @@ struct AutomaticReconstructionOptions {
   PriorImportOptions priors;
   GlobalStageOptions global;
   MapOptions map;
-  // Whether the coarse and the final model adjust focal length and distortion:
-  // 0, 1, or -1 for cameras without features.camera_params.
+  // Whether the model adjusts focal length and distortion: 0, 1, or -1 for
+  // cameras without features.camera_params. If it does, the coarse stage leaves
+  // the matches as they are.
   int refine_intrinsics = -1;
   // Of all stages; -1: all of the machine's.
   int num_threads = -1;

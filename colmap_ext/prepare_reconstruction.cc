@@ -72,15 +72,16 @@ Status PrepareReconstruction(AutomaticReconstructionOptions* options,
   options->pairs.descriptors.num_threads = options->num_threads;
   options->global.num_threads = options->num_threads;
   options->map.stage.num_threads = options->num_threads;
-  // EXIF gives a focal length to a few percent and no distortion; a calibration
-  // is left alone.
+  // EXIF's focal length may be off by a third, and says nothing of distortion;
+  // a calibration is left alone.
   const bool refine = options->refine_intrinsics < 0
                           ? options->features.camera_params.empty()
                           : options->refine_intrinsics == 1;
-  options->global.structure.bundle.refine_focal_length = refine;
-  options->global.structure.bundle.refine_extra_params = refine;
   options->map.refine_focal_length = refine;
   options->map.refine_extra_params = refine;
+  // Under intrinsics that are not right yet, epipolar lines would take most of
+  // the good matches away.
+  options->global.refinement.enabled = !refine;
   return Status::Ok();
 }
 
