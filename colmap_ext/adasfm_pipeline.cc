@@ -22,16 +22,21 @@ constexpr char kNoPriorsWarning[] =
     "the database has no sensor priors; the model will have no metric scale "
     "(adasfm_prior_importer adds them)";
 
+bool ChangesDatabase(const GlobalStageOptions& options) {
+  return options.refinement.enabled || options.poses.rotation_rates.enabled;
+}
+
 // Before any work: nothing is lost when the result cannot be written.
 Status CheckGlobalPaths(const GlobalStageOptions& options,
                         const std::string& database_path,
                         const std::string& output_path) {
   const Status status = CheckDatabase(database_path);
   if (!status.ok()) return status;
-  if (options.refinement.enabled && access(database_path.c_str(), W_OK) != 0) {
+  if (ChangesDatabase(options) && access(database_path.c_str(), W_OK) != 0) {
     return Status::Error("the database " + database_path +
                          " is not writable; change its permissions or use "
-                         "--AdaSfmGlobal.refine_matches 0");
+                         "--AdaSfmGlobal.refine_matches 0 "
+                         "--AdaSfmGlobal.correct_rotation_rates 0");
   }
   return PrepareOutputFolder(output_path);
 }
@@ -51,9 +56,12 @@ Status WriteGlobalResult(const GlobalStageOptions& options,
     status = WriteTextFile(output_path + "/removed_pairs.txt",
                            FormatRemovedPairs(scene, result.removed_pairs));
   }
-  if (status.ok() && options.refinement.enabled) {
+  if (status.ok() && ChangesDatabase(options)) {
     status = RewriteTwoViewGeometries(database_path, result.geometries,
-                                      result.removed_pairs);
+                                      result.removed_pairs,
+                                      result.poses.rotation_rates.corrected
+                                          ? result.poses.priors
+                                          : std::vector<RelativePosePrior>());
   }
   if (status.ok()) {
     status =

@@ -78,14 +78,13 @@ void AddPoints(const std::vector<TriangulatedTrack>& points,
 }
 
 PriorBundleAdjustmentProblem CreateProblem(
-    const CoarseStructureOptions& options, const SceneData& scene,
-    const CoarseModelInput& input) {
+    const CoarseStructureOptions& options, const CoarseModelInput& input) {
   PriorBundleAdjustmentProblem problem;
   for (const auto& [image_id, pose] : input.cams_from_world) {
     problem.images.insert(image_id);
   }
   if (!options.use_priors) return problem;
-  for (const RelativePosePrior& prior : scene.priors) {
+  for (const RelativePosePrior& prior : input.priors) {
     if (problem.images.count(prior.image_id1) == 0 ||
         problem.images.count(prior.image_id2) == 0) {
       continue;
@@ -205,10 +204,10 @@ CoarseModel BuildCoarseModel(
     const CoarseModelInput& input) {
   CoarseModel model;
   model.metric = input.metric;
+  model.max_track_bytes = EstimateTrackBytes(input.matches);
   const std::vector<Track> tracks = BuildTracks(options.tracks, input.matches);
   model.num_tracks = tracks.size();
-  const PriorBundleAdjustmentProblem problem =
-      CreateProblem(options, scene, input);
+  const PriorBundleAdjustmentProblem problem = CreateProblem(options, input);
 
   double keypoint_sigma_factor = 1.0;
   for (int round = 0; round < options.num_rounds; ++round) {

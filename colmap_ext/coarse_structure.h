@@ -44,6 +44,8 @@ struct CoarseModelInput {
   bool metric = false;
   // Verified matches that the view graph kept, both images in the component.
   std::map<ImagePair, std::vector<FeatureMatch>> matches;
+  // Those of images of other components are passed over.
+  std::vector<RelativePosePrior> priors;
 };
 
 struct CoarseModel {
@@ -53,6 +55,8 @@ struct CoarseModel {
   // The world's z axis points up.
   bool gravity_aligned = false;
   size_t num_tracks = 0;
+  // EstimateTrackBytes of the matches.
+  size_t max_track_bytes = 0;
   size_t num_points = 0;
   size_t num_observations = 0;
   double mean_reproj_error_px = 0.0;

@@ -15,8 +15,6 @@
 namespace adasfm {
 namespace {
 
-constexpr double kAucThresholdsDeg[] = {0.1, 0.5, 1.0, 3.0, 5.0, 10.0, 20.0};
-
 // All pairs up to here (2,000 images); beyond, as many at random, which settles
 // a percentage to 0.1.
 constexpr size_t kMaxNumAucPairs = 2000000;
@@ -159,40 +157,12 @@ bool AlignAndCompare(const std::vector<PosePair>& poses,
   return true;
 }
 
-// Sums over pairs of the area that one error leaves under the recall curve.
-class AucCounter {
- public:
-  void Add(double error_deg) {
-    ++count_;
-    for (size_t k = 0; k < std::size(kAucThresholdsDeg); ++k) {
-      sums_[k] += std::max(0.0, 1.0 - error_deg / kAucThresholdsDeg[k]);
-    }
-  }
-  double Percent(size_t k) const {
-    return count_ == 0 ? 0.0 : 100.0 * sums_[k] / count_;
-  }
-
- private:
-  int64_t count_ = 0;
-  double sums_[std::size(kAucThresholdsDeg)] = {};
-};
-
 std::vector<RelativePoseAuc> ComputeAuc(const std::vector<PosePair>& poses) {
-  AucCounter rotations;
-  AucCounter directions;
+  RelativePoseAucCounter counter;
   const auto add = [&](const PosePair& a, const PosePair& b) {
-    const Rigid3d relative =
-        ComputeCam2FromCam1(a.cam_from_world, b.cam_from_world);
-    const Rigid3d true_relative =
-        ComputeCam2FromCam1(a.true_cam_from_world, b.true_cam_from_world);
-    rotations.Add(
-        RadToDeg(AngleBetweenRad(relative.rotation, true_relative.rotation)));
-    // Without a true baseline there is no direction to be right or wrong.
-    if (true_relative.translation.isZero()) return;
-    directions.Add(relative.translation.isZero()
-                       ? 180.0
-                       : RadToDeg(AngleBetweenRad(relative.translation,
-                                                  true_relative.translation)));
+    counter.Add(
+        ComputeCam2FromCam1(a.cam_from_world, b.cam_from_world),
+        ComputeCam2FromCam1(a.true_cam_from_world, b.true_cam_from_world));
   };
   const size_t n = poses.size();
   if (n * (n - 1) / 2 <= kMaxNumAucPairs) {
@@ -207,12 +177,7 @@ std::vector<RelativePoseAuc> ComputeAuc(const std::vector<PosePair>& poses) {
       add(poses[i], poses[j < i ? j : j + 1]);
     }
   }
-  std::vector<RelativePoseAuc> auc;
-  for (size_t k = 0; k < std::size(kAucThresholdsDeg); ++k) {
-    auc.push_back(
-        {kAucThresholdsDeg[k], rotations.Percent(k), directions.Percent(k)});
-  }
-  return auc;
+  return counter.Result();
 }
 
 // COLMAP's error of a point: the mean over its observations.

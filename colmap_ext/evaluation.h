@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "colmap_ext/relative_pose_auc.h"
 #include "core/rigid3d.h"
 #include "core/status.h"
 #include "core/types.h"
@@ -45,14 +46,6 @@ struct AlignmentErrors {
   double translation_max_m = 0.0;
   double rotation_mean_deg = 0.0;
   double rotation_median_deg = 0.0;
-};
-
-// Area under the curve of recall over error from 0 to the threshold, in
-// percent, as in the paper's Table I.
-struct RelativePoseAuc {
-  double threshold_deg = 0.0;
-  double rotation_percent = 0.0;
-  double translation_percent = 0.0;  // of the direction
 };
 
 struct Evaluation {

@@ -27,6 +27,7 @@ Json ModelJson(const CoarseComponent& component, const CoarseModel& model) {
           {"images_without_points", model.num_images_without_points},
           {"images_with_few_points", model.num_images_with_few_points},
           {"tracks", model.num_tracks},
+          {"max_track_bytes", model.max_track_bytes},
           {"points", model.num_points},
           {"observations", model.num_observations},
           {"mean_reproj_error_px", model.mean_reproj_error_px},
@@ -37,6 +38,8 @@ Json ModelJson(const CoarseComponent& component, const CoarseModel& model) {
           {"gravity_aligned", model.gravity_aligned},
           {"rotations_converged", component.rotations_converged},
           {"positions_converged", component.positions_converged},
+          {"direction_agreement", component.direction_agreement},
+          {"least_direction_agreement", component.least_direction_agreement},
           {"rotation_optimality", component.sdp_optimality},
           {"adjustments", rounds}};
 }
@@ -56,6 +59,10 @@ std::string FormatGlobalReportJson(const SceneData& scene,
     removals[EdgeRemovalName(removal)] = count;
   }
   report["edges"] = removals;
+  const RotationRateReport& rates = result.poses.rotation_rates;
+  report["rotation_rates"] = {{"corrected", rates.corrected},
+                              {"pairs", rates.num_pairs},
+                              {"max_rate_rad_s", rates.max_rate_rad_s}};
   for (size_t i = 0; i < result.models.size(); ++i) {
     report["models"].push_back(
         ModelJson(result.poses.components[i], result.models[i]));
@@ -90,7 +97,9 @@ std::string FormatGlobalReportText(const GlobalStageResult& result,
     const CoarseComponent& component = result.poses.components[i];
     if (!component.rotations_converged) text << ", rotations not converged";
     if (!component.positions_converged) text << ", positions not converged";
-    text << "\n";
+    text << "; directions agree to " << 100.0 * component.direction_agreement
+         << " %, at the worst image "
+         << 100.0 * component.least_direction_agreement << " %\n";
   }
   text << "Total: " << total_seconds << " s\n";
   return text.str();

@@ -57,12 +57,13 @@ GlobalCorrespondences FindCorrespondences(const SceneData& scene,
 
 // The matches of the edges that hold the component together.
 CoarseModelInput CreateModelInput(const CoarseComponent& component,
-                                  const ViewGraph& graph,
+                                  const CoarsePoses& poses,
                                   const GlobalCorrespondences& matches) {
   CoarseModelInput input;
+  input.priors = poses.priors;
   input.cams_from_world = component.cams_from_world;
   input.metric = component.metric;
-  for (const ViewGraphEdge& edge : graph.edges) {
+  for (const ViewGraphEdge& edge : poses.graph.edges) {
     if (!edge.IsKept() || edge.source == EdgeSource::kSensor) continue;
     if (component.cams_from_world.count(edge.image_id1) == 0 ||
         component.cams_from_world.count(edge.image_id2) == 0) {
@@ -72,6 +73,14 @@ CoarseModelInput CreateModelInput(const CoarseComponent& component,
     if (it != matches.matches.end()) input.matches.insert(*it);
   }
   return input;
+}
+
+// Before it is used.
+std::string DescribeTrackMemory(const CoarseModelInput& input) {
+  std::ostringstream text;
+  text << "structure, tracks take at most "
+       << (EstimateTrackBytes(input.matches) >> 20) + 1 << " MiB";
+  return text.str();
 }
 
 std::string DescribeModel(const CoarseModel& model) {
@@ -182,7 +191,7 @@ StatusOr<GlobalStageResult> RunGlobalStage(
   std::string error;
   if (!requested_options.IsValid(&error)) throw std::invalid_argument(error);
   const GlobalStageOptions options = WithThreads(requested_options);
-  const auto begin = [&](const char* name, double share_done) {
+  const auto begin = [&](const std::string& name, double share_done) {
     if (progress) progress(name, share_done);
     return Stopwatch();
   };
@@ -217,10 +226,11 @@ StatusOr<GlobalStageResult> RunGlobalStage(
 
   // 7. Structure and adjustment.
   for (const CoarseComponent& component : result.poses.components) {
-    watch = begin("structure", 0.5);
-    result.models.push_back(BuildCoarseModel(
-        options.structure, scene, correspondences.bearings,
-        CreateModelInput(component, result.poses.graph, correspondences)));
+    const CoarseModelInput input =
+        CreateModelInput(component, result.poses, correspondences);
+    watch = begin(DescribeTrackMemory(input), 0.5);
+    result.models.push_back(BuildCoarseModel(options.structure, scene,
+                                             correspondences.bearings, input));
     result.steps.push_back(
         {"structure", watch.Seconds(), DescribeModel(result.models.back())});
   }

@@ -1,36 +1,17 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "colmap_ext/prior_tables.h"
 
-#include <cstring>
 #include <map>
 #include <utility>
 
+#include "colmap_ext/double_blob.h"
 #include "colmap_ext/host/database.h"
+#include "colmap_ext/prior_corrections.h"
 
 namespace adasfm {
 namespace {
 
 constexpr int kSchemaVersion = 1;
-
-// Doubles as a little-endian blob, whatever the machine.
-std::string BlobFromDoubles(const double* values, size_t size) {
-  std::string blob;
-  blob.reserve(size * sizeof(double));
-  for (size_t i = 0; i < size; ++i) {
-    uint64_t bits;
-    std::memcpy(&bits, &values[i], sizeof(bits));
-    for (int byte = 0; byte < 8; ++byte) {
-      blob.push_back(static_cast<char>((bits >> (8 * byte)) & 0xff));
-    }
-  }
-  return blob;
-}
-
-void BindDoubles(SqliteStatement* statement, int parameter,
-                 const double* values, size_t size) {
-  const std::string blob = BlobFromDoubles(values, size);
-  statement->BindBlob(parameter, blob.data(), blob.size());
-}
 
 void CreateTables(SqliteConnection* database) {
   CreateMetaTable(database);
@@ -145,6 +126,7 @@ Status WritePriorTables(const std::string& database_path,
     WriteImageTimes(names, tables.image_times, &database);
     WritePriors(names, tables.priors, &database);
     WriteGravity(names, tables.gravity, &database);
+    RemovePriorCorrections(&database);
     transaction.Commit();
   } catch (const SqliteError& error) {
     return Status::Error("cannot write the priors to " + database_path + ": " +

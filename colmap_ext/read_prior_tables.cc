@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <algorithm>
-#include <cstring>
 #include <map>
 #include <optional>
 #include <utility>
 
+#include "colmap_ext/double_blob.h"
 #include "colmap_ext/host/database.h"
 #include "colmap_ext/prior_tables.h"
 
@@ -15,23 +15,6 @@ constexpr uint32_t kAllFlags =
     kPriorRotation | kPriorDirection | kPriorLength | kPriorWheelSlip;
 
 // The inverse of how prior_tables.cc writes doubles.
-void DoublesFromBlob(const SqliteStatement& statement, int column,
-                     const std::string& row, size_t size, double* values) {
-  if (statement.NumBytes(column) != size * sizeof(double)) {
-    throw SqliteError(
-        row + ": a blob of " + std::to_string(statement.NumBytes(column)) +
-        " bytes instead of " + std::to_string(size * sizeof(double)));
-  }
-  const auto* bytes = static_cast<const unsigned char*>(statement.Blob(column));
-  for (size_t i = 0; i < size; ++i) {
-    uint64_t bits = 0;
-    for (int byte = 0; byte < 8; ++byte) {
-      bits |= static_cast<uint64_t>(bytes[8 * i + byte]) << (8 * byte);
-    }
-    std::memcpy(&values[i], &bits, sizeof(bits));
-  }
-}
-
 // The present id of the image that had this id and name; none when it is gone.
 class IdResolver {
  public:

@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "colmap_ext/host/database.h"
+#include "colmap_ext/prior_corrections.h"
 #include "colmap_ext/prior_tables.h"
 #include "colmap_ext/sqlite.h"
 #include "colmap_ext/two_view_geometry_backup.h"
@@ -28,7 +29,8 @@ void ReadSceneImages(SqliteConnection* database, SceneData* scene) {
   }
 }
 
-void ReadScenePriors(SqliteConnection* database, SceneData* scene) {
+void ReadScenePriors(SqliteConnection* database,
+                     const SceneDataOptions& options, SceneData* scene) {
   LoadedPriorTables loaded = ReadPriorTables(database);
   for (const ImageTimeRow& row : loaded.tables.image_times) {
     scene->images.at(row.image_id).timestamp_ns = row.timestamp_ns;
@@ -37,6 +39,8 @@ void ReadScenePriors(SqliteConnection* database, SceneData* scene) {
     scene->images.at(row.image_id).gravity_in_cam = row.gravity_in_cam;
   }
   scene->priors = std::move(loaded.tables.priors);
+  if (!options.use_original_two_view_geometries)
+    ApplyPriorCorrections(database, &scene->priors);
   if (loaded.num_ignored_rows > 0) {
     scene->warnings.push_back(
         std::to_string(loaded.num_ignored_rows) +
@@ -138,7 +142,7 @@ StatusOr<SceneData> ReadSceneData(const std::string& database_path,
     SqliteConnection database(database_path, SqliteConnection::Mode::kRead);
     scene.cameras = ReadCameras(&database);
     ReadSceneImages(&database, &scene);
-    ReadScenePriors(&database, &scene);
+    ReadScenePriors(&database, options, &scene);
     ReadScenePairs(&database, options, &scene);
     if (options.read_raw_matches) ReadRawMatches(&database, &scene);
   } catch (const SqliteError& error) {

@@ -58,8 +58,8 @@ struct SceneData {
 
 struct SceneDataOptions {
   bool read_raw_matches = false;
-  // Start from the two-view geometries as they were before adasfm_global
-  // rewrote them, where it did.
+  // Start from the two-view geometries, and the priors' rotations, as they were
+  // before adasfm_global changed them, where it did.
   bool use_original_two_view_geometries = false;
   // Pairs with fewer inlier matches are left out.
   int min_num_matches = 15;

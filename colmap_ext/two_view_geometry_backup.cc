@@ -4,6 +4,7 @@
 #include <map>
 #include <optional>
 
+#include "colmap_ext/prior_corrections.h"
 #include "colmap_ext/prior_tables.h"
 
 namespace adasfm {
@@ -189,9 +190,11 @@ void RemoveRows(const std::vector<ImagePair>& pairs,
 
 }  // namespace
 
-Status RewriteTwoViewGeometries(const std::string& database_path,
-                                const std::vector<NewTwoViewGeometry>& rows,
-                                const std::vector<ImagePair>& removed) {
+Status RewriteTwoViewGeometries(
+    const std::string& database_path,
+    const std::vector<NewTwoViewGeometry>& rows,
+    const std::vector<ImagePair>& removed,
+    const std::vector<RelativePosePrior>& corrected_priors) {
   const Status checked = CheckDatabase(database_path);
   if (!checked.ok()) return checked;
   std::vector<ImagePair> pairs = removed;
@@ -206,6 +209,7 @@ Status RewriteTwoViewGeometries(const std::string& database_path,
     RemoveRows(removed, &database);
     WriteTwoViewGeometries(&database, rows);
     RecordDigests(rows, &database);
+    WritePriorCorrections(corrected_priors, &database);
     transaction.Commit();
   } catch (const SqliteError& error) {
     return Status::Error("cannot rewrite the two-view geometries of " +
@@ -222,14 +226,17 @@ StatusOr<RestoreSummary> RestoreTwoViewGeometries(
   try {
     {
       SqliteConnection database(database_path, SqliteConnection::Mode::kRead);
-      if (!database.HasTable(kTwoViewGeometryBackupTable)) {
+      if (!database.HasTable(kTwoViewGeometryBackupTable) &&
+          !HasPriorCorrections(&database)) {
         return RestoreSummary();
       }
     }
     SqliteConnection database(database_path, SqliteConnection::Mode::kWrite);
     SqliteTransaction transaction(&database);
-    const RestoreSummary summary = RestoreRows(&database);
-    database.Execute("DROP TABLE adasfm_two_view_geometries");
+    RestoreSummary summary = RestoreRows(&database);
+    database.Execute("DROP TABLE IF EXISTS adasfm_two_view_geometries");
+    summary.priors_restored = HasPriorCorrections(&database);
+    RemovePriorCorrections(&database);
     transaction.Commit();
     return summary;
   } catch (const SqliteError& error) {

@@ -6,6 +6,7 @@
 
 #include "colmap_ext/host/database.h"
 #include "colmap_ext/sqlite.h"
+#include "core/relative_pose_prior.h"
 #include "core/status.h"
 #include "core/types.h"
 
@@ -16,21 +17,27 @@ namespace adasfm {
 // the row in its place is the one we wrote: when COLMAP has verified the pair
 // anew since, the present row is the original.
 
-// Puts `rows` in the place of the pairs' two-view geometries and removes those
-// of `removed`, in one transaction. What an earlier call replaced is put back
-// first, so calling twice equals calling once. On error nothing has changed.
-Status RewriteTwoViewGeometries(const std::string& database_path,
-                                const std::vector<NewTwoViewGeometry>& rows,
-                                const std::vector<ImagePair>& removed);
+// Puts `rows` in the place of the pairs' two-view geometries, removes those of
+// `removed`, and writes the corrected rotations of priors, all in one
+// transaction. What an earlier call replaced is put back first, so calling
+// twice equals calling once. On error nothing has changed.
+Status RewriteTwoViewGeometries(
+    const std::string& database_path,
+    const std::vector<NewTwoViewGeometry>& rows,
+    const std::vector<ImagePair>& removed,
+    const std::vector<RelativePosePrior>& corrected_priors = {});
 
 struct RestoreSummary {
   int num_restored = 0;
   // Rows that COLMAP has replaced in the meantime, or whose images changed.
   int num_outdated = 0;
+  // The priors' rotations had been corrected, and are as imported again.
+  bool priors_restored = false;
 };
 
-// Puts all originals back and drops the table, in one transaction. Without the
-// table there is nothing to do, and nothing is changed.
+// Puts all originals back and drops the tables, that of corrected priors too,
+// in one transaction. Without them there is nothing to do, and nothing is
+// changed.
 StatusOr<RestoreSummary> RestoreTwoViewGeometries(
     const std::string& database_path);
 

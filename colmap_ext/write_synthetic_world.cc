@@ -140,6 +140,14 @@ void WriteGroundTruth(const SyntheticWorld& world, std::ostream* file) {
   }
 }
 
+void WriteLandmarks(const SyntheticWorld& world, std::ostream* file) {
+  for (const SyntheticImage& image : world.images) {
+    *file << image.name;
+    for (const int id : image.landmark_ids) *file << " " << id;
+    *file << "\n";
+  }
+}
+
 void WriteTransform(const char* key, const Rigid3d& transform,
                     std::ostream* file) {
   const Eigen::Matrix<double, 3, 4> matrix = transform.ToMatrix();
@@ -209,11 +217,9 @@ Status WriteSyntheticLogs(const SyntheticWorld& world,
                           const std::string& folder) {
   using Writer = void (*)(const SyntheticWorld&, std::ostream*);
   const std::vector<std::pair<const char*, Writer>> files = {
-      {"imu.csv", WriteImu},
-      {"wheel.csv", WriteWheels},
-      {"times.csv", WriteTimes},
-      {"sensors.yaml", WriteSensors},
-      {"gt.txt", WriteGroundTruth}};
+      {"imu.csv", WriteImu},        {"wheel.csv", WriteWheels},
+      {"times.csv", WriteTimes},    {"sensors.yaml", WriteSensors},
+      {"gt.txt", WriteGroundTruth}, {"landmarks.txt", WriteLandmarks}};
   for (const auto& [name, write] : files) {
     const Status status = WriteText(
         fs::path(folder) / name,

@@ -18,8 +18,8 @@ namespace adasfm {
 Status WriteSyntheticDatabase(const SyntheticWorld& world,
                               const std::string& path);
 
-// Writes imu.csv, wheel.csv, times.csv, sensors.yaml and gt.txt into the
-// folder, in the formats that the importer and the evaluator read.
+// Writes imu.csv, wheel.csv, times.csv, sensors.yaml, gt.txt and landmarks.txt
+// to the folder, in the formats that the importer and the evaluator read.
 Status WriteSyntheticLogs(const SyntheticWorld& world,
                           const std::string& folder);
 

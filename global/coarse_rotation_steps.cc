@@ -17,17 +17,17 @@ void CoarsePoseEstimator::RefinePairs() {
     edge.removal = EdgeRemoval::kFewInliers;
     ++num_removed;
   }
-  const RotationRateReport rates = BuildChain();
+  result_.rotation_rates = BuildChain();
   if (options_.relative_poses.enabled) {
     RefineRelativePoses(options_.relative_poses, correspondences_,
                         PredictRotations(), &graph_);
   }
-  EndStep("relative poses", std::to_string(graph_.edges.size()) + " pairs, " +
-                                std::to_string(num_removed) +
-                                " with few inliers removed, odometry turned "
-                                "by up to " +
-                                std::to_string(rates.max_rate_rad_s) +
-                                " rad/s");
+  EndStep("relative poses",
+          std::to_string(graph_.edges.size()) + " pairs, " +
+              std::to_string(num_removed) +
+              " with few inliers removed, odometry turned "
+              "by up to " +
+              std::to_string(result_.rotation_rates.max_rate_rad_s) + " rad/s");
 }
 
 // The chain, after vision has corrected its rotations.

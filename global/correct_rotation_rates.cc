@@ -194,6 +194,7 @@ RotationRateReport CorrectRotationRates(
       continue;
     }
     const int window = windows.window_of_step[chain.Index(prior.image_id2)];
+    report.corrected = true;
     prior.cam2_from_cam1.rotation =
         (ExpSo3(SecondsFromNs(prior.dt_ns) * rates[window]) *
          prior.cam2_from_cam1.rotation)

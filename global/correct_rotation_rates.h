@@ -27,6 +27,8 @@ struct RotationRateOptions {
 };
 
 struct RotationRateReport {
+  // Rotations were changed.
+  bool corrected = false;
   int num_pairs = 0;
   // Largest correction of a span.
   double max_rate_rad_s = 0.0;

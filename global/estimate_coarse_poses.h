@@ -92,6 +92,7 @@ struct CoarsePoses {
   ViewGraph graph;
   // The input's, with the rotations that vision corrected.
   std::vector<RelativePosePrior> priors;
+  RotationRateReport rotation_rates;
   std::vector<CoarseStep> steps;
 };
 

@@ -6,64 +6,14 @@
 #include <algorithm>
 #include <cmath>
 
+#include "global/rotation_certificate.h"
+#include "global/rotation_sdp_problem.h"
+
 namespace adasfm {
 namespace {
 
-constexpr int kMaxRank = 12;
-using Block = Eigen::Matrix<double, 3, Eigen::Dynamic, 0, 3, kMaxRank>;
-
-// Both directions of every edge, by node, with weights whose largest node sum
-// is of order one.
-struct Neighbour {
-  int node = 0;
-  Eigen::Matrix3d weighted_rotation;  // node -> this one
-};
-
-class Problem {
- public:
-  Problem(const std::vector<RotationEdge>& edges, size_t num_nodes)
-      : neighbours_(num_nodes) {
-    double smallest_variance = std::numeric_limits<double>::infinity();
-    for (const RotationEdge& edge : edges) {
-      smallest_variance =
-          std::min(smallest_variance, edge.sigma_rad * edge.sigma_rad);
-    }
-    for (const RotationEdge& edge : edges) {
-      const double weight =
-          smallest_variance / (edge.sigma_rad * edge.sigma_rad);
-      neighbours_[edge.j].push_back({edge.i, weight * edge.rotation});
-      neighbours_[edge.i].push_back(
-          {edge.j, weight * edge.rotation.transpose()});
-      sum_weights_ += weight;
-    }
-  }
-
-  size_t size() const { return neighbours_.size(); }
-
-  Block Sum(const std::vector<Block>& blocks, size_t i) const {
-    Block sum = Block::Zero(3, blocks[i].cols());
-    for (const Neighbour& neighbour : neighbours_[i]) {
-      sum.noalias() += neighbour.weighted_rotation * blocks[neighbour.node];
-    }
-    return sum;
-  }
-
-  // sum of w |R_j - R_ij R_i|^2.
-  double Cost(const std::vector<Block>& blocks) const {
-    double gain = 0.0;
-    for (size_t i = 0; i < size(); ++i) {
-      gain += Sum(blocks, i).cwiseProduct(blocks[i]).sum();
-    }
-    return 6.0 * sum_weights_ - gain;
-  }
-
- private:
-  std::vector<std::vector<Neighbour>> neighbours_;
-  double sum_weights_ = 0.0;
-};
-
 // The nearest matrix with orthonormal rows.
-Block PolarFactor(const Block& matrix) {
+RotationBlock PolarFactor(const RotationBlock& matrix) {
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(
       matrix * matrix.transpose());
   const Eigen::Vector3d& values = eigen.eigenvalues();
@@ -77,12 +27,13 @@ Block PolarFactor(const Block& matrix) {
   return svd.matrixU() * svd.matrixV().transpose();
 }
 
-void Descend(const RotationSdpOptions& options, const Problem& problem,
-             std::vector<Block>* blocks) {
+void Descend(const RotationSdpOptions& options,
+             const RotationSdpProblem& problem,
+             std::vector<RotationBlock>* blocks) {
   double cost = problem.Cost(*blocks);
   for (int sweep = 0; sweep < options.max_num_sweeps; ++sweep) {
     for (size_t i = 0; i < problem.size(); ++i) {
-      const Block sum = problem.Sum(*blocks, i);
+      const RotationBlock sum = problem.Sum(*blocks, i);
       if (sum.squaredNorm() > 0.0) (*blocks)[i] = PolarFactor(sum);
     }
     const double new_cost = problem.Cost(*blocks);
@@ -98,18 +49,16 @@ struct Eigenpair {
   Eigen::VectorXd vector;
 };
 
-Eigenpair SmallestEigenpair(const Problem& problem,
-                            const std::vector<Block>& blocks) {
+Eigenpair SmallestEigenpair(const RotationSdpProblem& problem,
+                            const std::vector<RotationBlock>& blocks) {
   constexpr int kMaxNumVectors = 40;
   const int size = 3 * static_cast<int>(problem.size());
   std::vector<Eigen::Matrix3d> multipliers(problem.size());
   for (size_t i = 0; i < problem.size(); ++i) {
-    const Eigen::Matrix3d product =
-        problem.Sum(blocks, i) * blocks[i].transpose();
-    multipliers[i] = 0.5 * (product + product.transpose());
+    multipliers[i] = problem.Multiplier(blocks, i);
   }
   const auto apply = [&](const Eigen::VectorXd& vector) {
-    std::vector<Block> columns(problem.size());
+    std::vector<RotationBlock> columns(problem.size());
     for (size_t i = 0; i < problem.size(); ++i) {
       columns[i] = vector.segment<3>(3 * i);
     }
@@ -153,11 +102,12 @@ Eigenpair SmallestEigenpair(const Problem& problem,
 }
 
 // One more column, along the direction of negative curvature.
-void RaiseRank(const Eigen::VectorXd& direction, std::vector<Block>* blocks) {
+void RaiseRank(const Eigen::VectorXd& direction,
+               std::vector<RotationBlock>* blocks) {
   constexpr double kStep = 0.1;
   const double scale = kStep * std::sqrt(static_cast<double>(blocks->size()));
   for (size_t i = 0; i < blocks->size(); ++i) {
-    Block& block = (*blocks)[i];
+    RotationBlock& block = (*blocks)[i];
     block.conservativeResize(Eigen::NoChange, block.cols() + 1);
     block.rightCols<1>() = scale * direction.segment<3>(3 * i);
     block = PolarFactor(block);
@@ -165,19 +115,20 @@ void RaiseRank(const Eigen::VectorXd& direction, std::vector<Block>* blocks) {
 }
 
 std::vector<Eigen::Matrix3d> RoundToRotations(
-    const std::vector<Block>& blocks) {
+    const std::vector<RotationBlock>& blocks) {
   const Eigen::Index rank = blocks.front().cols();
   Eigen::MatrixXd moments = Eigen::MatrixXd::Zero(rank, rank);
-  for (const Block& block : blocks) moments += block.transpose() * block;
+  for (const RotationBlock& block : blocks)
+    moments += block.transpose() * block;
   const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(moments);
   Eigen::MatrixXd main_axes = eigen.eigenvectors().rightCols<3>();
   double sum_determinants = 0.0;
-  for (const Block& block : blocks) {
+  for (const RotationBlock& block : blocks) {
     sum_determinants += Eigen::Matrix3d(block * main_axes).determinant();
   }
   if (sum_determinants < 0.0) main_axes.col(0) *= -1.0;
   std::vector<Eigen::Matrix3d> rotations;
-  for (const Block& block : blocks) {
+  for (const RotationBlock& block : blocks) {
     const Eigen::JacobiSVD<Eigen::Matrix3d> svd(
         block * main_axes, Eigen::ComputeFullU | Eigen::ComputeFullV);
     Eigen::Vector3d signs = Eigen::Vector3d::Ones();
@@ -196,27 +147,32 @@ RotationSdpSolution SolveRotationSdp(
   RotationSdpSolution solution;
   solution.rotations = start;
   if (start.empty() || edges.empty()) return solution;
-  const Problem problem(edges, start.size());
-  std::vector<Block> blocks;
+  const RotationSdpProblem problem(edges, start.size());
+  std::vector<RotationBlock> blocks;
   for (const Eigen::Matrix3d& rotation : start) {
-    Block block = Block::Zero(3, options.min_rank);
+    RotationBlock block = RotationBlock::Zero(3, options.min_rank);
     block.leftCols<3>() = rotation;
     blocks.push_back(block);
   }
+  const double negligible = 1e-12 * edges.size();  // round-off
+  Eigenpair smallest;
   while (true) {
     Descend(options, problem, &blocks);
-    const Eigenpair smallest = SmallestEigenpair(problem, blocks);
-    const double cost = std::max(0.0, problem.Cost(blocks));
-    const double gap = 3.0 * blocks.size() * std::max(0.0, -smallest.value);
-    // Costs of this order are round-off.
-    const double negligible = 1e-12 * edges.size();
+    smallest = SmallestEigenpair(problem, blocks);
+    solution.cost = std::max(0.0, problem.Cost(blocks));
     solution.rank = blocks.front().cols();
-    solution.optimality = std::clamp(1.0 - gap / (cost + negligible), 0.0, 1.0);
-    if (cost <= negligible) solution.optimality = 1.0;
-    if (solution.optimality > 1.0 - 1e-3) break;
+    const double gap = 3.0 * blocks.size() * std::max(0.0, -smallest.value);
+    if (gap <= 1e-3 * solution.cost + negligible) break;
     if (solution.rank >= options.max_rank) break;
     RaiseRank(smallest.vector, &blocks);
   }
+  // Matrices of the relaxation have the trace 3 n, so none costs less.
+  const double bound = BoundNegativeEigenvalue(
+      CertificateMatrix(problem, blocks), std::max(0.0, -smallest.value));
+  solution.lower_bound =
+      std::max(0.0, solution.cost - 3.0 * blocks.size() * bound);
+  solution.optimality =
+      solution.cost <= negligible ? 1.0 : solution.lower_bound / solution.cost;
   solution.rotations = RoundToRotations(blocks);
   return solution;
 }

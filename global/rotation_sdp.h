@@ -24,9 +24,12 @@ struct RotationSdpOptions {
 struct RotationSdpSolution {
   std::vector<Eigen::Matrix3d> rotations;
   int rank = 0;
-  // Estimated lower bound of the optimal cost over the cost reached, in [0, 1];
-  // the smallest eigenvalue of the certificate matrix, on which it rests, comes
-  // from a Lanczos iteration.
+  // Of the relaxed solution, sum of w |Y_j - R_ij Y_i|^2, with the weights
+  // w = (smallest sigma / sigma)^2.
+  double cost = 0.0;
+  // No rotations cost less; proven by a factorisation (rotation_certificate.h).
+  double lower_bound = 0.0;
+  // lower_bound / cost, in [0, 1]; 1 when the cost is round-off.
   double optimality = 0.0;
 };
 

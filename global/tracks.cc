@@ -144,6 +144,26 @@ bool TrackOptions::IsValid(std::string* error) const {
   return true;
 }
 
+size_t EstimateTrackBytes(
+    const std::map<ImagePair, std::vector<FeatureMatch>>& matches) {
+  // malloc rounds up to 32 bytes a block.
+  constexpr size_t kBlock = 32;
+  size_t num_matches = 0;
+  for (const auto& [pair, pair_matches] : matches) {
+    num_matches += pair_matches.size();
+  }
+  // Both ends of every match are listed; vectors grow by doubling, while old
+  // and new are there.
+  const size_t num_keypoints = 2 * num_matches;
+  const size_t listing = 3 * num_keypoints * sizeof(TrackElement);
+  const size_t per_keypoint =
+      sizeof(TrackElement) + sizeof(int) +                // keypoint, parent
+      sizeof(std::vector<image_t>) + kBlock +             // its set
+      sizeof(int) +                                       // track of the set
+      sizeof(Track) + kBlock + 2 * sizeof(TrackElement);  // the track
+  return listing + num_keypoints * per_keypoint;
+}
+
 std::vector<Track> BuildTracks(
     const TrackOptions& options,
     const std::map<ImagePair, std::vector<FeatureMatch>>& matches) {

@@ -37,6 +37,11 @@ struct TrackOptions {
   bool IsValid(std::string* error) const;
 };
 
+// Upper bound of the bytes that BuildTracks takes at its peak, from the number
+// of matches alone.
+size_t EstimateTrackBytes(
+    const std::map<ImagePair, std::vector<FeatureMatch>>& matches);
+
 // Tracks of matched keypoints (union-find). Where matches would join two
 // keypoints of one image, the later match (pairs by number of matches, most
 // first) is left out, so one wrong match does not cost the whole track.

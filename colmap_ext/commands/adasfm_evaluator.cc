@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "colmap_ext/commands/registry.h"
+#include "colmap_ext/evaluate_pairs.h"
 #include "colmap_ext/evaluation.h"
 #include "colmap_ext/host/model.h"
 
@@ -37,6 +38,35 @@ StatusOr<LargestModel> ReadLargestModel(const std::string& path) {
   return *std::move(largest);
 }
 
+struct PairOptions {
+  std::string database_path;
+  std::string landmarks_path;
+  std::string json_path;
+};
+
+void AddPairOptions(PairOptions* options, CommandOptions* command) {
+  command->AddDefault("database_path", &options->database_path,
+                      "database whose verified pairs are compared too, as "
+                      "they were before and as they are after adasfm_global; "
+                      "none when empty");
+  command->AddDefault("landmarks_path", &options->landmarks_path,
+                      "what each keypoint truly sees, lines `name id id ...` "
+                      "(adasfm_synthesizer's landmarks.txt), for precision "
+                      "and recall of matches; none when empty");
+  command->AddDefault("pairs_json_path", &options->json_path,
+                      "file for the pairs' figures as JSON; none when empty");
+}
+
+Status ComparePairs(const PairOptions& options, const NamedPoses& truth) {
+  if (options.database_path.empty()) return Status::Ok();
+  const StatusOr<PairEvaluation> pairs = EvaluateDatabasePairs(
+      options.database_path, truth, options.landmarks_path);
+  if (!pairs.ok()) return pairs.status();
+  std::cout << FormatPairEvaluation(*pairs) << std::flush;
+  if (options.json_path.empty()) return Status::Ok();
+  return WriteTextFile(options.json_path, PairEvaluationToJson(*pairs) + "\n");
+}
+
 }  // namespace
 
 Status RunAdasfmEvaluator(int argc, char** argv) {
@@ -60,6 +90,8 @@ Status RunAdasfmEvaluator(int argc, char** argv) {
   command.AddDefault("max_time_gap_s", &options.max_time_gap_s,
                      "a trajectory is interpolated between poses at most this "
                      "far apart [s]");
+  PairOptions pairs;
+  AddPairOptions(&pairs, &command);
   const Status parsed = command.Parse(argc, argv);
   if (!parsed.ok() || command.HelpShown()) return parsed;
   const Status valid = CheckOptions(options);
@@ -79,8 +111,12 @@ Status RunAdasfmEvaluator(int argc, char** argv) {
   if (!evaluation.ok()) return evaluation.status();
   evaluation->num_models = model->num_models;
   std::cout << FormatEvaluation(*evaluation) << std::flush;
-  if (json_path.empty()) return Status::Ok();
-  return WriteTextFile(json_path, EvaluationToJson(*evaluation) + "\n");
+  if (!json_path.empty()) {
+    const Status written =
+        WriteTextFile(json_path, EvaluationToJson(*evaluation) + "\n");
+    if (!written.ok()) return written;
+  }
+  return ComparePairs(pairs, *truth);
 }
 
 }  // namespace adasfm

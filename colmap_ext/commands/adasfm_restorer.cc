@@ -12,7 +12,7 @@ Status RunAdasfmRestorer(int argc, char** argv) {
   CommandOptions command(
       "adasfm_restorer",
       "Puts the two-view geometries back that adasfm_global rewrote, byte for "
-      "byte.");
+      "byte, and the priors' rotations that it corrected.");
   command.AddRequired("database_path", &database_path,
                       "COLMAP database that adasfm_global rewrote");
   const Status parsed = command.Parse(argc, argv);
@@ -23,6 +23,9 @@ Status RunAdasfmRestorer(int argc, char** argv) {
   if (!summary.ok()) return summary.status();
   std::cout << "Two-view geometries restored: " << summary->num_restored
             << std::endl;
+  if (summary->priors_restored) {
+    std::cout << "The priors are as they were imported" << std::endl;
+  }
   if (summary->num_outdated > 0) {
     std::cout << "Left as they are, because COLMAP wrote them anew since: "
               << summary->num_outdated << std::endl;

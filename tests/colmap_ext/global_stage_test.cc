@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
 #include "colmap_ext/global_report.h"
 #include "tests/colmap_ext/synthetic_scene.h"
 
@@ -134,8 +136,29 @@ TEST(RunGlobalStageTest, ReportsEveryStep) {
   for (const StepReport& step : result.steps) {
     EXPECT_NE(json.find("\"" + step.name + "\""), std::string::npos);
   }
-  EXPECT_NE(FormatGlobalReportText(result, 1.0).find("60 images"),
-            std::string::npos);
+  for (const char* figure :
+       {"direction_agreement", "least_direction_agreement",
+        "rotation_optimality", "max_track_bytes", "rotation_rates"}) {
+    EXPECT_NE(json.find("\"" + std::string(figure) + "\""), std::string::npos)
+        << figure;
+  }
+  const std::string text = FormatGlobalReportText(result, 1.0);
+  EXPECT_NE(text.find("60 images"), std::string::npos);
+  EXPECT_NE(text.find("directions agree to"), std::string::npos);
+}
+
+TEST(RunGlobalStageTest, StatesTheMemoryOfTracksBeforeItIsUsed) {
+  const SyntheticWorld world = BuildSyntheticWorld(SmallWorld());
+  std::vector<std::string> names;
+  ASSERT_TRUE(
+      RunGlobalStage(
+          GlobalStageOptions(),
+          BuildSyntheticScene(world, SyntheticPriorOptions()),
+          [&](const std::string& name, double) { names.push_back(name); })
+          .ok());
+  EXPECT_TRUE(std::any_of(names.begin(), names.end(), [](const auto& name) {
+    return name.find("tracks take at most") != std::string::npos;
+  }));
 }
 
 }  // namespace

@@ -35,6 +35,27 @@ TEST(BuildTracks, KeepsOneKeypointPerImage) {
   EXPECT_EQ(BuildTracks(options, matches).size(), 1);
 }
 
+TEST(EstimateTrackBytes, CoversTheTracksAndGrowsWithTheMatches) {
+  std::map<ImagePair, std::vector<FeatureMatch>> matches;
+  EXPECT_EQ(EstimateTrackBytes(matches), 0);
+  size_t last = 0;
+  for (image_t i = 1; i < 30; ++i) {
+    for (point2D_t k = 0; k < 100; ++k) {
+      matches[ImagePair(i, i + 1)].push_back({k, k});
+    }
+    const size_t estimate = EstimateTrackBytes(matches);
+    EXPECT_GT(estimate, last);
+    last = estimate;
+    size_t num_bytes = 0;
+    TrackOptions options;
+    options.min_track_length = 2;
+    for (const Track& track : BuildTracks(options, matches)) {
+      num_bytes += sizeof(Track) + track.capacity() * sizeof(TrackElement);
+    }
+    EXPECT_GT(estimate, num_bytes);
+  }
+}
+
 TEST(TriangulateTracks, FindsThePointsDespiteWrongObservations) {
   for (const bool fisheye : {false, true}) {
     TestSceneOptions options;

@@ -1,0 +1,151 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "colmap_ext/commands/global_options.h"
+
+namespace adasfm {
+namespace {
+
+class GlobalOptionAdder {
+ public:
+  GlobalOptionAdder(GlobalStageOptions* stage, CommandOptions* command)
+      : stage_(stage), command_(command) {}
+
+  void AddPaper();
+  void AddRotations();
+  void AddLoops();
+  void AddPositions();
+  void AddStructure();
+  void AddMatches();
+  void AddAblations();
+
+ private:
+  template <typename T>
+  void Add(const std::string& name, T* value, const std::string& help) {
+    command_->AddDefault("AdaSfmGlobal." + name, value, help);
+  }
+
+  GlobalStageOptions* stage_;
+  CommandOptions* command_;
+};
+
+// Those that the paper names.
+void GlobalOptionAdder::AddPaper() {
+  Add("max_prior_time_gap_s", &stage_->poses.augmentation.max_prior_time_gap_s,
+      "sensor priors over longer times are no edges [s]");
+  Add("max_rotation_discrepancy_deg",
+      &stage_->poses.max_rotation_discrepancy_deg,
+      "pairs farther from the global rotations are removed [deg]");
+  Add("min_triangulation_angle_deg",
+      &stage_->structure.triangulation.min_triangulation_angle_deg,
+      "least angle of a point's rays [deg]");
+  Add("max_epipolar_error_px", &stage_->refinement.max_epipolar_error_px,
+      "matches farther from their epipolar lines, both views together, are "
+      "dropped [px]");
+  Add("num_threads", &stage_->num_threads, "-1: all of the machine's");
+}
+
+void GlobalOptionAdder::AddRotations() {
+  RotationRateOptions* rates = &stage_->poses.rotation_rates;
+  Add("min_num_inliers", &stage_->poses.min_num_inliers,
+      "pairs with fewer verified matches take no part");
+  Add("num_rotation_rounds", &stage_->poses.num_rotation_rounds,
+      "rounds of relative poses and rotations for pairs without odometry");
+  Add("rotation_rate_max_num_steps", &rates->max_num_steps,
+      "pairs at most this many images apart tell the gyroscope's bias");
+  Add("rotation_rate_window_s", &rates->window_s,
+      "one correction of the gyroscope for each such span [s]");
+  Add("rotation_rate_sigma_rad_s", &rates->rate_sigma_rad_s,
+      "1 sigma of a correction, per axis [rad/s]");
+  Add("rotation_rate_drift_sigma_rad_s", &rates->drift_sigma_rad_s,
+      "1 sigma of its change from span to span, per axis [rad/s]");
+  Add("rotation_rate_min_sigma_rad", &rates->min_rotation_sigma_rad,
+      "least error granted to a pair's rotation [rad]");
+}
+
+void GlobalOptionAdder::AddLoops() {
+  Add("wheel_scale_sigma", &stage_->poses.chain.scale_sigma,
+      "1 sigma of the wheels' common scale error, as a ratio");
+  Add("gyro_bias_sigma_rad_s", &stage_->poses.chain.gyro_bias_sigma_rad_s,
+      "1 sigma of the gyroscope bias that is left, per axis [rad/s]");
+  Add("max_loop_sigmas", &stage_->poses.loops.max_num_sigmas,
+      "pairs contradict the odometry beyond this many sigmas");
+  Add("max_contradicting_ratio", &stage_->poses.loops.max_contradicting_ratio,
+      "an undecided pair goes when more of its neighbours contradict the "
+      "odometry, as a ratio");
+}
+
+void GlobalOptionAdder::AddPositions() {
+  Add("max_num_position_iterations",
+      &stage_->poses.positions.max_num_iterations,
+      "iterations of the translation averaging");
+  Add("min_direction_agreement", &stage_->poses.min_direction_agreement,
+      "least share of directions that fit converged positions");
+  Add("min_image_direction_agreement",
+      &stage_->poses.min_image_direction_agreement,
+      "the same at the worst image");
+  Add("max_agreeing_direction_deg", &stage_->poses.max_agreeing_direction_deg,
+      "a direction fits within this angle [deg]");
+}
+
+void GlobalOptionAdder::AddStructure() {
+  Add("min_angle_floor_deg", &stage_->structure.min_angle_floor_deg,
+      "least angle for images with few points [deg]");
+  Add("min_num_points_per_image", &stage_->structure.min_num_points_per_image,
+      "images with fewer points get some of smaller angles");
+  Add("min_track_length", &stage_->structure.tracks.min_track_length,
+      "images that a track must have");
+  Add("min_num_tracks_per_image",
+      &stage_->structure.tracks.min_num_tracks_per_image,
+      "tracks are taken while an image has fewer");
+  Add("max_num_tracks", &stage_->structure.tracks.max_num_tracks,
+      "bound of the tracks (-1: none)");
+  Add("num_rounds", &stage_->structure.num_rounds,
+      "rounds of triangulation and bundle adjustment");
+  Add("final_max_reproj_error_px", &stage_->structure.final_max_reproj_error_px,
+      "largest error of a point in the last round [px]");
+  Add("ba_refine_focal_length", &stage_->structure.bundle.refine_focal_length,
+      "0/1");
+}
+
+void GlobalOptionAdder::AddMatches() {
+  Add("min_num_matches", &stage_->refinement.min_num_matches,
+      "pairs with fewer matches are removed");
+}
+
+// What each step buys.
+void GlobalOptionAdder::AddAblations() {
+  Add("use_sdp_start", &stage_->poses.rotations.use_sdp_start,
+      "start the rotations from the SDP");
+  Add("use_loop_gating", &stage_->poses.loops.enabled,
+      "remove loops that the odometry excludes");
+  Add("refine_relative_poses", &stage_->poses.relative_poses.enabled,
+      "least-squares relative poses");
+  Add("correct_rotation_rates", &stage_->poses.rotation_rates.enabled,
+      "take the gyroscope's remaining bias out of the priors, by vision");
+  Add("refine_translations", &stage_->poses.translations.enabled,
+      "directions anew under the global rotations");
+  Add("use_augmentation", &stage_->poses.augmentation.enabled,
+      "sensor edges and translations in the view graph");
+  Add("use_metric_lengths", &stage_->poses.augmentation.use_metric_lengths,
+      "keep the sensors' lengths (0: the paper's unit vectors)");
+  Add("refine_positions", &stage_->poses.positions.refine,
+      "weigh directions and lengths by their own sigmas at the end");
+  Add("ba_use_priors", &stage_->structure.use_priors,
+      "sensor priors in the bundle adjustment");
+  Add("refine_matches", &stage_->refinement.enabled,
+      "rewrite the database's two-view geometries");
+}
+
+}  // namespace
+
+void AddGlobalOptions(GlobalStageOptions* stage, CommandOptions* command) {
+  GlobalOptionAdder adder(stage, command);
+  adder.AddPaper();
+  adder.AddRotations();
+  adder.AddLoops();
+  adder.AddPositions();
+  adder.AddStructure();
+  adder.AddMatches();
+  adder.AddAblations();
+}
+
+}  // namespace adasfm

@@ -1,0 +1,127 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "colmap_ext/commands/global_options.h"
+
+#include <gtest/gtest.h>
+
+#include <functional>
+#include <string>
+#include <vector>
+
+namespace adasfm {
+namespace {
+
+struct OptionCase {
+  std::string name;
+  // Another value than the default.
+  double value;
+  std::function<double(const GlobalStageOptions&)> get;
+};
+
+#define OPTION(name, value, member)                                            \
+  {                                                                            \
+    name, value,                                                               \
+        [](const GlobalStageOptions& stage) -> double { return stage.member; } \
+  }
+
+const std::vector<OptionCase>& Cases() {
+  static const std::vector<OptionCase> cases = {
+      OPTION("max_prior_time_gap_s", 0.7,
+             poses.augmentation.max_prior_time_gap_s),
+      OPTION("max_rotation_discrepancy_deg", 6,
+             poses.max_rotation_discrepancy_deg),
+      OPTION("min_triangulation_angle_deg", 4,
+             structure.triangulation.min_triangulation_angle_deg),
+      OPTION("max_epipolar_error_px", 3, refinement.max_epipolar_error_px),
+      OPTION("num_threads", 1, num_threads),
+      OPTION("min_num_inliers", 20, poses.min_num_inliers),
+      OPTION("num_rotation_rounds", 1, poses.num_rotation_rounds),
+      OPTION("rotation_rate_max_num_steps", 5,
+             poses.rotation_rates.max_num_steps),
+      OPTION("rotation_rate_window_s", 30, poses.rotation_rates.window_s),
+      OPTION("rotation_rate_sigma_rad_s", 0.01,
+             poses.rotation_rates.rate_sigma_rad_s),
+      OPTION("rotation_rate_drift_sigma_rad_s", 0.01,
+             poses.rotation_rates.drift_sigma_rad_s),
+      OPTION("rotation_rate_min_sigma_rad", 0.01,
+             poses.rotation_rates.min_rotation_sigma_rad),
+      OPTION("wheel_scale_sigma", 0.02, poses.chain.scale_sigma),
+      OPTION("gyro_bias_sigma_rad_s", 0.001, poses.chain.gyro_bias_sigma_rad_s),
+      OPTION("max_loop_sigmas", 4, poses.loops.max_num_sigmas),
+      OPTION("max_contradicting_ratio", 0.6,
+             poses.loops.max_contradicting_ratio),
+      OPTION("max_num_position_iterations", 7,
+             poses.positions.max_num_iterations),
+      OPTION("min_direction_agreement", 0.9, poses.min_direction_agreement),
+      OPTION("min_image_direction_agreement", 0.6,
+             poses.min_image_direction_agreement),
+      OPTION("max_agreeing_direction_deg", 2, poses.max_agreeing_direction_deg),
+      OPTION("min_angle_floor_deg", 2, structure.min_angle_floor_deg),
+      OPTION("min_num_points_per_image", 10,
+             structure.min_num_points_per_image),
+      OPTION("min_track_length", 2, structure.tracks.min_track_length),
+      OPTION("min_num_tracks_per_image", 10,
+             structure.tracks.min_num_tracks_per_image),
+      OPTION("max_num_tracks", 10, structure.tracks.max_num_tracks),
+      OPTION("num_rounds", 1, structure.num_rounds),
+      OPTION("final_max_reproj_error_px", 3,
+             structure.final_max_reproj_error_px),
+      OPTION("ba_refine_focal_length", 1, structure.bundle.refine_focal_length),
+      OPTION("min_num_matches", 30, refinement.min_num_matches),
+      OPTION("use_sdp_start", 0, poses.rotations.use_sdp_start),
+      OPTION("use_loop_gating", 0, poses.loops.enabled),
+      OPTION("refine_relative_poses", 0, poses.relative_poses.enabled),
+      OPTION("correct_rotation_rates", 0, poses.rotation_rates.enabled),
+      OPTION("refine_translations", 0, poses.translations.enabled),
+      OPTION("use_augmentation", 0, poses.augmentation.enabled),
+      OPTION("use_metric_lengths", 0, poses.augmentation.use_metric_lengths),
+      OPTION("refine_positions", 0, poses.positions.refine),
+      OPTION("ba_use_priors", 0, structure.use_priors),
+      OPTION("refine_matches", 0, refinement.enabled),
+  };
+  return cases;
+}
+
+#undef OPTION
+
+Status ParseGlobal(const std::vector<std::string>& words,
+                   GlobalStageOptions* stage) {
+  CommandOptions command("test", "A test.");
+  AddGlobalOptions(stage, &command);
+  std::vector<const char*> argv = {"test"};
+  for (const std::string& word : words) argv.push_back(word.c_str());
+  return command.Parse(argv.size(), argv.data());
+}
+
+TEST(GlobalOptionsTest, EachSetsItsOwnField) {
+  for (const OptionCase& option : Cases()) {
+    GlobalStageOptions stage;
+    EXPECT_NE(option.get(stage), option.value) << option.name;
+    const Status parsed = ParseGlobal(
+        {"--AdaSfmGlobal." + option.name, OptionText(option.value)}, &stage);
+    ASSERT_TRUE(parsed.ok()) << parsed.message();
+    EXPECT_EQ(option.get(stage), option.value) << option.name;
+    std::string error;
+    EXPECT_TRUE(stage.IsValid(&error)) << option.name << ": " << error;
+    for (const OptionCase& other : Cases()) {
+      if (&other == &option) continue;
+      EXPECT_EQ(other.get(stage), other.get(GlobalStageOptions()))
+          << option.name << " changes " << other.name;
+    }
+  }
+}
+
+TEST(GlobalOptionsTest, TheHelpNamesAll) {
+  testing::internal::CaptureStdout();
+  GlobalStageOptions stage;
+  EXPECT_TRUE(ParseGlobal({"-h"}, &stage).ok());
+  const std::string help = testing::internal::GetCapturedStdout();
+  size_t num_listed = 0;
+  for (size_t at = help.find("--AdaSfmGlobal."); at != std::string::npos;
+       at = help.find("--AdaSfmGlobal.", at + 1)) {
+    ++num_listed;
+  }
+  EXPECT_EQ(num_listed, Cases().size());
+}
+
+}  // namespace
+}  // namespace adasfm
