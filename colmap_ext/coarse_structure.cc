@@ -168,6 +168,23 @@ double MaxReprojError(const CoarseStructureOptions& options, int round) {
          std::pow(ratio, static_cast<double>(round) / (options.num_rounds - 1));
 }
 
+// The balance of vision and priors means something at the optimum only, so the
+// last round finds it.
+PriorBundleAdjustmentSummary AdjustRound(
+    const CoarseStructureOptions& options,
+    const PriorBundleAdjustmentProblem& problem, int round,
+    colmap::Reconstruction* reconstruction, double* keypoint_sigma_factor) {
+  PriorBundleAdjustmentOptions bundle = options.bundle;
+  PriorBalanceOptions balance = options.balance;
+  if (round + 1 < options.num_rounds) {
+    bundle.function_tolerance =
+        std::max(bundle.function_tolerance, options.early_function_tolerance);
+    balance.enabled = false;
+  }
+  return AdjustBundleInBalance(balance, bundle, problem, reconstruction,
+                               keypoint_sigma_factor);
+}
+
 }  // namespace
 
 bool CoarseStructureOptions::IsValid(std::string* error) const {
@@ -183,6 +200,12 @@ bool CoarseStructureOptions::IsValid(std::string* error) const {
   if (!(min_angle_floor_deg > 0.0)) {
     *error = "min_angle_floor_deg is " + std::to_string(min_angle_floor_deg) +
              ", but must be positive";
+    return false;
+  }
+  if (!(early_function_tolerance >= 0.0)) {
+    *error = "early_function_tolerance is " +
+             std::to_string(early_function_tolerance) +
+             ", but must not be negative";
     return false;
   }
   if (min_num_points_per_image < 0) {
@@ -225,9 +248,9 @@ CoarseModel BuildCoarseModel(
                                              bearings, tracks),
                            &model.min_angle_deg),
               &model.reconstruction);
-    model.rounds.push_back(
-        AdjustBundleInBalance(options.balance, options.bundle, problem,
-                              &model.reconstruction, &keypoint_sigma_factor));
+    model.rounds.push_back(AdjustRound(options, problem, round,
+                                       &model.reconstruction,
+                                       &keypoint_sigma_factor));
     if (!model.rounds.back().success) break;
   }
   model.reconstruction.FilterAllPoints3D(

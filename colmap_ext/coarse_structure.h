@@ -31,6 +31,9 @@ struct CoarseStructureOptions {
   // shrinks from triangulation.max_reproj_error_px to this.
   int num_rounds = 3;
   double final_max_reproj_error_px = 4.0;
+  // Relative change of the cost at which the rounds before the last end: their
+  // points are dropped, so only the way matters, not the last digits.
+  double early_function_tolerance = 1e-3;
   // Sensor priors take part in the adjustment.
   bool use_priors = true;
 

@@ -16,9 +16,10 @@ import shutil
 import statistics
 import sys
 
-import benchmark
+from benchmarking.methods import evaluate
+from benchmarking.process import Failed, run
 
-ROOT = benchmark.ROOT
+ROOT = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
 HARD = ['--alias_ratio', '0.05', '--num_blackouts', '1', '--wheel_slips', '2']
 
 # Options of adasfm_global for each ablation.
@@ -58,9 +59,9 @@ def make_world(num_images, seed, args):
   log_path = os.path.join(folder, 'make.log')
   database = os.path.join(folder, 'database.db')
   if not os.path.exists(database):
-    benchmark.run([args.colmap, 'adasfm_synthesizer', '--output_path', folder,
-                   '--num_images', str(num_images), '--seed', str(seed)] +
-                  HARD, log_path)
+    run([args.colmap, 'adasfm_synthesizer', '--output_path', folder,
+         '--num_images', str(num_images), '--seed', str(seed)] + HARD,
+        log_path)
   imported = os.path.join(folder, 'imported.db')
   if not os.path.exists(imported):
     shutil.copy(database, imported + '.part')
@@ -69,7 +70,7 @@ def make_world(num_images, seed, args):
     for option, file in (('image_times', 'times.csv'), ('imu', 'imu.csv'),
                          ('wheel', 'wheel.csv'), ('sensors', 'sensors.yaml')):
       arguments += ['--%s_path' % option, os.path.join(folder, file)]
-    benchmark.run(arguments, log_path)
+    run(arguments, log_path)
     os.rename(imported + '.part', imported)
   return folder
 
@@ -87,11 +88,11 @@ def shorten(evaluation):
 
 def evaluate_pairs(database, model, folder, args, log_path):
   json_path = os.path.join(os.path.dirname(database), 'pairs.json')
-  benchmark.run([args.colmap, 'adasfm_evaluator', '--input_path', model,
-                 '--ground_truth_path', os.path.join(folder, 'gt.txt'),
-                 '--database_path', database, '--landmarks_path',
-                 os.path.join(folder, 'landmarks.txt'), '--pairs_json_path',
-                 json_path], log_path)
+  run([args.colmap, 'adasfm_evaluator', '--input_path', model,
+       '--ground_truth_path', os.path.join(folder, 'gt.txt'),
+       '--database_path', database, '--landmarks_path',
+       os.path.join(folder, 'landmarks.txt'), '--pairs_json_path', json_path],
+      log_path)
   with open(json_path) as file:
     return json.load(file)
 
@@ -109,25 +110,23 @@ def run_variant(variant, folder, args):
   coarse = os.path.join(run_folder, 'global')
   record = {'world': os.path.basename(folder), 'variant': variant}
   try:
-    usage = benchmark.run([args.colmap, 'adasfm_global', '--database_path',
-                           database, '--output_path', coarse] +
-                          options_of(variant), log_path)
-    record['cpu_seconds'] = round(usage[1], 2)
-    record['coarse'] = shorten(benchmark.evaluate(
-        os.path.join(coarse, '0'), truth, args, log_path))
+    usage = run([args.colmap, 'adasfm_global', '--database_path', database,
+                 '--output_path', coarse] + options_of(variant), log_path)
+    record['cpu_seconds'] = round(usage.cpu_seconds, 2)
+    record['coarse'] = shorten(evaluate(os.path.join(coarse, '0'), truth, args,
+                                        log_path))
     with open(os.path.join(coarse, 'summary.json')) as file:
       record['converged'] = json.load(file)['models'][0]['positions_converged']
     if variant == 'as it is':
       record['pairs'] = evaluate_pairs(database, os.path.join(coarse, '0'),
                                        folder, args, log_path)
-    if args.mapper:
+    if variant in args.mapper_variants:
       output = os.path.join(run_folder, 'model')
-      benchmark.run([args.colmap, 'adasfm_mapper', '--database_path', database,
-                     '--input_path', os.path.join(coarse, '0'),
-                     '--output_path', output], log_path)
-      record['final'] = shorten(benchmark.evaluate(output, truth, args,
-                                                   log_path))
-  except benchmark.Failed as error:
+      run([args.colmap, 'adasfm_mapper', '--database_path', database,
+           '--input_path', os.path.join(coarse, '0'), '--output_path', output],
+          log_path)
+      record['final'] = shorten(evaluate(output, truth, args, log_path))
+  except Failed as error:
     record['error'] = str(error)
   if not args.keep:
     shutil.rmtree(run_folder)
@@ -154,17 +153,19 @@ def summarise(records, key):
 def ablation_table(records, args):
   lines = ['| variant | coarse: median m | worst m | scale off % | failed |' +
            (' final: median m | worst m | scale off % | failed |'
-            if args.mapper else '') +
+            if args.mapper_variants else '') +
            ' called converged though failed |',
            '|---|---|---|---|---|' +
-           ('---|---|---|---|' if args.mapper else '') + '---|']
+           ('---|---|---|---|' if args.mapper_variants else '') + '---|']
   for variant in args.variants:
     mine = [r for r in records if r['variant'] == variant]
     silent = sum(bool(r.get('converged')) and failed(r.get('coarse'))
                  for r in mine)
     columns = [variant, summarise(mine, 'coarse')]
-    if args.mapper:
+    if variant in args.mapper_variants:
       columns.append(summarise(mine, 'final'))
+    elif args.mapper_variants:
+      columns.append(' | | | ')
     lines.append('| ' + ' | '.join(columns + [str(silent)]) + ' |')
   return lines
 
@@ -258,8 +259,9 @@ def parse_arguments():
                       help='worlds of each size (10: what the project claims)')
   parser.add_argument('--variants', default=','.join(VARIANTS),
                       help='any of: ' + ', '.join(VARIANTS))
-  parser.add_argument('--mapper', type=int, default=1,
-                      help='0: coarse models only')
+  parser.add_argument('--mapper_variants', default=','.join(VARIANTS),
+                      help='those that adasfm_mapper completes; "" for coarse '
+                      'models only')
   parser.add_argument('--keep', type=int, default=0,
                       help="1: keep the runs' models and databases")
   parser.add_argument('--results_path',
@@ -272,7 +274,8 @@ def parse_arguments():
   args.sizes = [int(size) for size in args.sizes.split(',')]
   args.seeds = list(range(1, args.num_seeds + 1))
   args.variants = args.variants.split(',')
-  for variant in args.variants:
+  args.mapper_variants = [v for v in args.mapper_variants.split(',') if v]
+  for variant in args.variants + args.mapper_variants:
     if variant not in VARIANTS:
       parser.error('no such variant: ' + variant)
   return args

@@ -102,6 +102,8 @@ void GlobalOptionAdder::AddStructure() {
       "rounds of triangulation and bundle adjustment");
   Add("final_max_reproj_error_px", &stage_->structure.final_max_reproj_error_px,
       "largest error of a point in the last round [px]");
+  Add("early_function_tolerance", &stage_->structure.early_function_tolerance,
+      "rounds before the last end at this relative change of the cost");
   Add("ba_refine_focal_length", &stage_->structure.bundle.refine_focal_length,
       "0/1");
 }

@@ -65,6 +65,8 @@ const std::vector<OptionCase>& Cases() {
       OPTION("num_rounds", 1, structure.num_rounds),
       OPTION("final_max_reproj_error_px", 3,
              structure.final_max_reproj_error_px),
+      OPTION("early_function_tolerance", 0.01,
+             structure.early_function_tolerance),
       OPTION("ba_refine_focal_length", 1, structure.bundle.refine_focal_length),
       OPTION("min_num_matches", 30, refinement.min_num_matches),
       OPTION("use_sdp_start", 0, poses.rotations.use_sdp_start),
