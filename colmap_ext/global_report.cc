@@ -10,7 +10,20 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-Json ModelJson(const CoarseComponent& component, const CoarseModel& model) {
+Json JoinsJson(const SceneData& scene,
+               const std::vector<UnverifiedJoin>& joins) {
+  Json json = Json::array();
+  for (const UnverifiedJoin& join : joins) {
+    json.push_back({{"name1", scene.images.at(join.image_id1).name},
+                    {"name2", scene.images.at(join.image_id2).name},
+                    {"pairs", join.num_pairs},
+                    {"images", join.num_images}});
+  }
+  return json;
+}
+
+Json ModelJson(const SceneData& scene, const CoarseComponent& component,
+               const CoarseModel& model) {
   Json rounds = Json::array();
   for (const PriorBundleAdjustmentSummary& round : model.rounds) {
     rounds.push_back({{"success", round.success},
@@ -41,6 +54,7 @@ Json ModelJson(const CoarseComponent& component, const CoarseModel& model) {
           {"direction_agreement", component.direction_agreement},
           {"least_direction_agreement", component.least_direction_agreement},
           {"rotation_optimality", component.sdp_optimality},
+          {"unverified_joins", JoinsJson(scene, component.unverified_joins)},
           {"adjustments", rounds}};
 }
 
@@ -65,7 +79,7 @@ std::string FormatGlobalReportJson(const SceneData& scene,
                               {"max_rate_rad_s", rates.max_rate_rad_s}};
   for (size_t i = 0; i < result.models.size(); ++i) {
     report["models"].push_back(
-        ModelJson(result.poses.components[i], result.models[i]));
+        ModelJson(scene, result.poses.components[i], result.models[i]));
   }
   report["matches"] = {{"candidates", result.refinement.num_candidates},
                        {"kept", result.refinement.num_kept},
@@ -103,6 +117,25 @@ std::string FormatGlobalReportText(const GlobalStageResult& result,
   }
   text << "Total: " << total_seconds << " s\n";
   return text.str();
+}
+
+std::vector<std::string> DescribeUnverifiedJoins(
+    const SceneData& scene, const GlobalStageResult& result) {
+  std::vector<std::string> warnings;
+  for (const CoarseComponent& component : result.poses.components) {
+    for (const UnverifiedJoin& join : component.unverified_joins) {
+      std::ostringstream text;
+      text << "a part of " << join.num_images
+           << " images is joined to the rest at one place only ("
+           << join.num_pairs << " pairs like "
+           << scene.images.at(join.image_id1).name << " and "
+           << scene.images.at(join.image_id2).name
+           << "); if the two places merely look alike the model is folded: "
+              "sensors (adasfm_prior_importer) or more overlap would tell";
+      warnings.push_back(text.str());
+    }
+  }
+  return warnings;
 }
 
 std::string FormatRemovedPairs(const SceneData& scene,

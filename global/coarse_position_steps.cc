@@ -42,11 +42,22 @@ void CoarsePoseEstimator::EstimatePositions() {
     num_images += component.cams_from_world.size();
   }
   const int num_removed = RemoveEdgesOffPositions();
+  int num_joins = 0;
+  for (CoarseComponent& component : result_.components) {
+    std::vector<image_t> images;
+    for (const auto& [image_id, pose] : component.cams_from_world) {
+      images.push_back(image_id);
+    }
+    component.unverified_joins =
+        FindUnverifiedJoins(options_.joins, ExtractSubgraph(graph_, images));
+    num_joins += component.unverified_joins.size();
+  }
   EndStep("translation averaging",
           std::to_string(num_images) + " images in " +
               std::to_string(result_.components.size()) + " components, " +
               std::to_string(num_iterations) + " iterations, " +
-              std::to_string(num_removed) + " edges removed");
+              std::to_string(num_removed) + " edges removed, " +
+              std::to_string(num_joins) + " joins at one place only");
 }
 
 // Returns the number of iterations.

@@ -64,7 +64,8 @@ bool CoarsePoseOptions::IsValid(std::string* error) const {
          relative_poses.IsValid(error) && lengths.IsValid(error) &&
          loops.IsValid(error) && rotations.IsValid(error) &&
          translations.IsValid(error) && augmentation.IsValid(error) &&
-         positions.IsValid(error) && position_filter.IsValid(error);
+         positions.IsValid(error) && position_filter.IsValid(error) &&
+         joins.IsValid(error);
 }
 
 CoarsePoses EstimateCoarsePoses(const CoarsePoseOptions& options,

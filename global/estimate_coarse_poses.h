@@ -13,6 +13,7 @@
 #include "global/edge_lengths.h"
 #include "global/filter_edges_by_position.h"
 #include "global/filter_loops_by_odometry.h"
+#include "global/find_unverified_joins.h"
 #include "global/odometry_chain.h"
 #include "global/refine_relative_poses.h"
 #include "global/relative_translation.h"
@@ -54,6 +55,7 @@ struct CoarsePoseOptions {
   int min_num_inliers = 15;
   // Priors shorter than this (standstill) say nothing about depths.
   double min_known_length_m = 0.05;
+  UnverifiedJoinOptions joins;
   // Of all steps; -1: all of the machine's.
   int num_threads = -1;
 
@@ -75,6 +77,8 @@ struct CoarseComponent {
   // look-alike places fits nearly everywhere, but not where it is bent.
   double least_direction_agreement = 0.0;
   double sdp_optimality = 0.0;
+  // Where nothing tells look-alike places apart; none with odometry throughout.
+  std::vector<UnverifiedJoin> unverified_joins;
 };
 
 struct CoarseStep {

@@ -98,6 +98,23 @@ std::vector<TrackElement> CollectKeypoints(
   return keypoints;
 }
 
+// The first, the last, and evenly spread ones between them, which differ from
+// track to track so that no image always falls out.
+Track Shorten(const Track& track, size_t max_length) {
+  if (track.size() <= max_length) return track;
+  constexpr int kNumPhases = 16;
+  const double phase =
+      static_cast<double>(track.front().point2D_idx % kNumPhases) / kNumPhases;
+  const double stride =
+      static_cast<double>(track.size() - 2) / (max_length - 2);
+  Track shortened = {track.front()};
+  for (size_t k = 0; k + 2 < max_length; ++k) {
+    shortened.push_back(track[1 + static_cast<size_t>((k + phase) * stride)]);
+  }
+  shortened.push_back(track.back());
+  return shortened;
+}
+
 // Longest first; a track is kept while one of its images still needs it.
 std::vector<Track> SelectTracks(const TrackOptions& options,
                                 std::vector<Track> tracks) {
@@ -129,6 +146,11 @@ bool TrackOptions::IsValid(std::string* error) const {
   if (min_track_length < 2) {
     *error = "min_track_length = " + std::to_string(min_track_length) +
              " must be >= 2";
+    return false;
+  }
+  if (max_track_length < std::max(3, min_track_length)) {
+    *error = "max_track_length = " + std::to_string(max_track_length) +
+             " must be >= 3 and >= min_track_length";
     return false;
   }
   if (min_num_tracks_per_image < 1) {
@@ -182,7 +204,11 @@ std::vector<Track> BuildTracks(
           sets.IndexOf({pair->first.image_id2, match.point2D_idx2}));
     }
   }
-  return SelectTracks(options, sets.Collect(options.min_track_length));
+  std::vector<Track> tracks = sets.Collect(options.min_track_length);
+  for (Track& track : tracks) {
+    track = Shorten(track, options.max_track_length);
+  }
+  return SelectTracks(options, std::move(tracks));
 }
 
 }  // namespace adasfm

@@ -28,6 +28,10 @@ using Track = std::vector<TrackElement>;
 
 struct TrackOptions {
   int min_track_length = 3;
+  // Longer tracks keep this many images, spread evenly from the first to the
+  // last: the adjustment's cost grows with the square of a track's length, and
+  // more short tracks see an image as well as few long ones.
+  int max_track_length = 12;
   // Tracks are taken, longest first, while they help an image that has fewer
   // than this many yet.
   int min_num_tracks_per_image = 120;

@@ -161,7 +161,8 @@ class Checker:
                     if option.name.endswith('_' + suffix) and not re.search(
                             unit, option.help):
                         # _m_s is no _s.
-                        if suffix == 's' and option.name.endswith('_m_s'):
+                        if suffix == 's' and option.name.endswith(
+                                ('_m_s', '_rad_s')):
                             continue
                         fail(where, 'has no unit in its help: ' + option.help)
 

@@ -84,6 +84,11 @@ void GlobalOptionAdder::AddPositions() {
       "the same at the worst image");
   Add("max_agreeing_direction_deg", &stage_->poses.max_agreeing_direction_deg,
       "a direction fits within this angle [deg]");
+  Add("max_sequence_gap", &stage_->poses.joins.max_sequence_gap,
+      "image ids at most this far apart follow each other; parts of a drive "
+      "that hang together at one place only are reported");
+  Add("min_num_join_images", &stage_->poses.joins.min_num_images,
+      "smaller parts are not reported");
 }
 
 void GlobalOptionAdder::AddStructure() {
@@ -93,6 +98,8 @@ void GlobalOptionAdder::AddStructure() {
       "images with fewer points get some of smaller angles");
   Add("min_track_length", &stage_->structure.tracks.min_track_length,
       "images that a track must have");
+  Add("max_track_length", &stage_->structure.tracks.max_track_length,
+      "longer tracks keep so many images, evenly spread");
   Add("min_num_tracks_per_image",
       &stage_->structure.tracks.min_num_tracks_per_image,
       "tracks are taken while an image has fewer");
@@ -104,6 +111,8 @@ void GlobalOptionAdder::AddStructure() {
       "largest error of a point in the last round [px]");
   Add("early_function_tolerance", &stage_->structure.early_function_tolerance,
       "rounds before the last end at this relative change of the cost");
+  Add("ba_keypoint_sigma_px", &stage_->structure.bundle.keypoint_sigma_px,
+      "1 sigma of a keypoint, against which sensor priors weigh [px]");
   Add("ba_refine_focal_length", &stage_->structure.bundle.refine_focal_length,
       "0/1");
 }

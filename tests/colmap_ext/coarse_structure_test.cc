@@ -35,6 +35,7 @@ Fixture BuildFixture(const SyntheticWorldOptions& options, double sigma_m) {
         pair.inlier_matches;
   }
   fixture.input.metric = true;
+  fixture.input.priors = fixture.scene.priors;
   return fixture;
 }
 
@@ -124,6 +125,10 @@ TEST(BuildCoarseModelTest, OptionsChangeTheOutcome) {
   options.use_priors = false;
   EXPECT_LT(build(options).rounds[0].num_residuals,
             model.rounds[0].num_residuals);
+  options = CoarseStructureOptions();
+  options.early_function_tolerance = 0.0;
+  EXPECT_GT(build(options).rounds[0].num_iterations,
+            model.rounds[0].num_iterations);
   options = CoarseStructureOptions();
   options.final_max_reproj_error_px = 1.0;
   EXPECT_LT(build(options).num_observations, model.num_observations);

@@ -35,6 +35,43 @@ TEST(BuildTracks, KeepsOneKeypointPerImage) {
   EXPECT_EQ(BuildTracks(options, matches).size(), 1);
 }
 
+TEST(BuildTracks, ShortensLongTracksEvenly) {
+  constexpr int kNumImages = 40;
+  constexpr int kNumTracks = 64;
+  std::map<ImagePair, std::vector<FeatureMatch>> matches;
+  for (image_t i = 1; i < kNumImages; ++i) {
+    for (point2D_t k = 0; k < kNumTracks; ++k) {
+      matches[ImagePair(i, i + 1)].push_back({k, k});
+    }
+  }
+  for (const int max_length : {3, 4, 12, 39, 40, 50}) {
+    TrackOptions options;
+    options.max_track_length = max_length;
+    const std::vector<Track> tracks = BuildTracks(options, matches);
+    ASSERT_EQ(tracks.size(), kNumTracks);
+    std::map<image_t, int> num_tracks;
+    const int length = std::min(max_length, kNumImages);
+    for (const Track& track : tracks) {
+      ASSERT_EQ(track.size(), length);
+      EXPECT_EQ(track.front().image_id, 1);
+      EXPECT_EQ(track.back().image_id, kNumImages);
+      for (int k = 1; k < length; ++k) {
+        EXPECT_EQ(track[k].point2D_idx, track[0].point2D_idx);
+        EXPECT_GT(track[k].image_id, track[k - 1].image_id);
+        if (length > 3) {
+          EXPECT_LE(track[k].image_id - track[k - 1].image_id,
+                    2 * (kNumImages - 1) / (length - 2));
+        }
+      }
+      for (const TrackElement& element : track) ++num_tracks[element.image_id];
+    }
+    // No image falls out of all tracks.
+    if (max_length >= 12) {
+      EXPECT_EQ(num_tracks.size(), kNumImages);
+    }
+  }
+}
+
 TEST(EstimateTrackBytes, CoversTheTracksAndGrowsWithTheMatches) {
   std::map<ImagePair, std::vector<FeatureMatch>> matches;
   EXPECT_EQ(EstimateTrackBytes(matches), 0);
