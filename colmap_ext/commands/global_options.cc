@@ -40,7 +40,7 @@ void GlobalOptionAdder::AddPaper() {
   Add("max_epipolar_error_px", &stage_->refinement.max_epipolar_error_px,
       "matches farther from their epipolar lines, both views together, are "
       "dropped [px]");
-  Add("num_threads", &stage_->num_threads, "-1: all of the machine's");
+  Add("num_threads", &stage_->num_threads, "threads; -1: all of the machine's");
 }
 
 void GlobalOptionAdder::AddRotations() {
@@ -104,7 +104,7 @@ void GlobalOptionAdder::AddStructure() {
       &stage_->structure.tracks.min_num_tracks_per_image,
       "tracks are taken while an image has fewer");
   Add("max_num_tracks", &stage_->structure.tracks.max_num_tracks,
-      "bound of the tracks (-1: none)");
+      "largest number of tracks; -1: no bound");
   Add("num_rounds", &stage_->structure.num_rounds,
       "rounds of triangulation and bundle adjustment");
   Add("final_max_reproj_error_px", &stage_->structure.final_max_reproj_error_px,
@@ -114,7 +114,7 @@ void GlobalOptionAdder::AddStructure() {
   Add("ba_keypoint_sigma_px", &stage_->structure.bundle.keypoint_sigma_px,
       "1 sigma of a keypoint, against which sensor priors weigh [px]");
   Add("ba_refine_focal_length", &stage_->structure.bundle.refine_focal_length,
-      "0/1");
+      "adjust focal lengths too");
 }
 
 void GlobalOptionAdder::AddMatches() {
