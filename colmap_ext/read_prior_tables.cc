@@ -14,7 +14,6 @@ namespace {
 constexpr uint32_t kAllFlags =
     kPriorRotation | kPriorDirection | kPriorLength | kPriorWheelSlip;
 
-// The inverse of how prior_tables.cc writes doubles.
 // The present id of the image that had this id and name; none when it is gone.
 class IdResolver {
  public:
