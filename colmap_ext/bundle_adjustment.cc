@@ -15,6 +15,9 @@ namespace {
 // The length of a scale that nothing measures is held to this share of itself;
 // no residual pulls against it, so the value is not a weight.
 constexpr double kGaugeLengthRatio = 1e-3;
+// The chain's length and bends are soft: the damping that Ceres begins with
+// (radius 1e4) would let them go a little at each of many steps.
+constexpr double kInitialTrustRegionRadius = 1e7;
 // Problems with fewer residuals are solved faster by one thread.
 constexpr int kMinNumResidualsForThreads = 20000;
 
@@ -45,6 +48,7 @@ ceres::Solver::Options SolverOptions(
   ceres::Solver::Options solver;
   solver.max_num_iterations = options.max_num_iterations;
   solver.function_tolerance = options.function_tolerance;
+  solver.initial_trust_region_radius = kInitialTrustRegionRadius;
   // The cost alone decides: gradients and steps have no common unit here.
   solver.gradient_tolerance = 1e-12;
   solver.parameter_tolerance = 1e-12;

@@ -1,60 +1,14 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "colmap_ext/bundle_problem.h"
 
-#include <base/camera_models.h>
-
 #include <algorithm>
 #include <cmath>
 #include <set>
 
+#include "colmap_ext/create_reprojection_cost.h"
 #include "colmap_ext/host/pose_conversion.h"
 
 namespace adasfm {
-namespace {
-
-// A keypoint whose undistortion does not lead back to it, in px.
-constexpr double kMaxUndistortionErrorPx = 0.5;
-
-// False when the camera model cannot undo its distortion at this keypoint.
-bool NormalizeKeypoint(const colmap::Camera& camera, const Eigen::Vector2d& xy,
-                       double sigma_px, NormalizedKeypoint* keypoint) {
-  // Half a step to either side: exact for pinholes, error of third order else.
-  const double step = 0.5 / camera.MeanFocalLength();
-  const Eigen::Vector2d normalized = camera.ImageToWorld(xy);
-  const Eigen::Vector2d dx(step, 0.0), dy(0.0, step);
-  Eigen::Matrix2d jacobian;
-  jacobian.col(0) = (camera.WorldToImage(normalized + dx) -
-                     camera.WorldToImage(normalized - dx)) /
-                    (2.0 * step);
-  jacobian.col(1) = (camera.WorldToImage(normalized + dy) -
-                     camera.WorldToImage(normalized - dy)) /
-                    (2.0 * step);
-  const Eigen::Vector2d error = camera.WorldToImage(normalized) - xy;
-  if (!jacobian.allFinite() || !(error.norm() < kMaxUndistortionErrorPx)) {
-    return false;
-  }
-  keypoint->normalized = normalized;
-  keypoint->whitened_from_normalized = jacobian / sigma_px;
-  return true;
-}
-
-std::unique_ptr<ceres::CostFunction> CreateCameraCost(
-    const colmap::Camera& camera, const Eigen::Vector2d& xy, double sigma_px,
-    const AdjustedPose* pose) {
-  switch (camera.ModelId()) {
-#define CAMERA_MODEL_CASE(Model)                         \
-  case colmap::Model::kModelId:                          \
-    return std::make_unique<ceres::AutoDiffCostFunction< \
-        CameraReprojectionCost<colmap::Model>, 2, 6, 3,  \
-        static_cast<int>(colmap::Model::kNumParams)>>(   \
-        new CameraReprojectionCost<colmap::Model>(xy, sigma_px, pose));
-    CAMERA_MODEL_CASES
-#undef CAMERA_MODEL_CASE
-  }
-  return nullptr;
-}
-
-}  // namespace
 
 BundleProblem::BundleProblem(const PriorBundleAdjustmentOptions& options,
                              const PriorBundleAdjustmentProblem& problem,
@@ -249,55 +203,6 @@ void BundleProblem::SetConstantBlocks(
           new ceres::SubsetManifold(block.params.size(), constant));
     }
   }
-}
-
-std::vector<image_t> BundleProblem::ConstantImages() const {
-  std::vector<image_t> image_ids;
-  for (const auto& [image_id, block] : images_) {
-    if (block.is_constant && block.IsUsed()) image_ids.push_back(image_id);
-  }
-  return image_ids;
-}
-
-void BundleProblem::FixFirstPose() {
-  ImageBlock* first = nullptr;
-  for (auto& [image_id, block] : images_) {
-    if (!block.IsUsed()) continue;
-    if (first == nullptr || block.num_observations > 0) first = &block;
-    if (block.num_observations > 0) break;
-  }
-  if (first == nullptr) return;
-  first->is_constant = true;
-  problem_->SetParameterBlockConstant(first->pose->parameters);
-}
-
-void BundleProblem::FixDistanceToFarthestPose(double sigma_ratio) {
-  std::pair<image_t, ImageBlock*> first(kInvalidImageId, nullptr);
-  for (auto& [image_id, block] : images_) {
-    if (block.is_constant && block.IsUsed()) {
-      first = {image_id, &block};
-      break;
-    }
-  }
-  if (first.second == nullptr) return;
-  std::pair<image_t, ImageBlock*> farthest(kInvalidImageId, nullptr);
-  double max_distance = 0.0;
-  for (auto& [image_id, block] : images_) {
-    if (!block.IsUsed()) continue;
-    const double distance =
-        (block.pose->center - first.second->pose->center).norm();
-    if (distance <= max_distance) continue;
-    max_distance = distance;
-    farthest = {image_id, &block};
-  }
-  if (farthest.second == nullptr) return;
-  PosePriorEdge edge;
-  edge.image_id1 = first.first;
-  edge.image_id2 = farthest.first;
-  edge.cam2_from_cam1.translation = Eigen::Vector3d(0.0, 0.0, max_distance);
-  edge.length_sigma_m = sigma_ratio * max_distance;
-  AddPrior(edge, PosePriorCost::Term::kLength, first.second, farthest.second,
-           nullptr);
 }
 
 std::shared_ptr<ceres::ParameterBlockOrdering> BundleProblem::Ordering() {

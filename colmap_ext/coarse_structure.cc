@@ -4,8 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "colmap_ext/align_to_gravity.h"
 #include "colmap_ext/host/pose_conversion.h"
-#include "core/sim3d.h"
 
 namespace adasfm {
 namespace {
@@ -96,52 +96,6 @@ PriorBundleAdjustmentProblem CreateProblem(
     problem.priors.push_back(edge);
   }
   return problem;
-}
-
-// The direction that most images call down: mean, then mean of those near it.
-std::optional<Eigen::Vector3d> FindGravityInWorld(
-    const SceneData& scene, const colmap::Reconstruction& reconstruction) {
-  std::vector<Eigen::Vector3d> directions;
-  for (const image_t image_id : reconstruction.RegImageIds()) {
-    const auto& gravity = scene.images.at(image_id).gravity_in_cam;
-    if (!gravity.has_value()) continue;
-    directions.push_back(
-        CamFromWorld(reconstruction.Image(image_id)).rotation.conjugate() *
-        *gravity);
-  }
-  if (directions.empty()) return std::nullopt;
-  Eigen::Vector3d mean = Eigen::Vector3d::Zero();
-  for (const Eigen::Vector3d& direction : directions) mean += direction;
-  // Weiszfeld: the geometric median ignores a minority of wrong directions.
-  for (int iteration = 0; iteration < 20; ++iteration) {
-    if (!(mean.norm() > 1e-9)) return std::nullopt;
-    mean.normalize();
-    Eigen::Vector3d sum = Eigen::Vector3d::Zero();
-    for (const Eigen::Vector3d& direction : directions) {
-      sum += direction / std::max(1e-6, (direction - mean).norm());
-    }
-    mean = sum;
-  }
-  return mean.normalized();
-}
-
-// Turns the world so that gravity points along -z and puts the first camera at
-// the origin.
-void AlignToGravity(const Eigen::Vector3d& gravity_in_world,
-                    colmap::Reconstruction* reconstruction) {
-  const std::map<image_t, Rigid3d> poses = CamsFromWorld(*reconstruction);
-  const Eigen::Quaterniond new_from_old = Eigen::Quaterniond::FromTwoVectors(
-      gravity_in_world, -Eigen::Vector3d::UnitZ());
-  const Eigen::Vector3d origin = poses.begin()->second.TargetOriginInSource();
-  const Sim3d sim(1.0, new_from_old, new_from_old * -origin);
-  for (const auto& [image_id, pose] : poses) {
-    SetCamFromWorld(TransformCamFromWorld(sim, pose),
-                    &reconstruction->Image(image_id));
-  }
-  for (const colmap::point3D_t point_id : reconstruction->Point3DIds()) {
-    colmap::Point3D& point = reconstruction->Point3D(point_id);
-    point.SetXYZ(sim * point.XYZ());
-  }
 }
 
 void FillFigures(const CoarseStructureOptions& options, CoarseModel* model) {
@@ -257,12 +211,7 @@ CoarseModel BuildCoarseModel(
       options.final_max_reproj_error_px,
       std::min(options.min_angle_floor_deg,
                options.triangulation.min_triangulation_angle_deg));
-  const std::optional<Eigen::Vector3d> gravity =
-      FindGravityInWorld(scene, model.reconstruction);
-  if (gravity.has_value()) {
-    AlignToGravity(*gravity, &model.reconstruction);
-    model.gravity_aligned = true;
-  }
+  model.gravity_aligned = AlignToGravity(scene, &model.reconstruction);
   model.keypoint_sigma_px =
       options.bundle.keypoint_sigma_px * keypoint_sigma_factor;
   model.prior_chi2_per_dof =

@@ -10,6 +10,7 @@
 
 #include "colmap_ext/host/pose_conversion.h"
 #include "colmap_ext/host/triangulation.h"
+#include "colmap_ext/part_adjuster.h"
 #include "colmap_ext/prior_support.h"
 #include "core/interruption.h"
 
@@ -23,8 +24,6 @@ constexpr size_t kMaxNumInitialTrials = 5;
 // adjustment has seen.
 constexpr double kMaxBatchRatio = 0.5;
 constexpr size_t kMinBatchSize = 8;
-// Registered images that see the batch's points, held fixed in its adjustment.
-constexpr size_t kMaxNumConstantImages = 30;
 
 class LocalMapper {
  public:
@@ -34,7 +33,8 @@ class LocalMapper {
         scene_(BuildMapperScene(data, coarse, images)),
         reconstruction_(scene_->reconstruction),
         triangulator_(&scene_->graph, &reconstruction_,
-                      options.min_triangulation_angle_deg) {}
+                      options.min_triangulation_angle_deg),
+        adjuster_(options, scene_.get(), &triangulator_) {}
 
   LocalMapResult Run() {
     while (RegisterInitialPair()) {  // 1
@@ -50,6 +50,8 @@ class LocalMapper {
     RegisterByPriors();  // 5
     Finish();            // 6
     reconstruction_.TearDown();
+    result_.num_global_adjustments = adjuster_.NumGlobalAdjustments();
+    result_.keypoint_sigma_factor = adjuster_.KeypointSigmaFactor();
     result_.mean_reproj_error_px =
         reconstruction_.ComputeMeanReprojectionError();
     result_.reconstruction = std::move(reconstruction_);
@@ -76,9 +78,7 @@ class LocalMapper {
       Register(pair.image_id2,
                pair.cam2_from_world * local_from_coarse.Inverse());
       triangulator_.TriangulateImage(pair.image_id1);
-      const std::set<image_t> images = {pair.image_id1, pair.image_id2};
-      AdjustImages(images, {}, 20);
-      Filter(images);
+      adjuster_.AdjustPair(pair.image_id1, pair.image_id2);
       if (reconstruction_.Image(pair.image_id1).NumPoints3D() >=
           kMinNumInitialPoints) {
         return true;
@@ -159,76 +159,11 @@ class LocalMapper {
   void AdjustAsGrown() {
     if (reconstruction_.NumRegImages() >=
         options_.global_adjustment_growth * num_registered_at_adjustment_) {
-      AdjustAll(10);
+      adjuster_.AdjustAll(10);
       num_registered_at_adjustment_ = reconstruction_.NumRegImages();
-      return;
+    } else {
+      adjuster_.AdjustBatch(batch_);
     }
-    AdjustImages(batch_, FindConstantImages(), 8);
-    Filter(batch_);
-  }
-
-  // The registered images matched to the batch, most matches first.
-  std::set<image_t> FindConstantImages() const {
-    std::map<image_t, int> num_matches;
-    for (const image_t image_id : batch_) {
-      for (const auto& [neighbor, count] : scene_->neighbors.at(image_id)) {
-        if (reconstruction_.IsImageRegistered(neighbor) &&
-            !batch_.count(neighbor)) {
-          num_matches[neighbor] += count;
-        }
-      }
-    }
-    std::vector<std::pair<int, image_t>> ranked;
-    for (const auto& [image_id, count] : num_matches) {
-      ranked.emplace_back(-count, image_id);
-    }
-    std::sort(ranked.begin(), ranked.end());
-    std::set<image_t> constant_images;
-    for (const auto& [count, image_id] : ranked) {
-      if (constant_images.size() == kMaxNumConstantImages) break;
-      constant_images.insert(image_id);
-    }
-    return constant_images;
-  }
-
-  void AdjustImages(const std::set<image_t>& images,
-                    const std::set<image_t>& constant_images,
-                    int max_num_iterations) {
-    PriorBundleAdjustmentProblem problem;
-    problem.images = images;
-    problem.constant_images = constant_images;
-    if (options_.use_priors_in_adjustment) {
-      std::set<image_t> all = images;
-      all.insert(constant_images.begin(), constant_images.end());
-      problem.priors = FindPriorEdges(*scene_, all);
-    }
-    PriorBundleAdjustmentOptions options;
-    options.keypoint_sigma_px = options_.keypoint_sigma_px;
-    options.max_num_iterations = max_num_iterations;
-    options.function_tolerance = 1e-4;
-    options.num_threads = options_.num_threads;
-    if (!constant_images.empty()) {
-      // Neighbours that stand fixed say nothing about the balance.
-      options.keypoint_sigma_px *= keypoint_sigma_factor_;
-      AdjustBundle(options, problem, &reconstruction_);
-      return;
-    }
-    AdjustBundleInBalance(options_.balance, options, problem, &reconstruction_,
-                          &keypoint_sigma_factor_);
-  }
-
-  void AdjustAll(int max_num_iterations) {
-    ++result_.num_global_adjustments;
-    triangulator_.CompleteAndMergeTracks(options_.filter_max_reproj_error_px);
-    AdjustImages(RegisteredImages(), {}, max_num_iterations);
-    reconstruction_.FilterAllPoints3D(options_.filter_max_reproj_error_px,
-                                      options_.min_triangulation_angle_deg);
-  }
-
-  void Filter(const std::set<image_t>& images) {
-    reconstruction_.FilterPoints3DInImages(options_.filter_max_reproj_error_px,
-                                           options_.min_triangulation_angle_deg,
-                                           {images.begin(), images.end()});
   }
 
   // Breadth first from the registered images along priors that confirm the
@@ -275,11 +210,11 @@ class LocalMapper {
   }
 
   void Finish() {
-    AdjustAll(15);
+    adjuster_.AdjustAll(15);
     for (const image_t image_id : RegisteredImages()) {
       triangulator_.TriangulateImage(image_id);
     }
-    AdjustAll(15);
+    adjuster_.AdjustAll(15);
     for (auto it = result_.prior_only_images.begin();
          it != result_.prior_only_images.end();) {
       // Points reached it after all.
@@ -293,10 +228,10 @@ class LocalMapper {
   std::unique_ptr<MapperScene> scene_;
   colmap::Reconstruction& reconstruction_;
   Triangulator triangulator_;
+  PartAdjuster adjuster_;
   std::set<image_t> batch_;
   std::map<image_t, int> num_visible_at_failure_;
   size_t num_registered_at_adjustment_ = 0;
-  double keypoint_sigma_factor_ = 1.0;
   LocalMapResult result_;
 };
 
@@ -325,17 +260,6 @@ bool LocalMapperOptions::IsValid(std::string* error) const {
          check(keypoint_sigma_px > 0.0, "keypoint_sigma_px", keypoint_sigma_px,
                "must be positive") &&
          balance.IsValid(error);
-}
-
-std::vector<PosePriorEdge> FindPriorEdges(const MapperScene& scene,
-                                          const std::set<image_t>& images) {
-  std::vector<PosePriorEdge> edges;
-  for (const RelativePosePrior& prior : scene.priors) {
-    if (images.count(prior.image_id1) && images.count(prior.image_id2)) {
-      edges.push_back(PosePriorEdgeFromPrior(prior));
-    }
-  }
-  return edges;
 }
 
 LocalMapResult ReconstructLocally(const LocalMapperOptions& options,

@@ -45,6 +45,8 @@ struct LocalMapResult {
   int num_registered_by_global_pose = 0;
   int num_global_adjustments = 0;
   double mean_reproj_error_px = 0.0;
+  // By which keypoint_sigma_px was raised in balance with the priors.
+  double keypoint_sigma_factor = 1.0;
 };
 
 // Reconstructs one part incrementally, steered by the coarse poses (paper,
@@ -64,9 +66,5 @@ LocalMapResult ReconstructLocally(const LocalMapperOptions& options,
                                   const SceneData& data,
                                   const CoarsePoseMap& coarse,
                                   const std::set<image_t>& images);
-
-// The priors among the images, as terms of an adjustment.
-std::vector<PosePriorEdge> FindPriorEdges(const MapperScene& scene,
-                                          const std::set<image_t>& images);
 
 }  // namespace adasfm

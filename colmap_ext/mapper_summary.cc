@@ -28,6 +28,7 @@ nlohmann::json PartAsJson(const MapperStageSummary& summary, size_t k) {
     json["merged"] = alignment.success;
     json["inlier_ratio"] = alignment.inlier_ratio;
     json["threshold"] = alignment.threshold;
+    json["num_thresholds_tried"] = alignment.num_iterations;
     json["alignment_rmse"] = alignment.rmse;
     json["scale"] = alignment.target_from_source.scale;
   }
@@ -53,6 +54,8 @@ std::string FormatMapperSummaryJson(const MapperStageSummary& summary) {
       {"num_refinement_iterations", summary.refine.num_iterations},
       {"keypoint_sigma_px", summary.refine.keypoint_sigma_px},
       {"prior_chi2_per_dof", summary.refine.prior_chi2_per_dof},
+      {"num_parallel_parts", summary.num_parallel_parts},
+      {"max_part_memory_bytes", summary.max_part_memory_bytes},
       {"plan_seconds", summary.plan_seconds},
       {"parts_seconds", summary.parts_seconds},
       {"merge_seconds", summary.merge_seconds},

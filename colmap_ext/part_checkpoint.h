@@ -22,14 +22,14 @@ struct PartReport {
   int num_registered_by_global_pose = 0;
   int num_global_adjustments = 0;
   double mean_reproj_error_px = 0.0;
+  double keypoint_sigma_factor = 1.0;
   double seconds = 0.0;
   // Set when the first try threw.
   std::string retry_reason;
   std::set<image_t> prior_only_images;
 };
 
-// A part's folder: part.json and, unless the part failed, the model's three
-// files. It appears under its name when all of it is on the disk.
+// A part's checkpoint (model_checkpoint.h); without a model when it failed.
 Status WritePartCheckpoint(const std::string& path,
                            const std::string& fingerprint,
                            const PartReport& report,

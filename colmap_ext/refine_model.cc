@@ -2,15 +2,16 @@
 #include "colmap_ext/refine_model.h"
 
 #include <algorithm>
+#include <stdexcept>
 #include <vector>
 
 #include "colmap_ext/bundle_adjustment.h"
 #include "colmap_ext/host/pose_conversion.h"
 #include "colmap_ext/host/triangulation.h"
 #include "colmap_ext/local_mapper.h"
+#include "colmap_ext/part_adjuster.h"
 #include "colmap_ext/prior_support.h"
 #include "colmap_ext/register_image.h"
-#include "core/sim3d.h"
 
 namespace adasfm {
 namespace {
@@ -29,28 +30,34 @@ constexpr double kContradictionTranslationM = 0.5;
 
 class ModelRefiner {
  public:
-  ModelRefiner(const RefineModelOptions& options, MapperScene* scene)
+  ModelRefiner(const RefineModelOptions& options, MapperScene* scene,
+               RefineModelSummary* summary)
       : options_(options),
         scene_(*scene),
         reconstruction_(scene->reconstruction),
         triangulator_(&scene->graph, &scene->reconstruction,
-                      options.min_triangulation_angle_deg) {}
+                      options.min_triangulation_angle_deg),
+        summary_(*summary) {}
 
-  RefineModelSummary Run() {
+  void JoinParts() {
+    if (!options_.join_parts) return;
     const double loose_px = 3.0 * options_.filter_max_reproj_error_px;
-    if (options_.join_parts) {
-      Adjust(10, 1e-3);
-      Filter(loose_px);
-      triangulator_.CompleteAndMergeTracks(loose_px);
-    }
+    Adjust(10, 1e-3);
+    Filter(loose_px);
+    triangulator_.CompleteAndMergeTracks(loose_px);
+  }
+
+  void AdjustRoughly() {
     TriangulateWeakImages();
-    Adjust(15, 1e-4);
+    Adjust(15, 1e-3);
     Filter(options_.filter_max_reproj_error_px);
-    if (PutBackContradictedImages()) Adjust(10, 1e-4);
+    if (PutBackContradictedImages()) Adjust(10, 1e-3);
+  }
+
+  void AdjustFinely() {
     triangulator_.CompleteAndMergeTracks(options_.filter_max_reproj_error_px);
     Adjust(25, 1e-6);
     Filter(options_.filter_max_reproj_error_px);
-    return summary_;
   }
 
  private:
@@ -126,10 +133,10 @@ class ModelRefiner {
     options.num_threads = options_.num_threads;
     summary_.num_iterations +=
         AdjustBundleInBalance(options_.balance, options, problem,
-                              &reconstruction_, &keypoint_sigma_factor_)
+                              &reconstruction_, &summary_.keypoint_sigma_factor)
             .num_iterations;
     summary_.keypoint_sigma_px =
-        options_.keypoint_sigma_px * keypoint_sigma_factor_;
+        options_.keypoint_sigma_px * summary_.keypoint_sigma_factor;
     summary_.prior_chi2_per_dof =
         ComputePriorChi2PerDof(problem.priors, reconstruction_);
   }
@@ -190,8 +197,7 @@ class ModelRefiner {
   MapperScene& scene_;
   colmap::Reconstruction& reconstruction_;
   Triangulator triangulator_;
-  double keypoint_sigma_factor_ = 1.0;
-  RefineModelSummary summary_;
+  RefineModelSummary& summary_;
 };
 
 }  // namespace
@@ -207,9 +213,18 @@ bool RefineModelOptions::IsValid(std::string* error) const {
   return false;
 }
 
-RefineModelSummary RefineModel(const RefineModelOptions& options,
-                               MapperScene* scene) {
-  return ModelRefiner(options, scene).Run();
+void RefineModel(const RefineModelOptions& options, int round,
+                 MapperScene* scene, RefineModelSummary* summary) {
+  ModelRefiner refiner(options, scene, summary);
+  switch (round) {
+    case 1:
+      return refiner.JoinParts();
+    case 2:
+      return refiner.AdjustRoughly();
+    case kNumRefinementRounds:
+      return refiner.AdjustFinely();
+  }
+  throw std::invalid_argument("RefineModel: no round " + std::to_string(round));
 }
 
 void RegisterAtCoarsePoses(MapperScene* scene) {
@@ -218,33 +233,6 @@ void RegisterAtCoarsePoses(MapperScene* scene) {
     SetCamFromWorld(cam_from_world, &scene->reconstruction.Image(image_id));
     scene->reconstruction.RegisterImage(image_id);
   }
-}
-
-bool AlignToGravity(const SceneData& data,
-                    colmap::Reconstruction* reconstruction) {
-  Eigen::Vector3d down = Eigen::Vector3d::Zero();
-  std::vector<image_t> image_ids = reconstruction->RegImageIds();
-  std::sort(image_ids.begin(), image_ids.end());
-  for (const image_t image_id : image_ids) {
-    const auto image = data.images.find(image_id);
-    if (image == data.images.end() || !image->second.gravity_in_cam) continue;
-    down += CamFromWorld(reconstruction->Image(image_id)).rotation.conjugate() *
-            image->second.gravity_in_cam->normalized();
-  }
-  if (down.norm() < 1e-6) return false;
-  const Sim3d level_from_world(
-      1.0, Eigen::Quaterniond::FromTwoVectors(down, -Eigen::Vector3d::UnitZ()),
-      Eigen::Vector3d::Zero());
-  for (const image_t image_id : image_ids) {
-    colmap::Image& image = reconstruction->Image(image_id);
-    SetCamFromWorld(
-        TransformCamFromWorld(level_from_world, CamFromWorld(image)), &image);
-  }
-  for (const auto& point : reconstruction->Points3D()) {
-    Eigen::Vector3d& xyz = reconstruction->Point3D(point.first).XYZ();
-    xyz = level_from_world * xyz;
-  }
-  return true;
 }
 
 }  // namespace adasfm

@@ -32,6 +32,8 @@ struct RefineModelOptions {
 
 struct RefineModelSummary {
   int num_iterations = 0;
+  // By which the keypoints' sigma is multiplied; the next round begins with it.
+  double keypoint_sigma_factor = 1.0;
   // 1 sigma of keypoints that agrees with the priors (balance_priors.h).
   double keypoint_sigma_px = 0.0;
   // Squared whitened residual of the priors per degree of freedom at the end.
@@ -40,20 +42,19 @@ struct RefineModelSummary {
   int num_images_put_back = 0;
 };
 
-// Refines the whole model once: bundle adjustment with priors, joining of
-// tracks, triangulation of what is still missing, filters. Images that hold on
-// few points are tied by weak coarse motions. An image whose motion contradicts
-// the priors on all sides is put back to where the coarse model has it, without
-// its points, so that the result is not worse than the priors.
-RefineModelSummary RefineModel(const RefineModelOptions& options,
-                               MapperScene* scene);
+inline constexpr int kNumRefinementRounds = 3;
+
+// Refines the whole model, in rounds from 1 to kNumRefinementRounds that follow
+// each other on the same summary; between them the model can be saved. Joining
+// of tracks, triangulation of what is still missing, filters, and bundle
+// adjustments with priors. Images that hold on few points are tied by weak
+// coarse motions. An image whose motion contradicts the priors on all sides is
+// put back to where the coarse model has it, without its points, so that the
+// result is not worse than the priors.
+void RefineModel(const RefineModelOptions& options, int round,
+                 MapperScene* scene, RefineModelSummary* summary);
 
 // Registers the scene's images where the coarse model has them, without points.
 void RegisterAtCoarsePoses(MapperScene* scene);
-
-// Turns the world so that gravity, averaged over the images that know it,
-// points along -z; the smallest such turn. False when no image knows it.
-bool AlignToGravity(const SceneData& data,
-                    colmap::Reconstruction* reconstruction);
 
 }  // namespace adasfm

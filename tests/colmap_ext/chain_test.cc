@@ -1,17 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // The whole chain through its commands, on synthetic drives.
 
-#include <signal.h>
-#include <unistd.h>
-
-#include <chrono>
 #include <nlohmann/json.hpp>
-#include <sstream>
 #include <string>
-#include <thread>
-#include <vector>
 
-#include "core/random.h"
 #include "tests/colmap_ext/command_line_fixture.h"
 
 namespace adasfm {
@@ -141,38 +133,6 @@ TEST_F(ChainTest, WithoutSensorsThereIsOneWarningAndAModel) {
   EXPECT_EQ(evaluation["num_images"], 60);
   // 90 m without metres or loops: COLMAP's mapper drifts by as much.
   EXPECT_LT(evaluation["sim3_least_squares"]["translation_rmse_m"], 0.5);
-}
-
-TEST_F(ChainTest, KilledMapperContinuesToTheSameModel) {
-  Make("--num_images 80 --seed 5 --num_keypoints 150");
-  Import();
-  ExpectSuccess(GlobalArguments());
-  const std::string options =
-      " --num_threads 1 --AdaSfmPartition.max_part_size 40";
-  ExpectSuccess(MapperArguments("undisturbed") + options);
-  Random random(5);
-  for (int trial = 0; trial < 4; ++trial) {
-    const pid_t child = fork();
-    ASSERT_GE(child, 0);
-    if (child == 0) {
-      std::istringstream words(MapperArguments("killed") + options);
-      std::vector<std::string> arguments = {ADASFM_LAUNCHER};
-      for (std::string word; words >> word;) arguments.push_back(word);
-      std::vector<char*> argv;
-      for (std::string& argument : arguments) argv.push_back(argument.data());
-      argv.push_back(nullptr);
-      if (!freopen("/dev/null", "w", stdout)) _exit(2);
-      execv(argv[0], argv.data());
-      _exit(2);
-    }
-    std::this_thread::sleep_for(
-        std::chrono::milliseconds(random.UniformInt(10, 1500)));
-    ::kill(child, SIGKILL);
-    int status = 0;
-    waitpid(child, &status, 0);
-  }
-  ExpectSuccess(MapperArguments("killed") + options);
-  EXPECT_EQ(ModelBytes("killed"), ModelBytes("undisturbed"));
 }
 
 TEST_F(ChainTest, WrongInputIsOneLineAndChangesNothing) {
