@@ -12,7 +12,9 @@ namespace {
 // Fewer say too little of a bias to be worth their risk.
 constexpr int kMinNumLinks = 20;
 constexpr int kMinNumInliers = 20;
-constexpr double kMaxSigma = 0.0175;  // rad
+// Poorer geometries err alike by more than a gyroscope does (0.1 deg where
+// their noise is 0.3).
+constexpr double kMaxSigma = 0.0035;  // rad
 // Two-view geometries are never more exact than this.
 constexpr double kMinSigma = 3e-4;  // rad
 constexpr double kSigmaFactor = 1.5;

@@ -29,8 +29,7 @@ struct VisualLinks {
 // (less a constant, by medians) and is taken for half as much again, because
 // errors of neighbouring pairs are alike (shutter) and because vision is used
 // again later; turning adds a share of the turn (a slightly turned T_cam_imu).
-// Vision with too few pairs, or off by more than 1 deg in the median, changes
-// nothing.
+// Vision with too few pairs, or with a sigma beyond 0.2 deg, changes nothing.
 VisualLinks AddVisualRotations(const std::vector<TimedRotation>& rotations,
                                timestamp_t timeshift_ns,
                                const Eigen::Quaterniond& cam_from_imu,
