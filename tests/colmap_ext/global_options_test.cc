@@ -44,6 +44,8 @@ const std::vector<OptionCase>& Cases() {
              poses.rotation_rates.drift_sigma_rad_s),
       OPTION("rotation_rate_min_sigma_rad", 0.01,
              poses.rotation_rates.min_rotation_sigma_rad),
+      OPTION("rotation_rate_offset_sigma_rad", 0.01,
+             poses.rotation_rates.offset_sigma_rad),
       OPTION("wheel_scale_sigma", 0.02, poses.chain.scale_sigma),
       OPTION("gyro_bias_sigma_rad_s", 0.001, poses.chain.gyro_bias_sigma_rad_s),
       OPTION("max_loop_sigmas", 4, poses.loops.max_num_sigmas),
