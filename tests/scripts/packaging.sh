@@ -91,10 +91,13 @@ if grep -E '\.a$|/include/' "$work/contents"; then
 fi
 grep -q ' ./usr/lib/libadasfm_core.a' "$work/dev-contents" ||
   fail "$dev lacks the libraries"
-dpkg-deb -f "$runtime" Depends | grep -q 'libopencv-core' ||
+# grep -q on a pipe would end the writer by SIGPIPE when it finds early.
+dpkg-deb -f "$runtime" Depends > "$work/depends"
+grep -q 'libopencv-core' "$work/depends" ||
   fail 'the dependencies of the program are missing'
 dpkg -x "$runtime" "$work/deb"
-"$work/deb/usr/bin/colmap-adasfm" adasfm_mapper -h | grep -q 'Options:' ||
+"$work/deb/usr/bin/colmap-adasfm" adasfm_mapper -h > "$work/help" &&
+  grep -q 'Options:' "$work/help" ||
   fail 'the packaged program does not run'
 # Where the COLMAP that it was built with is not there, it takes the one on the
 # PATH, and not itself.
