@@ -1,8 +1,8 @@
 #!/bin/bash
 # SPDX-License-Identifier: BSD-3-Clause
 # Benchmarks AdaSfM beside COLMAP's mappers: benchmark.sh [quick|full] [options
-# of scripts/benchmark.py]. quick takes less than half an hour on 2 cores, full
-# several hours. Tables and plots end up in adasfm-benchmark/.
+# of scripts/benchmark.py]. quick makes worlds of up to 1,000 images, full of up
+# to 10,000, which takes hours. Tables and plots end up in adasfm-benchmark/.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 
