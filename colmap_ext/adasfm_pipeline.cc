@@ -8,12 +8,13 @@
 #include <sstream>
 #include <utility>
 
-#include "colmap_ext/commands/command.h"
 #include "colmap_ext/global_report.h"
 #include "colmap_ext/host/model.h"
 #include "colmap_ext/host/pose_conversion.h"
 #include "colmap_ext/model_folder.h"
+#include "colmap_ext/output_files.h"
 #include "colmap_ext/two_view_geometry_backup.h"
+#include "core/check_options.h"
 
 namespace adasfm {
 namespace {

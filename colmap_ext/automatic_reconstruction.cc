@@ -5,9 +5,9 @@
 #include <sstream>
 #include <stdexcept>
 
-#include "colmap_ext/commands/command.h"
 #include "colmap_ext/digest.h"
 #include "colmap_ext/global_report.h"
+#include "colmap_ext/output_files.h"
 #include "colmap_ext/prepare_reconstruction.h"
 #include "colmap_ext/report.h"
 #include "colmap_ext/reset_workspace.h"

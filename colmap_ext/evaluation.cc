@@ -3,11 +3,12 @@
 
 #include <base/projection.h>
 
-#include <Eigen/SVD>
 #include <algorithm>
 #include <cmath>
 #include <utility>
 
+#include "core/median.h"
+#include "core/nearest_rotation.h"
 #include "core/random.h"
 #include "core/sim3d.h"
 #include "core/so3.h"
@@ -28,14 +29,6 @@ struct PosePair {
   Rigid3d cam_from_world;
   Rigid3d true_cam_from_world;
 };
-
-double Median(std::vector<double> values) {
-  const size_t middle = values.size() / 2;
-  std::nth_element(values.begin(), values.begin() + middle, values.end());
-  if (values.size() % 2 == 1) return values[middle];
-  return 0.5 * (values[middle] +
-                *std::max_element(values.begin(), values.begin() + middle));
-}
 
 double Mean(const std::vector<double>& values) {
   double sum = 0.0;
@@ -82,12 +75,7 @@ Eigen::Quaterniond AlignOrientations(const std::vector<PosePair>& poses,
             poses[i].cam_from_world.rotation)
                .toRotationMatrix();
   }
-  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(
-      sum, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  Eigen::Matrix3d mirror = Eigen::Matrix3d::Identity();
-  mirror(2, 2) =
-      (svd.matrixU() * svd.matrixV().transpose()).determinant() < 0 ? -1 : 1;
-  return Eigen::Quaterniond(svd.matrixU() * mirror * svd.matrixV().transpose());
+  return Eigen::Quaterniond(NearestRotation(sum));
 }
 
 std::vector<double> ComputeAnglesDeg(

@@ -76,7 +76,8 @@ std::string FormatGlobalReportJson(const SceneData& scene,
   const RotationRateReport& rates = result.poses.rotation_rates;
   report["rotation_rates"] = {{"corrected", rates.corrected},
                               {"pairs", rates.num_pairs},
-                              {"max_rate_rad_s", rates.max_rate_rad_s}};
+                              {"max_rate_rad_s", rates.max_rate_rad_s},
+                              {"vision_offset_rad", rates.offset_rad.norm()}};
   for (size_t i = 0; i < result.models.size(); ++i) {
     report["models"].push_back(
         ModelJson(scene, result.poses.components[i], result.models[i]));

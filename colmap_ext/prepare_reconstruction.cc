@@ -6,8 +6,8 @@
 #include <sstream>
 #include <string>
 
-#include "colmap_ext/commands/command.h"
 #include "colmap_ext/dataset_layout.h"
+#include "colmap_ext/output_files.h"
 
 namespace adasfm {
 namespace {

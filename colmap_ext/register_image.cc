@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "colmap_ext/host/pose_conversion.h"
+#include "core/median.h"
 #include "core/so3.h"
 
 namespace adasfm {
@@ -14,15 +15,6 @@ namespace {
 
 // More co-visible images hardly move a median.
 constexpr size_t kMaxNumNeighbors = 15;
-
-double Median(std::vector<double> values) {
-  const size_t middle = values.size() / 2;
-  std::nth_element(values.begin(), values.begin() + middle, values.end());
-  if (values.size() % 2 == 1) return values[middle];
-  const double upper = values[middle];
-  return 0.5 *
-         (upper + *std::max_element(values.begin(), values.begin() + middle));
-}
 
 // The registered images, with coarse poses, that image_id is matched or tied
 // to, strongest first.

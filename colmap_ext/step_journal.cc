@@ -8,7 +8,7 @@
 #include <nlohmann/json.hpp>
 #include <stdexcept>
 
-#include "colmap_ext/commands/command.h"
+#include "colmap_ext/output_files.h"
 
 namespace adasfm {
 

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/nearest_rotation.h"
 #include "global/rotation_certificate.h"
 #include "global/rotation_sdp_problem.h"
 
@@ -129,12 +130,7 @@ std::vector<Eigen::Matrix3d> RoundToRotations(
   if (sum_determinants < 0.0) main_axes.col(0) *= -1.0;
   std::vector<Eigen::Matrix3d> rotations;
   for (const RotationBlock& block : blocks) {
-    const Eigen::JacobiSVD<Eigen::Matrix3d> svd(
-        block * main_axes, Eigen::ComputeFullU | Eigen::ComputeFullV);
-    Eigen::Vector3d signs = Eigen::Vector3d::Ones();
-    signs(2) = (svd.matrixU() * svd.matrixV().transpose()).determinant();
-    rotations.push_back(svd.matrixU() * signs.asDiagonal() *
-                        svd.matrixV().transpose());
+    rotations.push_back(NearestRotation(block * main_axes));
   }
   return rotations;
 }

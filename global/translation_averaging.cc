@@ -6,6 +6,7 @@
 #include <limits>
 #include <numeric>
 
+#include "core/median.h"
 #include "core/so3.h"
 #include "global/laplacian_solver.h"
 #include "global/refine_positions.h"
@@ -14,13 +15,6 @@ namespace adasfm {
 namespace {
 
 using Vectors = LaplacianSolver::Vectors;
-
-double MedianOf(std::vector<double> values) {
-  if (values.empty()) return 0.0;
-  const size_t middle = values.size() / 2;
-  std::nth_element(values.begin(), values.begin() + middle, values.end());
-  return values[middle];
-}
 
 // Where sensors tie both ends of an edge together, its length from shared
 // points was derived from theirs: counting it again, with errors that all such
@@ -112,7 +106,7 @@ class PositionSolver {
     for (const PositionEdge& edge : edges) {
       if (edge.kind != PositionEdge::kFree) lengths.push_back(edge.length);
     }
-    unit_ = lengths.empty() ? 1.0 : MedianOf(lengths);
+    unit_ = lengths.empty() ? 1.0 : UpperMedian(&lengths);
     if (!(unit_ > 0.0)) unit_ = 1.0;
   }
 
@@ -205,7 +199,7 @@ void NormalizeScale(const std::vector<PositionEdge>& edges, Vectors* centers) {
   for (const PositionEdge& edge : edges) {
     lengths.push_back((centers->row(edge.j) - centers->row(edge.i)).norm());
   }
-  const double median = MedianOf(lengths);
+  const double median = UpperMedian(&lengths);
   if (median > 0.0) *centers /= median;
 }
 

@@ -2,11 +2,11 @@
 #include "partition/align_similarity.h"
 
 #include <Eigen/Eigenvalues>
-#include <Eigen/SVD>
 #include <algorithm>
 #include <cmath>
 #include <stdexcept>
 
+#include "core/nearest_rotation.h"
 #include "core/random.h"
 #include "core/so3.h"
 
@@ -16,16 +16,6 @@ namespace {
 // Orientations weigh as if they were known to this angle when centres are known
 // to the threshold.
 constexpr double kOrientationSigmaRad = 0.1;
-
-Eigen::Matrix3d NearestRotation(const Eigen::Matrix3d& matrix) {
-  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(
-      matrix, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  Eigen::Vector3d sign = Eigen::Vector3d::Ones();
-  if (svd.matrixU().determinant() * svd.matrixV().determinant() < 0.0) {
-    sign(2) = -1.0;
-  }
-  return svd.matrixU() * sign.asDiagonal() * svd.matrixV().transpose();
-}
 
 // The distance between the first and the last decile of the target's centres
 // along their longest axis.

@@ -5,6 +5,8 @@
 #include <cmath>
 #include <cstdio>
 
+#include "core/median.h"
+
 namespace adasfm {
 namespace {
 
@@ -22,12 +24,6 @@ std::string Format(const char* format, double a, double b = 0.0) {
   char buffer[256];
   std::snprintf(buffer, sizeof(buffer), format, a, b);
   return buffer;
-}
-
-double Median(std::vector<double> values) {
-  const auto middle = values.begin() + values.size() / 2;
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
 }
 
 // Samples in windows of about one second.
@@ -77,7 +73,7 @@ Status CheckForceUnits(const std::vector<ImuSample>& samples,
   for (const ImuSample& sample : samples) {
     norms.push_back(sample.specific_force.norm());
   }
-  const double median = Median(norms);
+  const double median = UpperMedian(&norms);
   if (median > 0.5 && median < 2.0) {
     return Status::Error(
         origin.Locate(0) +
@@ -103,7 +99,7 @@ double ComputeMedianPeriod(const std::vector<timestamp_t>& times_ns) {
   for (size_t i = 1; i < times_ns.size(); ++i) {
     periods.push_back(SecondsFromNs(times_ns[i] - times_ns[i - 1]));
   }
-  return Median(std::move(periods));
+  return UpperMedian(&periods);
 }
 
 Status CheckLogTimes(const std::vector<timestamp_t>& times_ns,

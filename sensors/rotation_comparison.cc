@@ -4,17 +4,9 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/median.h"
+
 namespace adasfm {
-namespace {
-
-double Median(std::vector<double>* values) {
-  const auto middle = values->begin() + values->size() / 2;
-  std::nth_element(values->begin(), middle, values->end());
-  return *middle;
-}
-
-}  // namespace
-
 RateIntegral::RateIntegral(const std::vector<ImuSample>& imu) : imu_(imu) {
   integral_.resize(imu.size(), Eigen::Vector3d::Zero());
   for (size_t i = 1; i < imu.size(); ++i) {
@@ -66,7 +58,7 @@ RotationFit ComputeRotationFit(const RotationComparison& data,
     for (size_t i = 0; i < num; ++i) {
       rates[i] = differences[i][axis] / data.dt_s[i];
     }
-    fit.rate_offset[axis] = Median(&rates);
+    fit.rate_offset[axis] = UpperMedian(&rates);
   }
   double sum = 0.0;
   for (const double distance :
@@ -93,7 +85,7 @@ double ComputeEvidence(const std::vector<double>& worse,
   if (worse.empty()) return 0.0;
   std::vector<double> sorted = worse;
   // The median of a three-dimensional normal vector's length.
-  const double sigma = Median(&sorted) / 1.538;
+  const double sigma = UpperMedian(&sorted) / 1.538;
   if (sigma <= 0.0) return 0.0;
   constexpr double kFreedom = 3.0;
   double sum = 0.0;

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/median.h"
 #include "core/so3.h"
 
 namespace adasfm {
@@ -23,12 +24,6 @@ constexpr double kTurnShare = 0.05;
 // The median of a three-dimensional normal vector's length.
 constexpr double kMedianNorm = 1.538;
 
-double Median(std::vector<double>* values) {
-  const auto middle = values->begin() + values->size() / 2;
-  std::nth_element(values->begin(), middle, values->end());
-  return *middle;
-}
-
 // Vision against the gyroscope over the links: the errors' sigma per axis.
 double EstimateSigma(const std::vector<OdometryLink>& links,
                      const std::vector<size_t>& indices) {
@@ -43,12 +38,12 @@ double EstimateSigma(const std::vector<OdometryLink>& links,
     for (size_t i = 0; i < indices.size(); ++i) {
       values[i] = errors[i][axis] / links[indices[i]].dt_s;
     }
-    rate[axis] = Median(&values);
+    rate[axis] = UpperMedian(&values);
   }
   for (size_t i = 0; i < indices.size(); ++i) {
     values[i] = (errors[i] - rate * links[indices[i]].dt_s).norm();
   }
-  return Median(&values) / kMedianNorm;
+  return UpperMedian(&values) / kMedianNorm;
 }
 
 }  // namespace

@@ -6,6 +6,7 @@
 #include "colmap_ext/automatic_reconstruction.h"
 #include "colmap_ext/commands/progress_display.h"
 #include "colmap_ext/commands/registry.h"
+#include "core/check_options.h"
 
 namespace adasfm {
 namespace {

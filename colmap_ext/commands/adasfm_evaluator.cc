@@ -10,6 +10,8 @@
 #include "colmap_ext/evaluate_pairs.h"
 #include "colmap_ext/evaluation.h"
 #include "colmap_ext/host/model.h"
+#include "colmap_ext/output_files.h"
+#include "core/check_options.h"
 
 namespace adasfm {
 namespace {

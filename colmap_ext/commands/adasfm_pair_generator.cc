@@ -5,7 +5,9 @@
 #include "colmap_ext/commands/pair_options.h"
 #include "colmap_ext/commands/progress_display.h"
 #include "colmap_ext/commands/registry.h"
+#include "colmap_ext/output_files.h"
 #include "colmap_ext/select_pairs.h"
+#include "core/check_options.h"
 
 namespace adasfm {
 

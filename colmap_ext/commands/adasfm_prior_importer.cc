@@ -4,6 +4,7 @@
 
 #include "colmap_ext/adasfm_pipeline.h"
 #include "colmap_ext/commands/registry.h"
+#include "core/check_options.h"
 
 namespace adasfm {
 namespace {

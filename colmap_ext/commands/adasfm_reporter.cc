@@ -3,7 +3,9 @@
 #include <string>
 
 #include "colmap_ext/commands/registry.h"
+#include "colmap_ext/output_files.h"
 #include "colmap_ext/report.h"
+#include "core/check_options.h"
 
 namespace adasfm {
 

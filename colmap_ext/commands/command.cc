@@ -8,7 +8,6 @@
 #include <cstdio>
 #include <cstdlib>
 #include <exception>
-#include <filesystem>
 #include <fstream>
 #include <iostream>
 #include <new>
@@ -21,7 +20,6 @@ namespace adasfm {
 namespace {
 
 namespace po = boost::program_options;
-namespace fs = std::filesystem;
 
 // Messages of other libraries may have several lines; an error has one.
 std::string OneLine(std::string message) {
@@ -148,40 +146,6 @@ int RunCommand(const Command& command, int argc, char** argv) {
     PrintError(std::string(command.name) + ": unknown exception");
   }
   return EXIT_FAILURE;
-}
-
-Status PrepareOutputFolder(const std::string& path) {
-  std::error_code error;
-  fs::create_directories(path, error);
-  if (!fs::is_directory(path)) {
-    return Status::Error(
-        "cannot create the output folder " + path + ": " +
-        (error ? error.message() : std::string("a file is in the way")) +
-        "; choose another folder");
-  }
-  if (access(path.c_str(), W_OK | X_OK) != 0) {
-    return Status::Error("the output folder " + path +
-                         " is not writable; choose another folder");
-  }
-  return Status::Ok();
-}
-
-Status WriteTextFile(const std::string& path, const std::string& text) {
-  const std::string temporary = path + ".tmp";
-  {
-    std::ofstream file(temporary, std::ios::binary);
-    file << text;
-    file.close();
-    if (file) {
-      std::error_code error;
-      fs::rename(temporary, path, error);
-      if (!error) return Status::Ok();
-    }
-  }
-  std::error_code ignored;
-  fs::remove(temporary, ignored);
-  return Status::Error("cannot write " + path +
-                       "; choose a path in a folder that is writable");
 }
 
 }  // namespace adasfm

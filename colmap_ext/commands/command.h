@@ -72,20 +72,6 @@ struct Command {
 // exception and no failed check of the host gets past it as an abort.
 int RunCommand(const Command& command, int argc, char** argv);
 
-// An option struct's IsValid as a Status.
-template <typename Options>
-Status CheckOptions(const Options& options) {
-  std::string error;
-  return options.IsValid(&error) ? Status::Ok() : Status::Error(error);
-}
-
-// Creates the folder, and its parents, unless it exists; an error when it
-// cannot be written to.
-Status PrepareOutputFolder(const std::string& path);
-
-// Writes a file under a temporary name and renames it when it is complete.
-Status WriteTextFile(const std::string& path, const std::string& text);
-
 // A value as the help shows it.
 template <typename T>
 std::string OptionText(const T& value) {
