@@ -28,6 +28,9 @@ packages=(
   libboost-system-dev libboost-test-dev libfreeimage-dev libflann-dev
   liblz4-dev libmetis-dev libgoogle-glog-dev libsqlite3-dev libglew-dev
   libgl1-mesa-dev libeigen3-dev libceres-dev libsuitesparse-dev
+  # Faster than the ATLAS that libceres-dev brings; serial, so that results
+  # do not depend on the number of cores.
+  libopenblas-serial-dev
   # Ours.
   libopencv-dev libyaml-cpp-dev nlohmann-json3-dev
   librosbag-storage-dev libsensor-msgs-dev libnav-msgs-dev
