@@ -229,6 +229,7 @@ Status MapperStage::RunAllParts() {
   std::vector<Status> statuses(parts.size());
   std::atomic<size_t> next{0};
   std::atomic<size_t> num_images_done{0};
+  std::atomic<size_t> num_parts_done{0};
   // One worker takes one part after another, the biggest first.
   ParallelFor(num_parallel, num_parallel, [&](size_t) {
     for (size_t i = next++; i < parts.size(); i = next++) {
@@ -236,7 +237,8 @@ Status MapperStage::RunAllParts() {
       const double share =
           1.0 * (num_images_done += parts[order[i]].size()) / num_images;
       std::ostringstream line;
-      line << "part " << order[i] << " of " << parts.size() << " done, about "
+      line << ++num_parts_done << " of " << parts.size()
+           << " parts done, about "
            << static_cast<int>(timer.Seconds() * (1.0 / share - 1.0))
            << " s left for the parts";
       Report(line.str(), 0.02 + 0.6 * share);
