@@ -120,6 +120,9 @@ def write_tables(records, folder):
   growth = tables.growth_table(records)
   if growth:
     text += '\n# Growth on the clean sets\n\n' + growth
+  ablations = tables.ablation_table(records)
+  if ablations:
+    text += '\n# Ablations: images, error after Sim3, CPU time\n\n' + ablations
   with open(os.path.join(folder, 'results.md'), 'w') as file:
     file.write(text)
   try:

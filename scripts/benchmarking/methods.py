@@ -18,9 +18,13 @@ ABLATIONS = {
         'mapper': ['--AdaSfmMapper.use_global_candidate', '0']},
     'adasfm_no_priors_in_adjustment': {
         'mapper': ['--AdaSfmMapper.use_priors_in_adjustment', '0']},
-    'adasfm_fixed_threshold': {
-        'mapper': ['--AdaSfmAlign.adapt_threshold', '0']},
 }
+# The alignment of parts with one threshold for all, in metres.
+ABLATIONS.update({
+    'adasfm_fixed_threshold_%s' % metres: {
+        'mapper': ['--AdaSfmAlign.adapt_threshold', '0',
+                   '--AdaSfmAlign.initial_threshold', metres]}
+    for metres in ('0.1', '1', '10')})
 
 
 def fixed_intrinsics(prefix):

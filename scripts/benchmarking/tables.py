@@ -121,6 +121,31 @@ def accuracy_table(records, methods):
                  '%.3f' % sim3_error(r)])
 
 
+def ablation_table(records):
+  """A line per variant of AdaSfM: images, error in m and CPU s per set."""
+  runs = middle_runs(records)
+  methods = [m for m in ordered(records, 'method')
+             if m == 'adasfm' or m.startswith('adasfm_no_') or
+             m.startswith('adasfm_fixed_')]
+  if len(methods) < 2:
+    return ''
+  names = [name for name in ordered(records, 'set')
+           if any((name, m) in runs for m in methods)]
+  lines = ['| variant | ' + ' | '.join(names) + ' |',
+           '|---' * (len(names) + 1) + '|']
+  for method in methods:
+    cells = []
+    for name in names:
+      record = runs.get((name, method))
+      e = record and record['evaluation']
+      cells.append('%d/%d, %.3f m, %.0f s' %
+                   (e['num_images'], e['num_true_images'], sim3_error(record),
+                    record['cpu_seconds']) if e else '-')
+    lines.append('| %s | %s |' % (name_of(method).strip('*'),
+                                  ' | '.join(cells)))
+  return '\n'.join(lines) + '\n'
+
+
 def exponent(points):
   """Slope of log(value) over log(images) by least squares."""
   xs = [math.log(x) for x, _ in points]

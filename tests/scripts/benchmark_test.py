@@ -58,6 +58,18 @@ class TablesTest(unittest.TestCase):
     columns = {line.count('|') for line in table.splitlines()}
     self.assertEqual(len(columns), 1, table)
 
+  def test_ablations_have_a_line_per_variant_and_a_cell_per_set(self):
+    records = [record('clean-250', 'adasfm', 30.0, 0.12),
+               record('clean-250', 'adasfm_no_candidates', 20.0, 0.5),
+               record('alias-300', 'adasfm', 9.0, 0.03),
+               record('alias-300', 'mapper', 9.0, 50.0)]
+    lines = tables.ablation_table(records).splitlines()
+    self.assertEqual(len(lines), 4)
+    self.assertEqual(lines[0], '| variant | clean-250 | alias-300 |')
+    self.assertEqual(lines[3], '| adasfm_no_candidates | 10/10, 0.500 m, 20 s '
+                               '| - |')
+    self.assertEqual(tables.ablation_table(records[3:]), '')
+
 
 class ProcessTest(unittest.TestCase):
 
