@@ -12,7 +12,7 @@ namespace {
 
 // The angles that the images need: all tracks of the wanted angle, then, widest
 // first, those that help an image with too few points.
-std::vector<TriangulatedTrack> SelectTracks(
+std::vector<TriangulatedTrack> SelectPoints(
     const CoarseStructureOptions& options,
     std::vector<TriangulatedTrack> triangulated, double* min_angle_deg) {
   std::vector<size_t> order(triangulated.size());
@@ -113,13 +113,47 @@ void FillFigures(const CoarseStructureOptions& options, CoarseModel* model) {
   }
 }
 
-// The threshold of a round, geometrically from the first to the last.
-double MaxReprojError(const CoarseStructureOptions& options, int round) {
-  if (options.num_rounds <= 1) return options.final_max_reproj_error_px;
-  const double first = options.triangulation.max_reproj_error_px;
-  const double ratio = options.final_max_reproj_error_px / first;
-  return first *
-         std::pow(ratio, static_cast<double>(round) / (options.num_rounds - 1));
+// The threshold falls from round to round, geometrically.
+TrackTriangulationOptions TriangulationOptions(
+    const CoarseStructureOptions& options, int round) {
+  TrackTriangulationOptions triangulation = options.triangulation;
+  triangulation.min_triangulation_angle_deg =
+      std::min(options.min_angle_floor_deg,
+               options.triangulation.min_triangulation_angle_deg);
+  const double ratio = options.final_max_reproj_error_px /
+                       options.triangulation.max_reproj_error_px;
+  const double progress = options.num_rounds > 1 ? static_cast<double>(round) /
+                                                       (options.num_rounds - 1)
+                                                 : 1.0;
+  triangulation.max_reproj_error_px *= std::pow(ratio, progress);
+  return triangulation;
+}
+
+struct RoundTracks {
+  std::vector<Track> last;
+  // Of the rounds before, within the keyframes.
+  std::vector<Track> early;
+  size_t num_keyframes = 0;
+};
+
+RoundTracks BuildRoundTracks(const CoarseStructureOptions& options,
+                             const CoarseModelInput& input,
+                             const std::set<image_t>& images) {
+  std::vector<Track> joined = JoinMatches(options.tracks, input.matches);
+  const bool has_metres = input.metric && options.use_priors;
+  const std::set<image_t> keyframes =
+      has_metres
+          ? SelectKeyframes(options.keyframes, images, joined, input.priors)
+          : images;
+  RoundTracks tracks;
+  tracks.num_keyframes = keyframes.size();
+  if (keyframes.size() < images.size()) {
+    tracks.early = SelectTracks(
+        options.tracks, RestrictTracks(options.tracks, joined, keyframes));
+  }
+  tracks.last = SelectTracks(options.tracks, std::move(joined));
+  if (keyframes.size() == images.size()) tracks.early = tracks.last;
+  return tracks;
 }
 
 // The balance of vision and priors means something at the optimum only, so the
@@ -143,7 +177,8 @@ PriorBundleAdjustmentSummary AdjustRound(
 
 bool CoarseStructureOptions::IsValid(std::string* error) const {
   if (!tracks.IsValid(error) || !triangulation.IsValid(error) ||
-      !bundle.IsValid(error) || !balance.IsValid(error)) {
+      !bundle.IsValid(error) || !balance.IsValid(error) ||
+      !keyframes.IsValid(error)) {
     return false;
   }
   if (num_rounds < 1) {
@@ -182,26 +217,25 @@ CoarseModel BuildCoarseModel(
   CoarseModel model;
   model.metric = input.metric;
   model.max_track_bytes = EstimateTrackBytes(input.matches);
-  const std::vector<Track> tracks = BuildTracks(options.tracks, input.matches);
-  model.num_tracks = tracks.size();
   const PriorBundleAdjustmentProblem problem = CreateProblem(options, input);
+  const RoundTracks tracks = BuildRoundTracks(options, input, problem.images);
+  model.num_tracks = tracks.last.size();
+  model.num_keyframes = tracks.num_keyframes;
 
   double keypoint_sigma_factor = 1.0;
   for (int round = 0; round < options.num_rounds; ++round) {
-    TrackTriangulationOptions triangulation = options.triangulation;
-    triangulation.max_reproj_error_px = MaxReprojError(options, round);
-    triangulation.min_triangulation_angle_deg =
-        std::min(options.min_angle_floor_deg,
-                 options.triangulation.min_triangulation_angle_deg);
     const std::map<image_t, Rigid3d> cams_from_world =
         round == 0 ? input.cams_from_world
                    : CamsFromWorld(model.reconstruction);
     model.reconstruction = CreateReconstruction(scene, cams_from_world);
-    AddPoints(SelectTracks(options,
-                           TriangulateTracks(triangulation, cams_from_world,
-                                             bearings, tracks),
-                           &model.min_angle_deg),
-              &model.reconstruction);
+    AddPoints(
+        SelectPoints(
+            options,
+            TriangulateTracks(
+                TriangulationOptions(options, round), cams_from_world, bearings,
+                round + 1 < options.num_rounds ? tracks.early : tracks.last),
+            &model.min_angle_deg),
+        &model.reconstruction);
     model.rounds.push_back(AdjustRound(options, problem, round,
                                        &model.reconstruction,
                                        &keypoint_sigma_factor));

@@ -12,6 +12,7 @@
 #include "colmap_ext/scene_data.h"
 #include "core/bearing.h"
 #include "core/rigid3d.h"
+#include "global/select_keyframes.h"
 #include "global/tracks.h"
 #include "global/triangulate_tracks.h"
 
@@ -22,6 +23,8 @@ struct CoarseStructureOptions {
   TrackTriangulationOptions triangulation;
   PriorBundleAdjustmentOptions bundle;
   PriorBalanceOptions balance;
+  // The rounds before the last see points in keyframes only.
+  KeyframeOptions keyframes;
   // Motion straight ahead leaves some images without points of a wide angle.
   // Images with fewer points than this get those with the next smaller angles,
   int min_num_points_per_image = 40;
@@ -58,6 +61,8 @@ struct CoarseModel {
   // The world's z axis points up.
   bool gravity_aligned = false;
   size_t num_tracks = 0;
+  // Images that see points in the rounds before the last.
+  size_t num_keyframes = 0;
   // EstimateTrackBytes of the matches.
   size_t max_track_bytes = 0;
   size_t num_points = 0;

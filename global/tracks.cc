@@ -116,8 +116,8 @@ Track Shorten(const Track& track, size_t max_length) {
 }
 
 // Longest first; a track is kept while one of its images still needs it.
-std::vector<Track> SelectTracks(const TrackOptions& options,
-                                std::vector<Track> tracks) {
+std::vector<Track> SelectNeededTracks(const TrackOptions& options,
+                                      std::vector<Track> tracks) {
   std::stable_sort(
       tracks.begin(), tracks.end(),
       [](const Track& a, const Track& b) { return a.size() > b.size(); });
@@ -186,7 +186,7 @@ size_t EstimateTrackBytes(
   return listing + num_keypoints * per_keypoint;
 }
 
-std::vector<Track> BuildTracks(
+std::vector<Track> JoinMatches(
     const TrackOptions& options,
     const std::map<ImagePair, std::vector<FeatureMatch>>& matches) {
   KeypointSets sets(CollectKeypoints(matches));
@@ -204,11 +204,37 @@ std::vector<Track> BuildTracks(
           sets.IndexOf({pair->first.image_id2, match.point2D_idx2}));
     }
   }
-  std::vector<Track> tracks = sets.Collect(options.min_track_length);
+  return sets.Collect(options.min_track_length);
+}
+
+std::vector<Track> SelectTracks(const TrackOptions& options,
+                                std::vector<Track> tracks) {
   for (Track& track : tracks) {
     track = Shorten(track, options.max_track_length);
   }
-  return SelectTracks(options, std::move(tracks));
+  return SelectNeededTracks(options, std::move(tracks));
+}
+
+std::vector<Track> RestrictTracks(const TrackOptions& options,
+                                  const std::vector<Track>& tracks,
+                                  const std::set<image_t>& images) {
+  std::vector<Track> restricted;
+  for (const Track& track : tracks) {
+    Track rest;
+    for (const TrackElement& element : track) {
+      if (images.count(element.image_id)) rest.push_back(element);
+    }
+    if (rest.size() >= static_cast<size_t>(options.min_track_length)) {
+      restricted.push_back(std::move(rest));
+    }
+  }
+  return restricted;
+}
+
+std::vector<Track> BuildTracks(
+    const TrackOptions& options,
+    const std::map<ImagePair, std::vector<FeatureMatch>>& matches) {
+  return SelectTracks(options, JoinMatches(options, matches));
 }
 
 }  // namespace adasfm

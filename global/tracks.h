@@ -2,6 +2,7 @@
 #pragma once
 
 #include <map>
+#include <set>
 #include <string>
 #include <tuple>
 #include <vector>
@@ -46,9 +47,25 @@ struct TrackOptions {
 size_t EstimateTrackBytes(
     const std::map<ImagePair, std::vector<FeatureMatch>>& matches);
 
-// Tracks of matched keypoints (union-find). Where matches would join two
-// keypoints of one image, the later match (pairs by number of matches, most
-// first) is left out, so one wrong match does not cost the whole track.
+// Tracks of matched keypoints (union-find), of at least min_track_length. Where
+// matches would join two keypoints of one image, the later match (pairs by
+// number of matches, most first) is left out, so one wrong match does not cost
+// the whole track.
+std::vector<Track> JoinMatches(
+    const TrackOptions& options,
+    const std::map<ImagePair, std::vector<FeatureMatch>>& matches);
+
+// What the options leave of the tracks: shortened, and only those that an image
+// needs.
+std::vector<Track> SelectTracks(const TrackOptions& options,
+                                std::vector<Track> tracks);
+
+// The tracks within these images, as far as min_track_length of them remain.
+std::vector<Track> RestrictTracks(const TrackOptions& options,
+                                  const std::vector<Track>& tracks,
+                                  const std::set<image_t>& images);
+
+// SelectTracks of JoinMatches.
 std::vector<Track> BuildTracks(
     const TrackOptions& options,
     const std::map<ImagePair, std::vector<FeatureMatch>>& matches);

@@ -114,6 +114,10 @@ void GlobalOptionAdder::AddStructure() {
       "largest error of a point in the last round [px]");
   Add("early_function_tolerance", &stage_->structure.early_function_tolerance,
       "rounds before the last end at this relative change of the cost");
+  Add("keyframe_min_num_images", &stage_->structure.keyframes.min_num_images,
+      "smaller components are adjusted with all images in all rounds");
+  Add("keyframe_stride", &stage_->structure.keyframes.stride,
+      "one image of so many sees points in the rounds before the last; 1: all");
   Add("ba_keypoint_sigma_px", &stage_->structure.bundle.keypoint_sigma_px,
       "1 sigma of a keypoint, against which sensor priors weigh [px]");
   Add("ba_refine_focal_length", &stage_->structure.bundle.refine_focal_length,

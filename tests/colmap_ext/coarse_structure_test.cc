@@ -62,6 +62,32 @@ TEST(BuildCoarseModelTest, AdjustsPosesAndKeepsMetres) {
   }
 }
 
+// Keyframes are a short cut, not another result.
+TEST(BuildCoarseModelTest, KeyframesLeadToTheSameModel) {
+  for (const uint64_t seed : {1, 2}) {
+    SyntheticWorldOptions options = SmallWorld();
+    options.seed = seed;
+    options.spacing_m = 0.5;
+    const Fixture fixture = BuildFixture(options, 0.1);
+    CoarseStructureOptions structure;
+    const CoarseModel all = BuildCoarseModel(structure, fixture.scene,
+                                             fixture.bearings, fixture.input);
+    EXPECT_EQ(all.num_keyframes, 40);
+    structure.keyframes.min_num_images = 10;
+    const CoarseModel model = BuildCoarseModel(structure, fixture.scene,
+                                               fixture.bearings, fixture.input);
+    EXPECT_LT(model.num_keyframes, 30);
+    EXPECT_LT(model.rounds[0].num_residuals, all.rounds[0].num_residuals);
+    EXPECT_EQ(model.rounds[0].num_images, all.rounds[0].num_images);
+    const double rmse_m =
+        ComparePoses(fixture.world, model.reconstruction).rmse_m;
+    const double all_rmse_m =
+        ComparePoses(fixture.world, all.reconstruction).rmse_m;
+    EXPECT_NEAR(rmse_m, all_rmse_m, 0.1 * all_rmse_m + 0.001);
+    EXPECT_NEAR(model.num_points, all.num_points, 0.05 * all.num_points);
+  }
+}
+
 TEST(BuildCoarseModelTest, TurnsTheWorldUpright) {
   Fixture fixture = BuildFixture(SmallWorld(), 0.02);
   const Sim3d tilt(1.0, ExpSo3(Eigen::Vector3d(0.4, -0.9, 0.2)),

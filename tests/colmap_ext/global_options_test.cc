@@ -68,6 +68,8 @@ const std::vector<OptionCase>& Cases() {
              structure.tracks.min_num_tracks_per_image),
       OPTION("max_num_tracks", 10, structure.tracks.max_num_tracks),
       OPTION("num_rounds", 1, structure.num_rounds),
+      OPTION("keyframe_min_num_images", 10, structure.keyframes.min_num_images),
+      OPTION("keyframe_stride", 2, structure.keyframes.stride),
       OPTION("final_max_reproj_error_px", 3,
              structure.final_max_reproj_error_px),
       OPTION("early_function_tolerance", 0.01,
