@@ -49,6 +49,14 @@ install(DIRECTORY ${PROJECT_SOURCE_DIR}/colmap_ext
 install(PROGRAMS $<TARGET_FILE:adasfm_launcher>
         DESTINATION ${CMAKE_INSTALL_BINDIR} RENAME colmap-adasfm
         COMPONENT runtime)
+# A renamed program is no target to install, so CPack does not strip it itself.
+find_program(ADASFM_STRIP NAMES strip)
+mark_as_advanced(ADASFM_STRIP)
+install(CODE "
+  if(CMAKE_INSTALL_DO_STRIP AND NOT \"${ADASFM_STRIP}\" STREQUAL \"\")
+    execute_process(COMMAND \"${ADASFM_STRIP}\" --strip-unneeded
+      --remove-section=.comment \"\$ENV{DESTDIR}\${CMAKE_INSTALL_PREFIX}/${CMAKE_INSTALL_BINDIR}/colmap-adasfm\")
+  endif()" COMPONENT runtime)
 set(launcher_link ${PROJECT_BINARY_DIR}/install/colmap)
 file(MAKE_DIRECTORY ${PROJECT_BINARY_DIR}/install)
 file(RELATIVE_PATH link_target
@@ -76,25 +84,49 @@ install(FILES ${PROJECT_SOURCE_DIR}/packaging/colmap-adasfm.bash
 set(doc_dir ${CMAKE_INSTALL_DATADIR}/doc/colmap-adasfm)
 install(FILES README.md CHANGELOG.md CITATION.cff DESTINATION ${doc_dir}
         COMPONENT runtime)
-# Debian's form: the licence's text indented, its blank lines as dots.
-file(READ LICENSE license_text)
-string(REGEX REPLACE "\n\n" "\n.\n" license_text "${license_text}")
-string(REGEX REPLACE "\n([^\n])" "\n \\1" license_text "\n${license_text}")
-configure_file(packaging/copyright.in ${PROJECT_BINARY_DIR}/install/copyright
-               @ONLY)
-install(FILES ${PROJECT_BINARY_DIR}/install/copyright DESTINATION ${doc_dir}
-        COMPONENT runtime)
 install(DIRECTORY docs DESTINATION ${doc_dir} COMPONENT runtime)
 if(EXISTS ${PROJECT_SOURCE_DIR}/scripts/adasfm.sh)
   install(PROGRAMS scripts/adasfm.sh DESTINATION ${doc_dir}/examples
           COMPONENT runtime)
 endif()
 
+# --- both packages: licence and Debian's changelog
+# Debian's form: the licence's text indented, its blank lines as dots.
+file(READ LICENSE license_text)
+string(REGEX REPLACE "\n\n" "\n.\n" license_text "${license_text}")
+string(REGEX REPLACE "\n([^\n])" "\n \\1" license_text "\n${license_text}")
+configure_file(packaging/copyright.in ${PROJECT_BINARY_DIR}/install/copyright
+               @ONLY)
+set(ADASFM_PACKAGE_CONTACT
+    "The AdaSfM for COLMAP authors <maintainers@adasfm.invalid>"
+    CACHE STRING "Maintainer of the packages: name <address>")
+foreach(package colmap-adasfm libadasfm-dev)
+  set(changelog ${PROJECT_BINARY_DIR}/install/${package})
+  file(MAKE_DIRECTORY ${changelog})
+  configure_file(packaging/changelog.in ${changelog}/changelog @ONLY)
+  # -n: no time stamp, so that the same text is the same file.
+  execute_process(COMMAND gzip -9nf ${changelog}/changelog
+                  RESULT_VARIABLE result)
+  if(NOT result EQUAL 0)
+    message(FATAL_ERROR "gzip cannot pack ${changelog}/changelog")
+  endif()
+endforeach()
+foreach(component runtime dev)
+  set(package colmap-adasfm)
+  if(component STREQUAL dev)
+    set(package libadasfm-dev)
+  endif()
+  install(FILES ${PROJECT_BINARY_DIR}/install/copyright
+                ${PROJECT_BINARY_DIR}/install/${package}/changelog.gz
+          DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/${package}
+          COMPONENT ${component})
+endforeach()
+
 # --- CPack: colmap-adasfm_*.deb and libadasfm-dev_*.deb
 set(CPACK_GENERATOR DEB)
 set(CPACK_PACKAGE_NAME adasfm)
 set(CPACK_PACKAGE_VENDOR "AdaSfM")
-set(CPACK_PACKAGE_CONTACT "The AdaSfM for COLMAP authors")
+set(CPACK_PACKAGE_CONTACT "${ADASFM_PACKAGE_CONTACT}")
 set(CPACK_PACKAGING_INSTALL_PREFIX /usr)
 set(CPACK_STRIP_FILES ON)
 set(CPACK_COMPONENTS_ALL runtime dev)
@@ -105,15 +137,14 @@ set(CPACK_DEBIAN_RUNTIME_PACKAGE_NAME colmap-adasfm)
 set(CPACK_DEBIAN_RUNTIME_PACKAGE_SHLIBDEPS ON)
 set(CPACK_DEBIAN_RUNTIME_PACKAGE_RECOMMENDS "colmap (>= 3.8), colmap (<< 3.9)")
 set(CPACK_COMPONENT_RUNTIME_DESCRIPTION
-  "Structure from Motion with IMU and wheel priors
-The adasfm_* commands: priors from sensor logs, coarse global SfM and
-partitioned mapping on ordinary COLMAP databases.")
+  "The adasfm_* commands: photos, and the logs of an IMU and wheels, to one
+metric model. Priors from sensor logs, coarse global SfM and partitioned
+mapping on ordinary COLMAP databases. Goes beside the package colmap.")
 set(CPACK_DEBIAN_DEV_PACKAGE_NAME libadasfm-dev)
 set(CPACK_DEBIAN_DEV_PACKAGE_SECTION libdevel)
 set(CPACK_DEBIAN_DEV_PACKAGE_DEPENDS
   "libeigen3-dev, libceres-dev, libyaml-cpp-dev, libmetis-dev, libopencv-dev, nlohmann-json3-dev")
 set(CPACK_COMPONENT_DEV_DESCRIPTION
-  "AdaSfM, libraries and headers
-Sensor fusion, rotation and translation averaging and graph partition for
-Structure from Motion, with a CMake package.")
+  "Libraries, headers and a CMake package: sensor fusion, rotation and
+translation averaging and graph partition for Structure from Motion.")
 include(CPack)

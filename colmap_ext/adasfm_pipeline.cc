@@ -220,7 +220,7 @@ StatusOr<CoarseModelReport> EstimateCoarseModel(
   if (!result.ok()) return result.status();
   report.result = std::move(result).value();
   report.result.steps.insert(report.result.steps.begin(), reading);
-  for (std::string& warning : DescribeUnverifiedJoins(*scene, report.result)) {
+  for (std::string& warning : ListGlobalWarnings(*scene, report.result)) {
     report.warnings.push_back(std::move(warning));
   }
   report.seconds = seconds();

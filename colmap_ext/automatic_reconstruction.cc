@@ -1,12 +1,13 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "colmap_ext/automatic_reconstruction.h"
 
-#include <filesystem>
 #include <sstream>
 #include <stdexcept>
 
+#include "colmap_ext/color_points.h"
 #include "colmap_ext/digest.h"
 #include "colmap_ext/global_report.h"
+#include "colmap_ext/open_workspace.h"
 #include "colmap_ext/output_files.h"
 #include "colmap_ext/prepare_reconstruction.h"
 #include "colmap_ext/report.h"
@@ -15,8 +16,6 @@
 
 namespace adasfm {
 namespace {
-
-namespace fs = std::filesystem;
 
 // Steps whose files are replaced have nothing to remove beforehand.
 Status KeepAll() { return Status::Ok(); }
@@ -109,18 +108,10 @@ Status Reconstructor::Prepare() {
   database_path_ = InWorkspace("database.db");
   result_.model_path = InWorkspace("sparse/0");
   result_.report_path = InWorkspace("report.html");
-  const std::string journal_path = InWorkspace("steps.json");
-  std::error_code ignored;
-  // Without the database nothing is done, whatever was recorded.
-  if (!fs::exists(database_path_)) fs::remove(journal_path, ignored);
-  StatusOr<StepJournal> journal = StepJournal::Read(journal_path);
+  StatusOr<StepJournal> journal =
+      OpenWorkspace(paths_.workspace_path, options_.restart, message_);
   if (!journal.ok()) return journal.status();
   journal_ = std::move(journal).value();
-  if (journal_.Steps().empty() && fs::exists(database_path_)) {
-    return Status::Error("the workspace " + paths_.workspace_path +
-                         " has a database that this command did not make; "
-                         "choose an empty folder");
-  }
   return Status::Ok();
 }
 
@@ -133,11 +124,11 @@ Status Reconstructor::ExtractAll(const std::vector<std::string>& names) {
       });
   if (!images.ok()) return images.status();
   std::ostringstream text;
-  text << "features: " << images->num_images << " photos of "
-       << images->num_cameras << " cameras";
+  text << "features: " << images->num_images << " photos, "
+       << images->num_cameras
+       << (images->num_cameras == 1 ? " camera" : " cameras");
   if (options_.features.camera_params.empty()) {
-    text << ", " << images->num_known_focal_lengths
-         << " of them with a focal length from EXIF";
+    text << ", focal lengths from EXIF: " << images->num_known_focal_lengths;
   }
   message_(text.str());
   if (!images->unreadable.empty()) {
@@ -255,7 +246,8 @@ Status Reconstructor::Model() {
         MapParts(options_.map, request, ProgressIn(kModel, "model"));
     if (!report.ok()) return report.status();
     message_(FormatMapperSummaryText(report->summary));
-    return Status::Ok();
+    return ColorPoints(paths_.image_path, InWorkspace("sparse"),
+                       InWorkspace("logs/colors.log"));
   });
 }
 

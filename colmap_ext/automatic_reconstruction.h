@@ -23,6 +23,8 @@ struct AutomaticReconstructionOptions {
   // cameras without features.camera_params. If it does, the coarse stage leaves
   // the matches as they are.
   int refine_intrinsics = -1;
+  // Removes what earlier calls left in the workspace, and does it all anew.
+  bool restart = false;
   // Of all stages; -1: all of the machine's.
   int num_threads = -1;
 

@@ -88,6 +88,7 @@ std::string FormatGlobalReportJson(const SceneData& scene,
                        {"pairs_written", result.geometries.size()},
                        {"pairs_removed", result.removed_pairs.size()},
                        {"pairs_skipped", result.refinement.num_skipped_pairs}};
+  report["warnings"] = ListGlobalWarnings(scene, result);
   for (const StepReport& step : result.steps) {
     report["steps"].push_back({{"name", step.name},
                                {"seconds", step.seconds},
@@ -121,10 +122,21 @@ std::string FormatGlobalReportText(const GlobalStageResult& result,
   return text.str();
 }
 
-std::vector<std::string> DescribeUnverifiedJoins(
-    const SceneData& scene, const GlobalStageResult& result) {
+std::vector<std::string> ListGlobalWarnings(const SceneData& scene,
+                                            const GlobalStageResult& result) {
   std::vector<std::string> warnings;
   for (const CoarseComponent& component : result.poses.components) {
+    if (!component.positions_converged) {
+      std::ostringstream text;
+      text << std::fixed << std::setprecision(0)
+           << "coarse positions did not converge: "
+           << 100.0 * component.direction_agreement
+           << " % of the directions agree with them, at the worst image "
+           << 100.0 * component.least_direction_agreement
+           << " %; wrong pairs outvote right ones, or the overlap is small: "
+              "look at the report, add sensors or match more pairs";
+      warnings.push_back(text.str());
+    }
     for (const UnverifiedJoin& join : component.unverified_joins) {
       std::ostringstream text;
       text << "a part of " << join.num_images

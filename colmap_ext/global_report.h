@@ -17,9 +17,10 @@ std::string FormatGlobalReportJson(const SceneData& scene,
 std::string FormatGlobalReportText(const GlobalStageResult& result,
                                    double total_seconds);
 
-// Warnings for the user: parts of a model that hang on one place.
-std::vector<std::string> DescribeUnverifiedJoins(
-    const SceneData& scene, const GlobalStageResult& result);
+// Warnings for the user: positions that did not converge, parts of a model that
+// hang on one place.
+std::vector<std::string> ListGlobalWarnings(const SceneData& scene,
+                                            const GlobalStageResult& result);
 
 // One line `name1 name2` per removed pair.
 std::string FormatRemovedPairs(const SceneData& scene,

@@ -85,6 +85,7 @@ std::string DescribeTrackMemory(const CoarseModelInput& input) {
 
 std::string DescribeModel(const CoarseModel& model) {
   std::ostringstream text;
+  text.precision(3);
   text << model.reconstruction.NumRegImages() << " images, " << model.num_points
        << " points, " << model.num_observations << " observations, "
        << model.mean_reproj_error_px << " px, angles >= " << model.min_angle_deg

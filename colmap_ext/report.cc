@@ -41,6 +41,19 @@ double TotalSeconds(const std::vector<StageTime>& times) {
   return seconds;
 }
 
+// "75.3 s", "5 min 20 s", "2 h 5 min".
+std::string FormatDuration(double seconds) {
+  if (seconds < 120.0) return FormatNumber("%.1f s", seconds);
+  const double minutes = std::floor(seconds / 60.0);
+  if (minutes < 120.0) {
+    return FormatNumber("%.0f min ", minutes) +
+           FormatNumber("%.0f s", std::floor(seconds - 60.0 * minutes));
+  }
+  const double hours = std::floor(minutes / 60.0);
+  return FormatNumber("%.0f h ", hours) +
+         FormatNumber("%.0f min", minutes - 60.0 * hours);
+}
+
 std::vector<ReportFigure> ListFigures(const ReportInput& input) {
   std::vector<ReportFigure> figures;
   const colmap::Reconstruction& model = input.model;
@@ -95,8 +108,8 @@ std::vector<ReportFigure> ListFigures(const ReportInput& input) {
   }
   const std::vector<StageTime> times = ListStageTimes(input.summaries);
   if (!times.empty()) {
-    figures.push_back({"Time", FormatNumber("%.1f s", TotalSeconds(times)),
-                       "of the steps below"});
+    figures.push_back(
+        {"Time", FormatDuration(TotalSeconds(times)), "of the steps below"});
   }
   return figures;
 }

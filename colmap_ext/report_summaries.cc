@@ -196,6 +196,11 @@ ReportTable FormatGlobalSteps(const ReportSummaries& summaries) {
   for (const Json& step : ListAt(summaries.global, "steps")) {
     table.rows.push_back({TextAt(step, "name"), TextAt(step, "summary")});
   }
+  for (const Json& warning : ListAt(summaries.global, "warnings")) {
+    if (warning.is_string()) {
+      table.rows.push_back({"warning", warning.get<std::string>()});
+    }
+  }
   return table;
 }
 

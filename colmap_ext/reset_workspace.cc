@@ -11,6 +11,13 @@ namespace {
 
 namespace fs = std::filesystem;
 
+Status Remove(const std::string& path) {
+  std::error_code error;
+  fs::remove_all(path, error);
+  if (!error) return Status::Ok();
+  return Status::Error("cannot remove " + path + ": " + error.message());
+}
+
 // All statements, or none.
 Status Execute(const std::string& database_path,
                const std::vector<std::string>& statements) {
@@ -30,14 +37,11 @@ Status Execute(const std::string& database_path,
 }  // namespace
 
 Status ResetFeatures(const std::string& workspace_path) {
-  for (const char* name : {"database.db", "database.db-wal", "database.db-shm",
-                           "coarse", "sparse"}) {
-    std::error_code error;
-    const std::string path = workspace_path + "/" + name;
-    fs::remove_all(path, error);
-    if (error) {
-      return Status::Error("cannot remove " + path + ": " + error.message());
-    }
+  for (const char* name :
+       {"database.db", "database.db-wal", "database.db-shm",
+        "database.db.priors.json", "coarse", "sparse", "report.html"}) {
+    const Status status = Remove(workspace_path + "/" + name);
+    if (!status.ok()) return status;
   }
   return Status::Ok();
 }
@@ -49,10 +53,13 @@ Status ResetMatches(const std::string& database_path) {
 }
 
 Status ResetPriors(const std::string& database_path) {
+  const Status status = Remove(database_path + ".priors.json");
+  if (!status.ok()) return status;
   return Execute(database_path,
                  {"DROP TABLE IF EXISTS adasfm_image_times",
                   "DROP TABLE IF EXISTS adasfm_relative_pose_priors",
-                  "DROP TABLE IF EXISTS adasfm_gravity"});
+                  "DROP TABLE IF EXISTS adasfm_gravity",
+                  "DROP TABLE IF EXISTS adasfm_prior_corrections"});
 }
 
 }  // namespace adasfm

@@ -1,12 +1,24 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 
 #include "core/so3.h"
 #include "global/coarse_pose_estimator.h"
 #include "global/filter_edges_by_rotation.h"
 
 namespace adasfm {
+namespace {
+
+std::string DescribeRotationRates(const RotationRateReport& rates) {
+  if (!rates.corrected) return "";
+  char text[64];
+  std::snprintf(text, sizeof(text), ", odometry turned by up to %.2g rad/s",
+                rates.max_rate_rad_s);
+  return text;
+}
+
+}  // namespace
 
 void CoarsePoseEstimator::RefinePairs() {
   int num_removed = 0;
@@ -22,12 +34,10 @@ void CoarsePoseEstimator::RefinePairs() {
     RefineRelativePoses(options_.relative_poses, correspondences_,
                         PredictRotations(), &graph_);
   }
-  EndStep("relative poses",
-          std::to_string(graph_.edges.size()) + " pairs, " +
-              std::to_string(num_removed) +
-              " with few inliers removed, odometry turned "
-              "by up to " +
-              std::to_string(result_.rotation_rates.max_rate_rad_s) + " rad/s");
+  EndStep("relative poses", std::to_string(graph_.edges.size()) + " pairs, " +
+                                std::to_string(num_removed) +
+                                " with few inliers removed" +
+                                DescribeRotationRates(result_.rotation_rates));
 }
 
 // The chain, after vision has corrected its rotations.

@@ -4,13 +4,15 @@
 
   scripts/check_docs.py COLMAP [--run] [FILE...]
 
-Every `colmap` command of a code block must exist and have the options that it
-is shown with; every `--option` and `Group.option` named anywhere must exist;
-links to files must lead somewhere; and each option's help must explain it, with
-a unit and a default. With --run the blocks marked ```sh are also run, in the
-order of the text, on a small rendered drive that lies in the folder under the
-names the documentation uses. ```console marks what is shown and not run."""
+Every `colmap` command of the text must exist and have the options that it is
+shown with; every `--option` and `Group.option` named anywhere must exist; links
+to files must lead somewhere; and each option's help must explain it, with a unit
+and a default. Blocks of commands are ```sh, which --run runs in the order of the
+text, on a small rendered drive that lies in the folder under the names the
+documentation uses; or ```console REASON, which are shown only, and listed.
+```python is run as well where the modules that it wants are installed."""
 import argparse
+import importlib.util
 import os
 import pathlib
 import re
@@ -18,10 +20,12 @@ import shlex
 import subprocess
 import sys
 import tempfile
+import time
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT / 'packaging'))
 from command_help import read_commands, read_host_options  # noqa: E402
+from docs_drive import make_drive  # noqa: E402
 
 # Options of other programs that the text may name; those of our scripts are read
 # from them.
@@ -31,8 +35,10 @@ OTHER_OPTIONS = {
 # What the first word of a shown command may be, besides ours and paths in this
 # repository.
 OTHER_PROGRAMS = {
-    'cmake', 'export', 'sudo', 'cd', 'cpack', 'mkdir', 'python3', 'rosrun',
-    'for', 'do', 'done', 'if', 'then', 'fi', 'wait', 'ssh', 'rsync', 'cp'}
+    'cmake', 'export', 'sudo', 'cd', 'cp', 'cpack', 'mkdir', 'rosrun'}
+COMMAND = re.compile(
+    r'((colmap|colmap-adasfm|cmake|cpack|sudo|rosrun)\s|scripts/\w'
+    r'|[\w./$"-]*/bin/\w)')
 UNITS = {'px': r'\[px', 'deg': r'\[deg', 'm': r'\[m', 's': r'\[s',
          'm_s': r'\[m/s', 'hz': r'\[Hz', 'rad': r'\[rad', 'gb': r'\[GB'}
 
@@ -80,6 +86,7 @@ class Checker:
         if not self.commands:
             sys.exit('%s lists no commands' % colmap)
         self.host_options = {}
+        self.shown = []  # where, and why not run
         self.known = set(OTHER_OPTIONS)
         for script in sorted((ROOT / 'scripts').glob('*.[ps][yh]')):
             self.known.update(re.findall(r'--([a-z][\w-]+)',
@@ -97,7 +104,7 @@ class Checker:
 
     def check_command(self, where, words):
         name = words[1] if len(words) > 1 else 'help'
-        if name in ('help', '-h', 'COMMAND', 'X', 'gui'):
+        if name in ('help', '-h', 'gui'):
             return
         if name.startswith('adasfm_') and name not in self.commands:
             fail(where, 'there is no command ' + name)
@@ -112,11 +119,18 @@ class Checker:
 
     def check_block(self, path, block):
         number, language, lines = block
-        for line in read_lines(lines):
-            where = '%s:%d' % (path.name, number)
-            if not re.match(r'(colmap(-adasfm)?\s|scripts/|[\w./$"-]*/bin/colmap)',
-                            line) and language not in ('sh', 'console'):
-                continue
+        where = '%s:%d' % (path.name, number)
+        language, _, reason = language.partition(' ')
+        lines = read_lines(lines)
+        if language == 'console':
+            self.shown.append('%s: %s' % (where, reason))
+            if not reason:
+                fail(where, 'does not say why it is shown only')
+        elif language != 'sh':
+            if language in ('', 'bash') and any(map(COMMAND.match, lines)):
+                fail(where, 'commands are ```sh, or ```console with a reason')
+            return
+        for line in lines:
             try:
                 words = shlex.split(line, comments=True)
             except ValueError as error:
@@ -128,7 +142,8 @@ class Checker:
             elif program.startswith('scripts/'):
                 if not (ROOT / program).exists():
                     fail(where, 'there is no ' + program)
-            elif not (program in OTHER_PROGRAMS or '=' in program):
+            elif not (program in OTHER_PROGRAMS or '=' in program or
+                      program.startswith('build')):
                 fail(where, 'unknown program: ' + program)
 
     def check_names(self, path):
@@ -142,6 +157,8 @@ class Checker:
                     if not any(known.startswith(name + '.')
                                for known in self.known):
                         fail(where, 'no command has the option --' + name)
+            for command in re.findall(r'`(colmap adasfm_[^`]*)`', line):
+                self.check_command(where, command.split())
             for link in re.findall(r'\]\(([^)#]+)(?:#[^)]*)?\)', line):
                 if not re.match(r'\w+:', link) and not (
                         path.parent / link).exists():
@@ -167,24 +184,21 @@ class Checker:
                         fail(where, 'has no unit in its help: ' + option.help)
 
 
-def run(arguments, folder, log):
-    with open(log, 'ab') as file:
-        return subprocess.run(arguments, cwd=folder, stdout=file,
-                              stderr=file, check=False).returncode
-
-
-def make_drive(colmap, folder):
-    """A rendered drive under the names of the documentation."""
-    log = folder / 'drive.log'
-    code = run([colmap, 'adasfm_synthesizer', '--output_path', '.',
-                '--num_images', '16', '--spacing', '1', '--image_width', '480',
-                '--image_height', '300', '--render', '1'], folder, log)
-    if code != 0:
-        sys.exit(log.read_text())
-    (folder / 'images').rename(folder / 'photos')
-    camera = re.search(r'intrinsics: *\[(.*)\]',
-                       (folder / 'sensors.yaml').read_text())[1]
-    return camera.replace(' ', '')
+def run_block(folder, language, text, log):
+    """The exit code; None when it needs what is not installed."""
+    if language == 'python':
+        modules = re.findall(r'^import (\w+)', text, re.MULTILINE)
+        if not all(map(importlib.util.find_spec, modules)):
+            compile(text, 'block', 'exec')
+            return None
+        command = [sys.executable, '-c', text]
+    else:
+        command = ['bash', '-euo', 'pipefail', '-c', text]
+    environment = dict(os.environ, PATH='%s/bin:%s' %
+                       (folder, os.environ['PATH']))
+    with open(log, 'wb') as file:
+        return subprocess.run(command, cwd=folder, env=environment,
+                              stdout=file, stderr=file, check=False).returncode
 
 
 def run_blocks(colmap, files):
@@ -194,19 +208,19 @@ def run_blocks(colmap, files):
         (folder / 'bin').mkdir()
         (folder / 'bin/colmap').symlink_to(pathlib.Path(colmap).resolve())
         (folder / 'scripts').symlink_to(ROOT / 'scripts')
+        log = folder / 'log'
         for path in files:
             for number, language, lines in read_blocks(path):
-                if language != 'sh':
+                if language not in ('sh', 'python'):
                     continue
                 text = '\n'.join(lines).replace('FX,FY,CX,CY', camera)
                 where = '%s:%d' % (path.name, number)
-                print('running', where, flush=True)
-                log = folder / 'log'
-                log.write_text('')
-                code = run(['bash', '-euo', 'pipefail', '-c',
-                            'export PATH=%s/bin:$PATH\n%s' % (folder, text)],
-                           folder, log)
-                if code != 0:
+                start = time.monotonic()
+                code = run_block(folder, language, text, log)
+                print('%s %s (%.1f s)' % (
+                    'compiled, modules are missing:' if code is None else
+                    'ran', where, time.monotonic() - start), flush=True)
+                if code:
                     fail(where, 'exit code %d:\n%s' %
                          (code, log.read_text()[-2000:]))
 
@@ -226,6 +240,7 @@ def main():
             checker.check_block(path, block)
     for path in files:
         checker.check_names(path)
+    print('shown, not run:', *checker.shown, sep='\n  ')
     if arguments.run and not failures:
         run_blocks(arguments.colmap, files)
     if failures:

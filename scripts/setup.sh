@@ -7,7 +7,8 @@
 #   scripts/setup.sh [--host-only] [--for-tests] [CMake arguments...]
 #
 # --host-only stops after the host, --for-tests also installs the browser that
-# the report's test and the screenshots need.
+# the report's test and the screenshots need, and what the packages and the
+# documentation are checked with.
 # Environment: ADASFM_CACHE (default: the user's cache folder) holds the host;
 # ADASFM_BUILD_DIR (default: build/); ADASFM_BUILD_TYPE (default: Release).
 # With -DCOLMAP_DIR=PREFIX/share/colmap that COLMAP is used instead.
@@ -37,7 +38,8 @@ packages=(
   libgtest-dev libgmock-dev libbenchmark-dev
   # For the scripts that draw tables and compare models.
   python3 python3-numpy python3-matplotlib sqlite3)
-test_packages=(chromium chromium-driver python3-selenium file)
+test_packages=(chromium chromium-driver python3-selenium file lintian
+  python3-h5py)
 
 say() { printf '\n== %s\n' "$*"; }
 die() { printf 'setup: %s\n' "$*" >&2; exit 1; }

@@ -25,12 +25,14 @@ void AddPaths(AutomaticReconstructionPaths* paths, CommandOptions* command) {
                       "times of the images: EuRoC data.csv, 4Seasons times.txt "
                       "or TUM rgb.txt; when empty, the names' digits are "
                       "nanoseconds");
-  command->AddDefault("imu_path", &paths->imu_path,
-                      "IMU log: EuRoC CSV, 4Seasons imu.txt or a KITTI oxts "
-                      "folder; none when empty");
-  command->AddDefault("wheel_path", &paths->wheel_path,
-                      "wheel log, told apart by its header line, or a TUM "
-                      "odometry trajectory; none when empty");
+  command->AddDefault(
+      "imu_path", &paths->imu_path,
+      "IMU log: EuRoC CSV, 4Seasons imu.txt, a KITTI oxts folder "
+      "or a ROS 1 bag; none when empty");
+  command->AddDefault(
+      "wheel_path", &paths->wheel_path,
+      "wheel log, told apart by its header line, a TUM odometry "
+      "trajectory or a ROS 1 bag with one; none when empty");
   command->AddDefault("sensors_path", &paths->sensors_path,
                       "YAML file with the calibration of the sensors");
   command->AddDefault("ground_truth_path", &paths->ground_truth_path,
@@ -88,6 +90,9 @@ Status RunAdasfmAutomaticReconstructor(int argc, char** argv) {
                      "every image is matched with so many of the next ones");
   command.AddDefault("num_similar_images", &options.pairs.num_similar_images,
                      "and with so many of the most similar ones beyond them");
+  command.AddDefault("restart", &options.restart,
+                     "1: remove what earlier runs left in the workspace, and "
+                     "do it all anew; 0: continue");
   command.AddDefault("num_threads", &options.num_threads,
                      "-1: all of the machine's");
   const Status parsed = command.Parse(argc, argv);

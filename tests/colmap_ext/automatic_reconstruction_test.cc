@@ -4,6 +4,7 @@
 #include <signal.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <chrono>
 #include <filesystem>
 #include <memory>
@@ -69,6 +70,9 @@ class AutomaticTest : public CommandLineTest {
         ReadModel(workspace_ + "/sparse/0");
     ASSERT_TRUE(model.ok()) << model.status().message();
     EXPECT_EQ(model->NumRegImages(), kNumImages);
+    EXPECT_TRUE(std::any_of(
+        model->Points3D().begin(), model->Points3D().end(),
+        [](const auto& point) { return !point.second.Color().isZero(); }));
     EXPECT_GT(fs::file_size(workspace_ + "/report.html"), 10000);
   }
 
@@ -123,7 +127,20 @@ TEST_F(AutomaticTest, PhotosAndSensorsThenAgainThenWithOtherOptions) {
   EXPECT_TRUE(Contains(run.out, "WARNING: the database has no sensor"));
   EXPECT_TRUE(
       ReadPriorTables(workspace_ + "/database.db")->tables.priors.empty());
+  EXPECT_FALSE(fs::exists(workspace_ + "/database.db.priors.json"));
   ExpectModel();
+}
+
+TEST_F(AutomaticTest, RestartDoesAllAnew) {
+  ExpectSuccess(Photos());
+  const std::string kept = workspace_ + "/notes.txt";
+  std::ofstream(kept) << "mine";
+  const Run run = ExpectSuccess(Photos() + " --restart 1");
+  EXPECT_TRUE(Contains(run.out, "removing what earlier runs left"));
+  EXPECT_FALSE(Contains(run.out, "done before")) << run.out;
+  EXPECT_EQ(DoneSteps().size(), 6);
+  ExpectModel();
+  EXPECT_TRUE(fs::exists(kept));
 }
 
 TEST_F(AutomaticTest, EurocRecording) {
@@ -233,6 +250,9 @@ TEST_F(AutomaticTest, WrongInputIsOneLine) {
   std::ofstream(used + "/database.db") << "somebody's";
   ExpectError("adasfm_automatic_reconstructor --workspace_path " + used +
                   " --image_path " + drive_->File("images"),
+              "did not make");
+  ExpectError("adasfm_automatic_reconstructor --restart 1 --workspace_path " +
+                  used + " --image_path " + drive_->File("images"),
               "did not make");
   EXPECT_EQ(ReadBytes(used + "/database.db"), "somebody's");
 }

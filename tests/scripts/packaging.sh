@@ -78,7 +78,8 @@ dev=$(echo "$work"/packages/libadasfm-dev_*.deb)
 dpkg-deb -c "$runtime" > "$work/contents"
 dpkg-deb -c "$dev" > "$work/dev-contents"
 for file in usr/bin/colmap-adasfm usr/lib/adasfm/bin/colmap \
-  usr/share/man/man1/colmap-adasfm.1.gz usr/share/doc/colmap-adasfm/copyright; do
+  usr/share/man/man1/colmap-adasfm.1.gz usr/share/doc/colmap-adasfm/copyright \
+  usr/share/doc/colmap-adasfm/changelog.gz; do
   grep -qE " \./$file( |$)" "$work/contents" || fail "$runtime lacks $file"
 done
 # Debian's package colmap owns these names and folders.
@@ -91,6 +92,43 @@ if grep -E '\.a$|/include/' "$work/contents"; then
 fi
 grep -q ' ./usr/lib/libadasfm_core.a' "$work/dev-contents" ||
   fail "$dev lacks the libraries"
+if command -v lintian > /dev/null; then
+  # --allow-root is for containers.
+  lintian --allow-root --fail-on error,warning "$runtime" "$dev" ||
+    fail 'lintian finds the faults above'
+else
+  echo 'lintian is not installed, and was left out'
+fi
+
+echo '== beside the package colmap'
+# dpkg as root only, and into a folder: a stand-in with the paths of Debian's colmap.
+if [ "$(id -u)" = 0 ]; then
+  for file in bin/colmap share/doc/colmap/copyright share/man/man1/colmap.1.gz \
+    share/applications/colmap.desktop; do
+    mkdir -p "$work/stub/usr/$(dirname "$file")"
+    echo colmap > "$work/stub/usr/$file"
+  done
+  mkdir -p "$work/stub/DEBIAN" "$work/system/var/lib/dpkg"/{info,updates,triggers}
+  printf '%s\n' 'Package: colmap' 'Version: 3.8-1' 'Architecture: all' \
+    'Maintainer: nobody <nobody@adasfm.invalid>' 'Description: stand-in' \
+    > "$work/stub/DEBIAN/control"
+  dpkg-deb -b "$work/stub" "$work/colmap.deb" > /dev/null
+  touch "$work/system/var/lib/dpkg/status"
+  dpkg_here() {
+    dpkg --root="$work/system" --force-depends --force-script-chrootless \
+      --no-triggers "$@" > "$work/log" 2>&1 ||
+      { tail -n 20 "$work/log" >&2; fail "dpkg $* fails"; }
+  }
+  dpkg_here -i "$work/colmap.deb"
+  dpkg_here -i "$runtime" "$dev"
+  [ -x "$work/system/usr/bin/colmap-adasfm" ] || fail 'the program is not installed'
+  dpkg_here -r colmap-adasfm libadasfm-dev
+  [ ! -e "$work/system/usr/bin/colmap-adasfm" ] || fail 'the program is not removed'
+  dpkg_here -V colmap
+  [ "$(cat "$work/system/usr/bin/colmap")" = colmap ] || fail 'colmap was replaced'
+else
+  echo 'not root: dpkg was left out'
+fi
 # grep -q on a pipe would end the writer by SIGPIPE when it finds early.
 dpkg-deb -f "$runtime" Depends > "$work/depends"
 grep -q 'libopencv-core' "$work/depends" ||
