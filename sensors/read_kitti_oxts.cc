@@ -12,6 +12,7 @@ namespace {
 constexpr size_t kMinNumFields = 20;
 constexpr size_t kForceField = 11;
 constexpr size_t kRateField = 17;
+constexpr timestamp_t kSecondNs = 1'000'000'000;
 
 // Days since 1970-01-01 in the Gregorian calendar, from the day count of whole
 // years that begin in March, so that a leap day ends its year.
@@ -40,12 +41,13 @@ bool ParseDateTime(const LogLine& line, timestamp_t* timestamp_ns) {
     return false;
   }
   if (year < 1970 || year > 2200 || month < 1 || month > 12 || day < 1 ||
-      day > 31 || hour < 0 || hour > 23 || minute < 0 || minute > 59) {
+      day > 31 || hour < 0 || hour > 23 || minute < 0 || minute > 59 ||
+      seconds_ns >= 61 * kSecondNs) {
     return false;
   }
   const int64_t minutes =
       (DaysSinceEpoch(year, month, day) * 24 + hour) * 60 + minute;
-  *timestamp_ns = minutes * 60'000'000'000 + seconds_ns;
+  *timestamp_ns = minutes * 60 * kSecondNs + seconds_ns;
   return true;
 }
 

@@ -2,15 +2,14 @@
 #include "sensors/read_rosbag.h"
 
 #include <algorithm>
-#include <cmath>
 #include <filesystem>
 #include <set>
 
 #ifdef ADASFM_HAS_ROSBAG
-#include <nav_msgs/Odometry.h>
 #include <rosbag/bag.h>
 #include <rosbag/view.h>
-#include <sensor_msgs/Imu.h>
+
+#include "sensors/ros_messages.h"
 #endif
 
 namespace adasfm {
@@ -59,27 +58,6 @@ StatusOr<std::string> FindTopic(const rosbag::Bag& bag, const BagPath& path,
                        *topics.begin());
 }
 
-bool ToSample(const sensor_msgs::Imu& message, ImuSample* sample) {
-  const auto& rate = message.angular_velocity;
-  const auto& force = message.linear_acceleration;
-  sample->angular_velocity << rate.x, rate.y, rate.z;
-  sample->specific_force << force.x, force.y, force.z;
-  return sample->angular_velocity.allFinite() &&
-         sample->specific_force.allFinite();
-}
-
-bool ToSample(const nav_msgs::Odometry& message, OdometryPose* pose) {
-  const auto& q = message.pose.pose.orientation;
-  const auto& p = message.pose.pose.position;
-  const Eigen::Quaterniond rotation(q.w, q.x, q.y, q.z);
-  // Also false for what is not a number.
-  const bool is_unit = std::abs(rotation.norm() - 1.0) < 0.01;
-  pose->world_from_body =
-      Rigid3d(is_unit ? rotation.normalized() : Eigen::Quaterniond::Identity(),
-              Eigen::Vector3d(p.x, p.y, p.z));
-  return is_unit && pose->world_from_body.translation.allFinite();
-}
-
 template <typename Message, typename Sample>
 StatusOr<std::vector<Sample>> ReadMessages(const BagPath& path) {
   const std::string type = ros::message_traits::DataType<Message>::value();
@@ -100,14 +78,8 @@ StatusOr<std::vector<Sample>> ReadMessages(const BagPath& path) {
       return error(index, "not the " + type + " that ROS 1 knows");
     }
     Sample sample;
-    sample.timestamp_ns =
-        static_cast<timestamp_t>(message->header.stamp.toNSec());
-    if (sample.timestamp_ns == 0) {
-      return error(index, "its header has no stamp; let the driver set it");
-    }
-    if (!ToSample(*message, &sample)) {
-      return error(index, "not finite, or its quaternion is not of length 1");
-    }
+    const std::string cause = ConvertRosMessage(*message, &sample);
+    if (!cause.empty()) return error(index, cause);
     samples.push_back(sample);
   }
   // Bags are in the order of arrival.

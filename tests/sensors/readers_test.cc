@@ -192,6 +192,10 @@ TEST_F(Readers, KittiOxts) {
   std::filesystem::remove(folder_ + "/oxts/data/0000000001.txt");
   ExpectError(ReadImu(folder_ + "/oxts").status(), "0000000001.txt",
               {"no such file"});
+  // With the year's nanoseconds this would be beyond 64 bits.
+  Write("oxts/timestamps.txt", "2200-12-31 23:59:8999999999\n");
+  ExpectError(ReadImu(folder_ + "/oxts").status(), "timestamps.txt",
+              {"line 1", "hh:mm:ss"});
 }
 
 TEST_F(Readers, WheelTypesByHeader) {
