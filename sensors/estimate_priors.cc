@@ -198,7 +198,8 @@ void PriorEstimator::Fuse() {
     estimate_.summary.num_visual_links = visual.num_links;
     estimate_.summary.visual_sigma_deg = RadToDeg(visual.sigma_rad);
   }
-  if (has_visual_bias_) {
+  // What the links hold already must not count twice.
+  if (has_visual_bias_ && estimate_.summary.num_visual_links == 0) {
     problem_.prior_gyroscope_bias = visual_bias_;
     problem_.prior_gyroscope_bias_sigma = std::min(
         options_.visual_bias_sigma, options_.fusion.gyroscope_bias_sigma);

@@ -51,7 +51,8 @@ struct PriorEstimationOptions {
   // Whether two-view rotations help to find the gyroscope's bias: its first
   // value when the machine never stands still, and its course on the way.
   bool use_visual_rotations = true;
-  // How well they tell the first value, rad/s.
+  // How well they tell the first value when they are too poor for the rest,
+  // rad/s.
   double visual_bias_sigma = 0.002;
   // Whether vision and gyroscope are compared before anything is believed
   // (sensors/check_against_vision.h); a contradiction is an error.

@@ -86,7 +86,8 @@ void AddOptions(PriorImportOptions* options, CommandOptions* command) {
       "two-view rotations help to find the gyroscope's bias: its first value "
       "when the machine never stands still, and its course (0 or 1)");
   add("visual_bias_sigma", &estimation->visual_bias_sigma,
-      "how well they give the first value, 1 sigma [rad/s]");
+      "how well they give the first value when too poor for the rest, 1 sigma "
+      "[rad/s]");
   add("estimate_time_shift", &estimation->estimate_time_shift,
       "add the time shift that vision and gyroscope agree on to the "
       "calibration's (0 or 1)");

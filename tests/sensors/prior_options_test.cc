@@ -6,7 +6,7 @@
 namespace adasfm {
 namespace {
 
-enum class Sensors { kBoth, kImu, kWheels };
+enum class Sensors { kBoth, kImu, kWheels, kPoorVision };
 
 // An option, another value for it, and the sensors with which it matters.
 struct OptionChange {
@@ -26,7 +26,8 @@ class Drive {
     const SyntheticWorld world = BuildSyntheticWorld(options);
     data_ = ToDataset(world);
     data_.calibration.timeshift_cam_imu_s = 0.0;
-    vision_ = SimulateVision(world, 3, {1e-3, 1, 0.05});
+    const double vision_noise = sensors == Sensors::kPoorVision ? 6e-3 : 1e-3;
+    vision_ = SimulateVision(world, 3, {vision_noise, 1, 0.05});
     const timestamp_t gap_ns = data_.images[20].timestamp_ns;
     Cut(gap_ns, 60'000'000, &data_.logs.imu);
     Cut(gap_ns, 120'000'000, &data_.logs.wheel);
@@ -98,7 +99,8 @@ INSTANTIATE_TEST_SUITE_P(
         OptionChange{"UseVisualRotations",
                      [](Options* o) { o->use_visual_rotations = false; }},
         OptionChange{"VisualBiasSigma",
-                     [](Options* o) { o->visual_bias_sigma = 2e-5; }},
+                     [](Options* o) { o->visual_bias_sigma = 2e-5; },
+                     Sensors::kPoorVision},
         OptionChange{"EstimateTimeShift",
                      [](Options* o) { o->estimate_time_shift = true; }}),
     [](const auto& change) { return change.param.name; });
