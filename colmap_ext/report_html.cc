@@ -113,7 +113,8 @@ std::string FormatTable(const ReportTable& table) {
   }
   html += "<tbody>\n";
   for (const std::vector<std::string>& row : table.rows) {
-    html += "<tr>";
+    const bool is_warning = !row.empty() && row[0] == "warning";
+    html += is_warning ? "<tr class=\"warning\">" : "<tr>";
     for (size_t i = 0; i < row.size(); ++i) {
       html += (i == 0 ? "<th scope=\"row\">" : "<td>") + EscapeHtml(row[i]) +
               (i == 0 ? "</th>" : "</td>");

@@ -193,13 +193,13 @@ ReportTable FormatSensors(const ReportSummaries& summaries) {
 ReportTable FormatGlobalSteps(const ReportSummaries& summaries) {
   ReportTable table;
   table.head = {"step of adasfm_global", "what it did"};
-  for (const Json& step : ListAt(summaries.global, "steps")) {
-    table.rows.push_back({TextAt(step, "name"), TextAt(step, "summary")});
-  }
   for (const Json& warning : ListAt(summaries.global, "warnings")) {
     if (warning.is_string()) {
       table.rows.push_back({"warning", warning.get<std::string>()});
     }
+  }
+  for (const Json& step : ListAt(summaries.global, "steps")) {
+    table.rows.push_back({TextAt(step, "name"), TextAt(step, "summary")});
   }
   return table;
 }

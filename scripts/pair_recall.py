@@ -4,9 +4,9 @@
 
     scripts/pair_recall.py EXHAUSTIVE.db PAIRS.txt
 
-EXHAUSTIVE.db has been matched with COLMAP's exhaustive_matcher: its verified
-pairs are the truth. PAIRS.txt is the output of adasfm_pair_generator. Prints the
-recall for pairs of at least 15, 30, 60 and 120 verified matches, of all pairs
+EXHAUSTIVE.db has been matched exhaustively (match_exactly.py), or is that of
+adasfm_synthesizer: its verified pairs are the truth. PAIRS.txt is the output of adasfm_pair_generator. Prints the
+recall for pairs of at least 15, 30, 60, 120 and 240 verified matches, of all pairs
 and of those more than 10 images apart (in the order of the names), and the
 recall of the best list that has as many partners for every image.
 """
@@ -56,7 +56,7 @@ def main():
     print(f"{len(rank)} images, {len(truth)} of {total} pairs verified; "
           f"{len(pairs)} in the list, {len(pairs & truth.keys())} of them true")
     for min_gap in (0, 10):
-        for min_rows in (15, 30, 60, 120):
+        for min_rows in (15, 30, 60, 120, 240):
             chosen = {pair: rows for pair, rows in truth.items()
                       if rows >= min_rows and max(pair) - min(pair) > min_gap}
             recall = len(pairs & chosen.keys()) / max(1, len(chosen))

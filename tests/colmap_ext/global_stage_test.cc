@@ -131,7 +131,8 @@ TEST(RunGlobalStageTest, AnEmptySceneIsAnError) {
 TEST(RunGlobalStageTest, ReportsEveryStep) {
   const SyntheticWorld world = BuildSyntheticWorld(SmallWorld());
   const SceneData scene = BuildSyntheticScene(world, SyntheticPriorOptions());
-  const GlobalStageResult result = RunStage(scene);
+  GlobalStageResult result = RunStage(scene);
+  EXPECT_TRUE(ListGlobalWarnings(scene, result).empty());
   const std::string json = FormatGlobalReportJson(scene, result, 1.0);
   for (const StepReport& step : result.steps) {
     EXPECT_NE(json.find("\"" + step.name + "\""), std::string::npos);
@@ -145,6 +146,12 @@ TEST(RunGlobalStageTest, ReportsEveryStep) {
   const std::string text = FormatGlobalReportText(result, 1.0);
   EXPECT_NE(text.find("60 images"), std::string::npos);
   EXPECT_NE(text.find("directions agree to"), std::string::npos);
+  result.poses.components[0].positions_converged = false;
+  const std::vector<std::string> warnings = ListGlobalWarnings(scene, result);
+  ASSERT_EQ(warnings.size(), 1);
+  EXPECT_NE(warnings[0].find("did not converge"), std::string::npos);
+  EXPECT_NE(FormatGlobalReportJson(scene, result, 1.0).find(warnings[0]),
+            std::string::npos);
 }
 
 TEST(RunGlobalStageTest, StatesTheMemoryOfTracksBeforeItIsUsed) {

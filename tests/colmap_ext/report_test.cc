@@ -110,7 +110,8 @@ class ReportTest : public CommandLineTest {
   void WriteSummaries() {
     folder_.Write("global/summary.json",
                   R"({"steps": [{"name": "loop gating", "seconds": 1.5,
-                      "summary": "5 <pairs> tested"}]})");
+                      "summary": "5 <pairs> tested"}],
+                      "warnings": ["positions did not converge"]})");
     folder_.Write("sparse/summary.json",
                   R"({"is_metric": true, "refine_seconds": 2.25, "parts": [
                       {"part_index": 0, "num_images": 25, "merged": false,
@@ -146,7 +147,7 @@ TEST_F(ReportTest, IsSelfContainedAndHoldsTheFigures) {
   ExpectSelfContained(*page);
   for (const std::string figure :
        {"25 of 25", "<b>100</b>", "1.00", "0.25 px", "RMSE of the points",
-        "0.000 m", "7.2 s", "5 &lt;pairs&gt; tested",
+        "0.000 m", "7.2 s", "5 &lt;pairs&gt; tested", "<tr class=\"warning\">",
         "does not fit the coarse model", "a &lt; b", "200 Hz", "1 lines of"}) {
     EXPECT_NE(page->find(figure), std::string::npos) << figure;
   }
