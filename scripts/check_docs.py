@@ -35,7 +35,8 @@ OTHER_OPTIONS = {
 # What the first word of a shown command may be, besides ours and paths in this
 # repository.
 OTHER_PROGRAMS = {
-    'cmake', 'export', 'sudo', 'cd', 'cp', 'cpack', 'mkdir', 'rosrun'}
+    'cmake', 'export', 'sudo', 'cd', 'cp', 'cpack', 'mkdir', 'rosrun',
+    'sqlite3'}
 COMMAND = re.compile(
     r'((colmap|colmap-adasfm|cmake|cpack|sudo|rosrun)\s|scripts/\w'
     r'|[\w./$"-]*/bin/\w)')

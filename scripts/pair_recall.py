@@ -5,10 +5,11 @@
     scripts/pair_recall.py EXHAUSTIVE.db PAIRS.txt
 
 EXHAUSTIVE.db has been matched exhaustively (match_exactly.py), or is that of
-adasfm_synthesizer: its verified pairs are the truth. PAIRS.txt is the output of adasfm_pair_generator. Prints the
-recall for pairs of at least 15, 30, 60, 120 and 240 verified matches, of all pairs
-and of those more than 10 images apart (in the order of the names), and the
-recall of the best list that has as many partners for every image.
+adasfm_synthesizer: its verified pairs are the truth. PAIRS.txt is the output of
+adasfm_pair_generator. Prints the recall for pairs of at least 15, 30, 60, 120 and
+240 verified matches, of all pairs and of those more than 10 images apart (in the
+order of the names), and the recall of the best list that has as many partners
+for every image.
 """
 import sqlite3
 import sys
