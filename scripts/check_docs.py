@@ -31,7 +31,8 @@ from docs_drive import make_drive  # noqa: E402
 # from them.
 OTHER_OPTIONS = {
     'import_path', 'Group.name', 'option', 'install', 'prefix', 'bag',
-    'topics', 'models', 'cam', 'imu', 'target', 'build', 'host'}
+    'topics', 'models', 'cam', 'imu', 'target', 'build', 'host',
+    'benchmark_filter'}
 # What the first word of a shown command may be, besides ours and paths in this
 # repository.
 OTHER_PROGRAMS = {
