@@ -36,8 +36,10 @@ PosePriorEdge PosePriorEdgeFromPrior(const RelativePosePrior& prior);
 
 struct PriorBundleAdjustmentOptions {
   // 1 sigma of a keypoint's position; the unit in which priors and keypoints
-  // are compared.
-  double keypoint_sigma_px = 1.0;
+  // are compared. Half a pixel is the noise of one keypoint. More, to be safe,
+  // bends long drives: the errors of priors persist, which the adjustment does
+  // not know, while balance_priors.h finds what keypoints have in common.
+  double keypoint_sigma_px = 0.5;
   // Where the robust loss on reprojection errors (soft L1) takes over, in px;
   // <= 0: plain squares.
   double reproj_loss_scale_px = 2.0;

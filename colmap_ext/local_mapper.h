@@ -29,7 +29,7 @@ struct LocalMapperOptions {
   // (COLMAP: 1.1 and every 500 images).
   double global_adjustment_growth = 1.5;
   // 1 sigma of a keypoint's position, which weighs priors against keypoints.
-  double keypoint_sigma_px = 1.0;
+  double keypoint_sigma_px = 0.5;
   // How vision is weighed against the priors.
   PriorBalanceOptions balance;
   int num_threads = 1;

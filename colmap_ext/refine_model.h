@@ -14,7 +14,7 @@ struct RefineModelOptions {
   bool use_priors_in_adjustment = true;
   double filter_max_reproj_error_px = 4.0;
   double min_triangulation_angle_deg = 1.5;
-  double keypoint_sigma_px = 1.0;
+  double keypoint_sigma_px = 0.5;
   // As in LocalMapperOptions.
   PriorBalanceOptions balance;
   // Intrinsics are adjusted here and nowhere else, so that all parts agree

@@ -20,7 +20,6 @@ from benchmarking.methods import evaluate
 from benchmarking.process import Failed, run
 
 ROOT = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
-HARD = ['--alias_ratio', '0.05', '--num_blackouts', '1', '--wheel_slips', '2']
 
 # Options of adasfm_global for each ablation.
 VARIANTS = {
@@ -39,6 +38,11 @@ VARIANTS = {
 }
 # A world has failed when the model lacks images or errs by more.
 MAX_ERROR_M = 0.5
+
+
+def hard_options(args):
+  return ['--alias_ratio', '0.05', '--num_blackouts', str(args.num_blackouts),
+          '--wheel_slips', '2']
 
 
 def options_of(variant):
@@ -60,8 +64,8 @@ def make_world(num_images, seed, args):
   database = os.path.join(folder, 'database.db')
   if not os.path.exists(database):
     run([args.colmap, 'adasfm_synthesizer', '--output_path', folder,
-         '--num_images', str(num_images), '--seed', str(seed)] + HARD,
-        log_path)
+         '--num_images', str(num_images), '--seed', str(seed)] +
+        hard_options(args), log_path)
   imported = os.path.join(folder, 'imported.db')
   if not os.path.exists(imported):
     shutil.copy(database, imported + '.part')
@@ -119,7 +123,7 @@ def run_variant(variant, folder, args):
       model = json.load(file)['models'][0]
     record['unsuspected'] = (model['positions_converged'] and
                              not model['unverified_joins'])
-    if variant == 'as it is':
+    if variant == 'as it is' and args.compare_pairs:
       record['pairs'] = evaluate_pairs(database, os.path.join(coarse, '0'),
                                        folder, args, log_path)
     if variant in args.mapper_variants:
@@ -169,6 +173,27 @@ def ablation_table(records, args):
     elif args.mapper_variants:
       columns.append(' | | | ')
     lines.append('| ' + ' | '.join(columns + [str(silent)]) + ' |')
+  return lines
+
+
+def world_table(records):
+  """Every world as it is."""
+  lines = ['| world | images | coarse: m | scale off % | final: m | scale off % |'
+           ' reported against it |', '|---|---|---|---|---|---|---|']
+  for record in records:
+    if record['variant'] != 'as it is':
+      continue
+    cells = [record['world']]
+    coarse = record.get('coarse')
+    cells.append('%d/%d' % (coarse['images'], coarse['true_images'])
+                 if coarse else '-')
+    for key in ('coarse', 'final'):
+      figures = record.get(key)
+      cells += (['%.3f' % figures['rmse_m'],
+                 '%.2f' % (100.0 * abs(figures['scale'] - 1.0))]
+                if figures else ['-', '-'])
+    cells.append('no' if record.get('unsuspected') else 'yes')
+    lines.append('| ' + ' | '.join(cells) + ' |')
   return lines
 
 
@@ -229,15 +254,20 @@ def report(records, args):
   pairs = [r['pairs'] for r in records if 'pairs' in r]
   lines = ['# Figures of the coarse global stage', '',
            'Written by `scripts/global_tables.py`; the runs behind it are in '
-           '`global_results.json`. Worlds: `adasfm_synthesizer %s`, %s images, '
+           '`%s.json`. Worlds: `adasfm_synthesizer %s`, %s images, '
            'seeds %s. Errors are the RMSE of camera centres after a '
            'similarity. A model that lacks images or errs by more than '
            '%.1f m has failed; it is wrong without a word when it errs by more and '
            'neither convergence nor unverified joins are reported against it.' % (
-               ' '.join(HARD), ' and '.join(map(str, args.sizes)),
+               os.path.basename(args.results_path),
+               ' '.join(hard_options(args)),
+               ' and '.join(map(str, args.sizes)),
                ', '.join(map(str, args.seeds)), MAX_ERROR_M), '',
            '## What each step buys', '']
   lines += ablation_table(records, args)
+  if 'as it is' in args.variants:
+    lines += ['', '## World by world', '']
+    lines += world_table(records)
   if pairs:
     lines += ['', '## Matches against the truth', '',
               'Recall is relative to the true ones among the raw matches.', '']
@@ -258,6 +288,10 @@ def parse_arguments():
   parser.add_argument('--output_path', default='adasfm-global-tables',
                       help='folder of worlds and runs')
   parser.add_argument('--sizes', default='150,300', help='images of a world')
+  parser.add_argument('--num_blackouts', type=int, default=1,
+                      help='intervals without a keypoint')
+  parser.add_argument('--compare_pairs', type=int, default=1,
+                      help='0: leave out the tables of pairs and matches')
   parser.add_argument('--num_seeds', type=int, default=3,
                       help='worlds of each size (10: what the project claims)')
   parser.add_argument('--variants', default=','.join(VARIANTS),
@@ -287,8 +321,8 @@ def parse_arguments():
 def main():
   args = parse_arguments()
   records = []
-  for num_images in args.sizes:
-    for seed in args.seeds:
+  for seed in args.seeds:
+    for num_images in args.sizes:
       folder = make_world(num_images, seed, args)
       for variant in args.variants:
         record = run_variant(variant, folder, args)

@@ -219,6 +219,7 @@ TEST(AdjustBundleTest, AgreesWithColmap) {
 
     PriorBundleAdjustmentOptions options = ConvergeFully();
     options.reproj_loss_scale_px = 0.0;
+    options.keypoint_sigma_px = 1.0;  // COLMAP's cost is in px
     const PriorBundleAdjustmentSummary summary =
         AdjustBundle(options, ProblemOfAll(ours), &ours);
     ASSERT_TRUE(summary.success);

@@ -74,7 +74,7 @@ const std::vector<OptionCase>& Cases() {
              structure.final_max_reproj_error_px),
       OPTION("early_function_tolerance", 0.01,
              structure.early_function_tolerance),
-      OPTION("ba_keypoint_sigma_px", 0.5, structure.bundle.keypoint_sigma_px),
+      OPTION("ba_keypoint_sigma_px", 0.7, structure.bundle.keypoint_sigma_px),
       OPTION("ba_refine_focal_length", 1, structure.bundle.refine_focal_length),
       OPTION("min_num_matches", 30, refinement.min_num_matches),
       OPTION("use_sdp_start", 0, poses.rotations.use_sdp_start),
