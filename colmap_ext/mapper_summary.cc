@@ -51,6 +51,7 @@ std::string FormatMapperSummaryJson(const MapperStageSummary& summary) {
       {"started_from_coarse_poses", summary.started_from_coarse_poses},
       {"num_merged_points", summary.merge.num_merged_points},
       {"num_images_put_back", summary.refine.num_images_put_back},
+      {"num_images_left_out", summary.refine.num_images_left_out},
       {"num_refinement_iterations", summary.refine.num_iterations},
       {"keypoint_sigma_px", summary.refine.keypoint_sigma_px},
       {"prior_chi2_per_dof", summary.refine.prior_chi2_per_dof},
@@ -99,7 +100,9 @@ std::string FormatMapperSummaryText(const MapperStageSummary& summary) {
        << " px; " << summary.merge.coarse_images.size()
        << " images started from coarse poses, "
        << summary.refine.num_images_put_back
-       << " contradicted the priors and were put back\n";
+       << " contradicted the priors and were put back, "
+       << summary.refine.num_images_left_out
+       << " without points and priors were left out\n";
   if (summary.started_from_coarse_poses) {
     text << "the merged parts contradicted the priors: the model was refined "
             "from the coarse poses\n";

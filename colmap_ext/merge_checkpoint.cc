@@ -50,6 +50,7 @@ nlohmann::json AsJson(const MapperStageSummary& summary) {
       {"keypoint_sigma_px", summary.refine.keypoint_sigma_px},
       {"prior_chi2_per_dof", summary.refine.prior_chi2_per_dof},
       {"num_images_put_back", summary.refine.num_images_put_back},
+      {"num_images_left_out", summary.refine.num_images_left_out},
       {"started_from_coarse_poses", summary.started_from_coarse_poses}};
   json["alignments"] = nlohmann::json::array();
   for (const AlignSimilarityResult& alignment : summary.aligned.alignments) {
@@ -76,6 +77,7 @@ void SummaryFromJson(const nlohmann::json& json, MapperStageSummary* summary) {
   json.at("keypoint_sigma_px").get_to(refine.keypoint_sigma_px);
   json.at("prior_chi2_per_dof").get_to(refine.prior_chi2_per_dof);
   json.at("num_images_put_back").get_to(refine.num_images_put_back);
+  json.at("num_images_left_out").get_to(refine.num_images_left_out);
   json.at("started_from_coarse_poses")
       .get_to(summary->started_from_coarse_poses);
 }

@@ -18,6 +18,8 @@ namespace {
 
 // Fewer points than this do not hold an image by themselves.
 constexpr size_t kMinNumPointsToHold = 20;
+// And with fewer than this nothing is known of its pose.
+constexpr size_t kMinNumPointsToKeep = 6;
 // How weak the ties of such images to the coarse motion are.
 constexpr double kCoarseRotationSigmaRad = 0.02;
 constexpr double kCoarseDirectionSigmaRad = 0.1;
@@ -58,6 +60,7 @@ class ModelRefiner {
     triangulator_.CompleteAndMergeTracks(options_.filter_max_reproj_error_px);
     Adjust(25, 1e-6);
     Filter(options_.filter_max_reproj_error_px);
+    LeaveOutUnsupportedImages();
   }
 
  private:
@@ -191,6 +194,19 @@ class ModelRefiner {
     }
     summary_.num_images_put_back = static_cast<int>(images.size());
     return !images.empty();
+  }
+
+  // A coarse pose that neither points nor priors confirm is only a guess.
+  void LeaveOutUnsupportedImages() {
+    for (const image_t image_id : RegisteredImages()) {
+      if (scene_.priors_of_image.count(image_id) > 0 ||
+          reconstruction_.Image(image_id).NumPoints3D() >=
+              kMinNumPointsToKeep) {
+        continue;
+      }
+      reconstruction_.DeRegisterImage(image_id);
+      ++summary_.num_images_left_out;
+    }
   }
 
   const RefineModelOptions& options_;

@@ -40,6 +40,8 @@ struct RefineModelSummary {
   double prior_chi2_per_dof = 0.0;
   // Images that the priors contradict and that were put back.
   int num_images_put_back = 0;
+  // Images without priors that end with too few points for a pose.
+  int num_images_left_out = 0;
 };
 
 inline constexpr int kNumRefinementRounds = 3;
@@ -50,7 +52,8 @@ inline constexpr int kNumRefinementRounds = 3;
 // adjustments with priors. Images that hold on few points are tied by weak
 // coarse motions. An image whose motion contradicts the priors on all sides is
 // put back to where the coarse model has it, without its points, so that the
-// result is not worse than the priors.
+// result is not worse than the priors. An image that neither points nor priors
+// hold is left out in the end.
 void RefineModel(const RefineModelOptions& options, int round,
                  MapperScene* scene, RefineModelSummary* summary);
 
