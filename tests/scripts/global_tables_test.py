@@ -55,7 +55,8 @@ class GlobalTablesTest(unittest.TestCase):
     records[0]['pairs'] = pairs
     args = argparse.Namespace(variants=['as it is', 'no loop gating'],
                               mapper_variants=['as it is'], sizes=[150],
-                              seeds=[1])
+                              seeds=[1], num_blackouts=1,
+                              results_path='/folder/figures')
     text = global_tables.report(records, args)
     table = []
     for line in text.split('\n') + ['']:
@@ -66,6 +67,7 @@ class GlobalTablesTest(unittest.TestCase):
         self.assertEqual(len(set(columns)), 1, text)
         table = []
     self.assertIn('| kept, refined | 4 | 1 | 96 | 98.96 | 95.00 | 50.0 |', text)
+    self.assertIn('`figures.json`', text)
     self.assertIn('| @ 1 deg | 90.00 | 80.00 |', text)
 
 
