@@ -73,8 +73,9 @@ BENCHMARK(BM_EstimateCoarsePoses)
 void BM_BuildTracks(benchmark::State& state) {
   const Input input = BuildInput(state.range(0));
   for (auto _ : state) {
-    benchmark::DoNotOptimize(
-        BuildTracks(TrackOptions(), input.correspondences.matches));
+    benchmark::DoNotOptimize(SelectTracks(
+        TrackOptions(),
+        JoinMatches(TrackOptions(), input.correspondences.matches)));
   }
 }
 BENCHMARK(BM_BuildTracks)->Arg(500)->Unit(benchmark::kMillisecond);
@@ -146,7 +147,8 @@ BENCHMARK(BM_EstimateGlobalPositions)
 void BM_TriangulateTracks(benchmark::State& state) {
   const Input input = BuildInput(state.range(0));
   const std::vector<Track> tracks =
-      BuildTracks(TrackOptions(), input.correspondences.matches);
+      SelectTracks(TrackOptions(),
+                   JoinMatches(TrackOptions(), input.correspondences.matches));
   for (auto _ : state) {
     benchmark::DoNotOptimize(
         TriangulateTracks(TrackTriangulationOptions(), input.cams_from_world,

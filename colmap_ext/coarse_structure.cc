@@ -130,10 +130,15 @@ TrackTriangulationOptions TriangulationOptions(
 }
 
 struct RoundTracks {
-  std::vector<Track> last;
-  // Of the rounds before, within the keyframes.
-  std::vector<Track> early;
+  std::vector<Track> all;
+  // Of the rounds before the last, unless all images are keyframes.
+  std::vector<Track> within_keyframes;
+  bool has_keyframes = false;
   size_t num_keyframes = 0;
+
+  const std::vector<Track>& Of(bool is_last_round) const {
+    return has_keyframes && !is_last_round ? within_keyframes : all;
+  }
 };
 
 RoundTracks BuildRoundTracks(const CoarseStructureOptions& options,
@@ -147,12 +152,12 @@ RoundTracks BuildRoundTracks(const CoarseStructureOptions& options,
           : images;
   RoundTracks tracks;
   tracks.num_keyframes = keyframes.size();
-  if (keyframes.size() < images.size()) {
-    tracks.early = SelectTracks(
+  tracks.has_keyframes = keyframes.size() < images.size();
+  if (tracks.has_keyframes) {
+    tracks.within_keyframes = SelectTracks(
         options.tracks, RestrictTracks(options.tracks, joined, keyframes));
   }
-  tracks.last = SelectTracks(options.tracks, std::move(joined));
-  if (keyframes.size() == images.size()) tracks.early = tracks.last;
+  tracks.all = SelectTracks(options.tracks, std::move(joined));
   return tracks;
 }
 
@@ -219,7 +224,7 @@ CoarseModel BuildCoarseModel(
   model.max_track_bytes = EstimateTrackBytes(input.matches);
   const PriorBundleAdjustmentProblem problem = CreateProblem(options, input);
   const RoundTracks tracks = BuildRoundTracks(options, input, problem.images);
-  model.num_tracks = tracks.last.size();
+  model.num_tracks = tracks.all.size();
   model.num_keyframes = tracks.num_keyframes;
 
   double keypoint_sigma_factor = 1.0;
@@ -229,12 +234,11 @@ CoarseModel BuildCoarseModel(
                    : CamsFromWorld(model.reconstruction);
     model.reconstruction = CreateReconstruction(scene, cams_from_world);
     AddPoints(
-        SelectPoints(
-            options,
-            TriangulateTracks(
-                TriangulationOptions(options, round), cams_from_world, bearings,
-                round + 1 < options.num_rounds ? tracks.early : tracks.last),
-            &model.min_angle_deg),
+        SelectPoints(options,
+                     TriangulateTracks(
+                         TriangulationOptions(options, round), cams_from_world,
+                         bearings, tracks.Of(round + 1 == options.num_rounds)),
+                     &model.min_angle_deg),
         &model.reconstruction);
     model.rounds.push_back(AdjustRound(options, problem, round,
                                        &model.reconstruction,

@@ -94,7 +94,8 @@ std::set<image_t> SelectKeyframes(
   }
   const Chain chain(images, priors);
   const SharedTracks shared(tracks);
-  std::set<image_t> keyframes;
+  // All but those that are passed over: priors in a circle have no first image.
+  std::set<image_t> keyframes = images;
   for (const image_t first : images) {
     if (chain.HasPrevious(first)) continue;
     image_t last_keyframe = first;
@@ -106,12 +107,12 @@ std::set<image_t> SelectKeyframes(
           num_passed_over + 1 < options.stride &&
           shared.Count(last_keyframe, next) >= options.min_num_shared_tracks;
       if (is_passed_over) {
+        keyframes.erase(id);
         ++num_passed_over;
-        continue;
+      } else {
+        last_keyframe = id;
+        num_passed_over = 0;
       }
-      keyframes.insert(id);
-      last_keyframe = id;
-      num_passed_over = 0;
     }
   }
   return keyframes;

@@ -231,10 +231,4 @@ std::vector<Track> RestrictTracks(const TrackOptions& options,
   return restricted;
 }
 
-std::vector<Track> BuildTracks(
-    const TrackOptions& options,
-    const std::map<ImagePair, std::vector<FeatureMatch>>& matches) {
-  return SelectTracks(options, JoinMatches(options, matches));
-}
-
 }  // namespace adasfm

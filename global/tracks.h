@@ -65,9 +65,4 @@ std::vector<Track> RestrictTracks(const TrackOptions& options,
                                   const std::vector<Track>& tracks,
                                   const std::set<image_t>& images);
 
-// SelectTracks of JoinMatches.
-std::vector<Track> BuildTracks(
-    const TrackOptions& options,
-    const std::map<ImagePair, std::vector<FeatureMatch>>& matches);
-
 }  // namespace adasfm

@@ -3,6 +3,7 @@
 #include <string>
 
 #include "colmap_ext/adasfm_pipeline.h"
+#include "colmap_ext/commands/log_options.h"
 #include "colmap_ext/commands/registry.h"
 #include "core/check_options.h"
 
@@ -14,18 +15,7 @@ void AddPathOptions(PriorImportPaths* paths, CommandOptions* command) {
                        "COLMAP database with the images");
   command->AddRequired("sensors_path", &paths->sensors_path,
                        "YAML file with the calibration of the sensors");
-  command->AddDefault("image_times_path", &paths->image_times_path,
-                      "times of the images: EuRoC data.csv, 4Seasons times.txt "
-                      "or TUM rgb.txt; when empty, the names' digits are "
-                      "nanoseconds");
-  command->AddDefault(
-      "imu_path", &paths->imu_path,
-      "IMU log: EuRoC CSV, 4Seasons imu.txt, a KITTI oxts folder "
-      "or a ROS 1 bag; none when empty");
-  command->AddDefault(
-      "wheel_path", &paths->wheel_path,
-      "wheel log, told apart by its header line, a TUM odometry "
-      "trajectory or a ROS 1 bag with one; none when empty");
+  AddLogOptions(paths, command);
 }
 
 void AddFusionOptions(OdometryFusionOptions* fusion, CommandOptions* command) {

@@ -100,6 +100,25 @@ TEST_F(MapperStageTest, BlackoutIsBridgedByPriors) {
   EXPECT_LT(errors.rmse_m, 0.5 * CoarseRmseM(world));
 }
 
+// Without priors nothing says where they are but a coarse pose.
+TEST_F(MapperStageTest, ImagesThatNothingHoldsAreLeftOut) {
+  for (uint64_t seed = 1; seed <= 2; ++seed) {
+    MapperWorldOptions options;
+    options.world.num_images = 60;
+    options.world.seed = seed;
+    options.world.num_blackouts = 1;
+    options.world.blackout_num_images = 3;
+    options.priors.enabled = false;
+    const MapperWorld world = BuildMapperWorld(options);
+    const auto poses = Run(world);
+    for (const auto& [image_id, image] : world.data.images) {
+      EXPECT_EQ(poses.count(image_id), image.keypoints.empty() ? 0 : 1)
+          << image.name;
+    }
+    EXPECT_EQ(summary_.refine.num_images_left_out, 3);
+  }
+}
+
 TEST_F(MapperStageTest, ThreadsDoNotChangeTheResult) {
   MapperWorldOptions options;
   options.world.num_images = 80;

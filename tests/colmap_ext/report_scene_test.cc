@@ -19,12 +19,16 @@
 namespace adasfm {
 namespace {
 
+SyntheticWorld BuildWorld(uint64_t seed) {
+  SyntheticWorldOptions options;
+  options.seed = seed;
+  options.num_images = 30;
+  return BuildSyntheticWorld(options);
+}
+
 TEST(ReportScene, PriorsWithoutErrorFollowTheModel) {
   for (const uint64_t seed : {1, 2, 3}) {
-    SyntheticWorldOptions options;
-    options.seed = seed;
-    options.num_images = 30;
-    const SyntheticWorld world = BuildSyntheticWorld(options);
+    const SyntheticWorld world = BuildWorld(seed);
     const colmap::Reconstruction model = MakeModel(world, 1, 0.0);
     SyntheticPriorOptions exact;
     exact.rotation_sigma_rad = exact.translation_sigma_m = 0.0;
@@ -49,10 +53,7 @@ TEST(ReportScene, PriorsWithoutErrorFollowTheModel) {
 
 TEST(ReportScene, TheTruthComesIntoTheModelsWorld) {
   for (const uint64_t seed : {1, 2, 3}) {
-    SyntheticWorldOptions options;
-    options.seed = seed;
-    options.num_images = 30;
-    const SyntheticWorld world = BuildSyntheticWorld(options);
+    const SyntheticWorld world = BuildWorld(seed);
     Random random(seed);
     const Eigen::Quaterniond turn = ExpSo3(random.GaussianVector(1.0));
     const Eigen::Vector3d shift = random.GaussianVector(50.0);

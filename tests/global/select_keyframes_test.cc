@@ -80,6 +80,12 @@ TEST(SelectKeyframes, KeepsImagesThatNothingCarries) {
   EXPECT_EQ(keyframes.count(20), 1);
   EXPECT_EQ(keyframes.count(21), 1);
   EXPECT_LT(keyframes.size(), kNumImages / 2);
+  // Priors in a circle begin nowhere.
+  priors = Priors(kComplete);
+  priors.push_back(priors.back());
+  priors.back().image_id1 = kNumImages;
+  priors.back().image_id2 = 1;
+  EXPECT_EQ(SelectKeyframes(options, Images(), Tracks(10), priors), Images());
 }
 
 TEST(SelectKeyframes, KeepsImagesWhereFewPointsReachAcross) {

@@ -13,6 +13,12 @@
 namespace adasfm {
 namespace {
 
+std::vector<Track> BuildTracks(
+    const TrackOptions& options,
+    const std::map<ImagePair, std::vector<FeatureMatch>>& matches) {
+  return SelectTracks(options, JoinMatches(options, matches));
+}
+
 // Images 1 2 3; keypoint 0 everywhere is one point, and a wrong match would
 // join keypoint 5 of image 3 to it:
 //   1:0 - 2:0 - 3:0      2:0 - 3:5 (in a pair with fewer matches, so later)

@@ -52,4 +52,15 @@ void RequireAscending(const Log& log) {
   }
 }
 
+// And every number in an accepted IMU log is finite.
+template <typename Log>
+void RequireSoundImuLog(const Log& log) {
+  RequireAscending(log);
+  if (!log.ok()) return;
+  for (const auto& sample : *log) {
+    Require(sample.angular_velocity.allFinite());
+    Require(sample.specific_force.allFinite());
+  }
+}
+
 }  // namespace adasfm

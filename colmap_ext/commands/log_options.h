@@ -1,0 +1,26 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include "colmap_ext/commands/command.h"
+
+namespace adasfm {
+
+// --image_times_path, --imu_path and --wheel_path, for every command that reads
+// logs. Paths has members of these names.
+template <typename Paths>
+void AddLogOptions(Paths* paths, CommandOptions* command) {
+  command->AddDefault("image_times_path", &paths->image_times_path,
+                      "times of the images: EuRoC data.csv, 4Seasons times.txt "
+                      "or TUM rgb.txt; when empty, the names' digits are "
+                      "nanoseconds");
+  command->AddDefault(
+      "imu_path", &paths->imu_path,
+      "IMU log: EuRoC CSV, 4Seasons imu.txt, a KITTI oxts folder "
+      "or a ROS 1 bag; none when empty");
+  command->AddDefault(
+      "wheel_path", &paths->wheel_path,
+      "wheel log, told apart by its header line, a TUM odometry "
+      "trajectory or a ROS 1 bag with one; none when empty");
+}
+
+}  // namespace adasfm
