@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "colmap_ext/dataset_files.h"
 
+#include <cmath>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
@@ -15,7 +16,7 @@ namespace {
 bool ParseNumber(const std::string& word, double* value) {
   char* end = nullptr;
   *value = std::strtod(word.c_str(), &end);
-  return end != word.c_str() && *end == '\0';
+  return end != word.c_str() && *end == '\0' && std::isfinite(*value);
 }
 
 }  // namespace
@@ -26,6 +27,10 @@ bool PathExists(const std::string& path) {
 }
 
 void RequireFile(const std::string& path) {
+  std::error_code error;
+  if (std::filesystem::file_size(path, error) == 0 && !error) {
+    throw std::runtime_error(path + " is empty");
+  }
   if (PathExists(path)) return;
   throw std::runtime_error(path +
                            " is missing; is --image_path the recording's root "
@@ -82,6 +87,15 @@ const std::vector<double>& FindNumbers(
                              std::to_string(count) + " numbers");
   }
   return entry->second;
+}
+
+Eigen::Matrix3d RequireRotation(const Eigen::Matrix3d& matrix,
+                                const std::string& path) {
+  if (!(matrix * matrix.transpose()).isIdentity(1e-3) ||
+      !(matrix.determinant() > 0.0)) {
+    throw std::runtime_error(path + ": a transform is not a rotation");
+  }
+  return matrix;
 }
 
 std::string JoinNumbers(const std::vector<double>& numbers) {

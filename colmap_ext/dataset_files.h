@@ -13,13 +13,13 @@ namespace adasfm {
 // Helpers to read the calibration files of known datasets. What is wrong with a
 // file is thrown as std::runtime_error, with a message for the user.
 
-// Throws unless the file (or folder) exists.
+// Throws unless the folder, or the file with something in it, exists.
 void RequireFile(const std::string& path);
 bool PathExists(const std::string& path);
 
 std::string ReadText(const std::string& path);
 
-// All numbers of a text, in order; throws for a word that is none.
+// All numbers of a text, in order; throws for a word that is no finite number.
 std::vector<double> NumbersFromText(const std::string& text,
                                     const std::string& path);
 
@@ -31,6 +31,10 @@ std::map<std::string, std::vector<double>> ReadKeyedNumbers(
 const std::vector<double>& FindNumbers(
     const std::map<std::string, std::vector<double>>& values,
     const std::string& key, size_t count, const std::string& path);
+
+// The matrix itself; throws unless it is a rotation.
+Eigen::Matrix3d RequireRotation(const Eigen::Matrix3d& matrix,
+                                const std::string& path);
 
 // "a,b,c" with all digits.
 std::string JoinNumbers(const std::vector<double>& numbers);

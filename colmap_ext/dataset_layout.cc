@@ -44,12 +44,8 @@ Rigid3d RigidFromNumbers(const std::vector<double>& numbers,
   }
   const Eigen::Map<const Eigen::Matrix<double, 4, 4, Eigen::RowMajor>> matrix(
       numbers.data());
-  const Eigen::Matrix3d rotation = matrix.topLeftCorner<3, 3>();
-  if (!(rotation * rotation.transpose()).isIdentity(1e-3) ||
-      !(rotation.determinant() > 0.0)) {
-    throw std::runtime_error(path + ": a transform is not a rotation");
-  }
-  return Rigid3d(rotation, Eigen::Vector3d(matrix.topRightCorner<3, 1>()));
+  return Rigid3d(RequireRotation(matrix.topLeftCorner<3, 3>(), path),
+                 Eigen::Vector3d(matrix.topRightCorner<3, 1>()));
 }
 
 // Camera of a calibration with Kalibr's or EuRoC's names of the models.
@@ -71,6 +67,14 @@ void SetCamera(const std::string& distortion_model,
                              " coefficients; 4 are expected");
   } else {
     const bool is_fisheye = distortion_model == "equidistant";
+    if (!is_fisheye && distortion_model != "radial-tangential" &&
+        distortion_model != "radtan") {
+      throw std::runtime_error(path +
+                               ": distortion_model = " + distortion_model +
+                               " must be radial-tangential or equidistant; "
+                               "give --camera_model and --camera_params "
+                               "without --data_format");
+    }
     layout->camera_model = is_fisheye ? "OPENCV_FISHEYE" : "OPENCV";
     params.insert(params.end(), distortion.begin(), distortion.end());
   }

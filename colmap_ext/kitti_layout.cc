@@ -26,13 +26,15 @@ std::string FindCamera(const std::string& root, const std::string& colour,
   return PathExists(root + "/image_" + colour) ? colour : grey;
 }
 
-// The images of a folder by name.
-std::vector<std::string> ListFiles(const std::string& folder) {
+// The numbered images of a folder, by name; what a file manager left there is
+// none.
+std::vector<std::string> ListImages(const std::string& folder) {
   RequireFile(folder);
   std::vector<std::string> names;
   for (const auto& entry : std::filesystem::directory_iterator(folder)) {
-    if (entry.is_regular_file()) {
-      names.push_back(entry.path().filename().string());
+    const std::string name = entry.path().filename().string();
+    if (entry.is_regular_file() && name[0] >= '0' && name[0] <= '9') {
+      names.push_back(name);
     }
   }
   std::sort(names.begin(), names.end());
@@ -48,15 +50,21 @@ void SetCamera(const ProjectionMatrix& projection, DatasetLayout* layout) {
                    projection(1, 2) + 0.5});
 }
 
+// Nine numbers, row by row.
+Eigen::Matrix3d ToRotation(const std::vector<double>& numbers,
+                           const std::string& path) {
+  return RequireRotation(
+      Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(
+          numbers.data()),
+      path);
+}
+
 Rigid3d ReadRigid(const std::string& path) {
   const KeyedNumbers values = ReadKeyedNumbers(path);
   const std::vector<double>& rotation = FindNumbers(values, "R", 9, path);
   const std::vector<double>& translation = FindNumbers(values, "T", 3, path);
-  return Rigid3d(
-      Eigen::Matrix3d(
-          Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(
-              rotation.data())),
-      Eigen::Vector3d(translation.data()));
+  return Rigid3d(ToRotation(rotation, path),
+                 Eigen::Vector3d(translation.data()));
 }
 
 ProjectionMatrix ToProjection(const std::vector<double>& numbers) {
@@ -108,7 +116,7 @@ std::string BuildImageTimes(const std::string& times_path,
   const std::vector<timestamp_t> times = ReadTimes(times_path);
   std::ostringstream text;
   text << "#timestamp [ns],filename\n";
-  for (const std::string& name : ListFiles(image_path)) {
+  for (const std::string& name : ListImages(image_path)) {
     const size_t index = std::strtoul(name.c_str(), nullptr, 10);
     if (index >= times.size()) {
       throw std::runtime_error(times_path + " has " +
@@ -131,11 +139,8 @@ Rigid3d RectifiedFromCam0(const KeyedNumbers& values, const std::string& camera,
   if (!(std::abs(calibration.determinant()) > 0.0)) {
     throw std::runtime_error(path + ": P_rect_" + camera + " is singular");
   }
-  return Rigid3d(
-      Eigen::Matrix3d(
-          Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(
-              rotation.data())),
-      Eigen::Vector3d(calibration.inverse() * projection.col(3)));
+  return Rigid3d(ToRotation(rotation, path),
+                 Eigen::Vector3d(calibration.inverse() * projection.col(3)));
 }
 
 }  // namespace
@@ -180,7 +185,7 @@ StatusOr<DatasetLayout> FindKittiOdometryLayout(const std::string& root) {
   const std::string times_path = root + "/times.txt";
   const std::vector<double> times =
       NumbersFromText(ReadText(times_path), times_path);
-  const std::vector<std::string> names = ListFiles(layout.image_path);
+  const std::vector<std::string> names = ListImages(layout.image_path);
   std::ostringstream text;
   text << "#timestamp [ns],filename\n";
   for (const std::string& name : names) {

@@ -43,6 +43,24 @@ class LayoutTest : public testing::Test {
         << layout.status().message();
   }
 
+  // Each of the files must be named when it is missing, and when it is empty.
+  void ExpectErrorWithout(const std::string& format, const std::string& root,
+                          const std::vector<std::string>& files) {
+    for (const std::string& name : files) {
+      const std::string path = folder_.File(name), kept = path + ".kept";
+      const std::string last = fs::path(name).filename();
+      fs::rename(path, kept);
+      ExpectError(format, root, last + " is missing");
+      if (fs::is_regular_file(kept)) {
+        folder_.Write(name, "");
+        ExpectError(format, root, last);
+        fs::remove(path);
+      }
+      fs::rename(kept, path);
+    }
+    Find(format, root);
+  }
+
   SensorCalibration ReadSensors(const DatasetLayout& layout) {
     const StatusOr<SensorCalibration> calibration = ReadSensorCalibration(
         folder_.Write("sensors.yaml", layout.sensors_text));
@@ -118,9 +136,16 @@ TEST_F(LayoutTest, Euroc) {
     EXPECT_EQ(sensors.imu_noise.gyroscope_noise_density, 1.5e-4);
     EXPECT_EQ(sensors.imu_noise.accelerometer_random_walk, 3.0e-3);
   }
+  ExpectErrorWithout("euroc", "r",
+                     {"r/mav0/cam0/data", "r/mav0/cam0/data.csv",
+                      "r/mav0/cam0/sensor.yaml", "r/mav0/imu0/sensor.yaml"});
   ExpectError("kitti", "r", "calib.txt is missing");
   ExpectError("euroc", "nowhere", "cam0/data is missing");
   ExpectError("rosbag", "r", "must be euroc, 4seasons, kitti or tum");
+  Write("r/mav0/cam0/sensor.yaml",
+        "distortion_model: fov\nintrinsics: [1, 1, 0, 0]\n"
+        "distortion_coefficients: [1, 0, 0, 0]\n");
+  ExpectError("euroc", "r", "distortion_model = fov");
   Write("r/mav0/cam0/sensor.yaml", "T_BS: [1, 2\n");
   ExpectError("euroc", "r", "cam0/sensor.yaml");
 }
@@ -148,6 +173,10 @@ TEST_F(LayoutTest, FourSeasons) {
   const SensorCalibration sensors = ReadSensors(layout);
   ExpectNear(sensors.cam_from_imu, cam_from_imu);
   EXPECT_EQ(sensors.timeshift_cam_imu_s, 0.0125);
+  ExpectErrorWithout(
+      "4seasons", "day/recording",
+      {"day/recording/times.txt", "day/calibration/camchain.yaml",
+       "day/calibration/undistorted_calib_0.txt"});
   // Without the undistorted images the distorted ones are used.
   fs::remove_all(folder_.File("day/recording/undistorted_images"));
   layout = Find("4seasons", "day/recording");
@@ -217,6 +246,14 @@ TEST_F(KittiTest, RawDrive) {
   EXPECT_EQ((*times)[0].timestamp_ns, (*imu)[0].timestamp_ns);
   EXPECT_EQ((*times)[1].timestamp_ns, (*imu)[1].timestamp_ns + 1);
   EXPECT_EQ((*times)[1].name, "0000000001.png");
+  ExpectErrorWithout(
+      "kitti", drive,
+      {drive + "image_02/data", drive + "image_02/timestamps.txt",
+       drive + "oxts/timestamps.txt", "2011_09_26/calib_cam_to_cam.txt",
+       "2011_09_26/calib_velo_to_cam.txt", "2011_09_26/calib_imu_to_velo.txt"});
+  Write("2011_09_26/calib_imu_to_velo.txt", "R: 0 0 0 0 0 0 0 0 0\nT: 0 0 0\n");
+  ExpectError("kitti", drive, "calib_imu_to_velo.txt: a transform is not a");
+  WriteRigid("2011_09_26/calib_imu_to_velo.txt", velo_from_imu);
   Write(drive + "image_02/data/0000000009.png", "");
   ExpectError("kitti", drive, "none for the photo 0000000009.png");
 }
@@ -224,6 +261,7 @@ TEST_F(KittiTest, RawDrive) {
 TEST_F(KittiTest, OdometrySequence) {
   Write("sequences/07/image_0/000000.png", "");
   Write("sequences/07/image_0/000001.png", "");
+  Write("sequences/07/image_0/.DS_Store", "");
   Write("sequences/07/calib.txt",
         "P0: 707.5 0 601.5 0 0 707.25 183.25 0 0 0 1 0\n"
         "P2: 1 0 0 0 0 1 0 0 0 0 1 0\n");
@@ -235,8 +273,14 @@ TEST_F(KittiTest, OdometrySequence) {
   const StatusOr<std::vector<ImageTime>> times =
       ReadImageTimes(folder_.Write("times.csv", layout.image_times_text));
   ASSERT_TRUE(times.ok()) << times.status().message();
+  ASSERT_EQ(times->size(), 2);
   EXPECT_EQ(times->at(1).name, "000001.png");
   EXPECT_EQ(times->at(1).timestamp_ns, 103750000);
+  ExpectErrorWithout("kitti", "sequences/07",
+                     {"sequences/07/image_0", "sequences/07/calib.txt",
+                      "sequences/07/times.txt"});
+  Write("sequences/07/times.txt", "0.0 nan\n");
+  ExpectError("kitti", "sequences/07", "'nan' is not a number");
   Write("sequences/07/calib.txt", "P0: 1 2 3\n");
   ExpectError("kitti", "sequences/07", "12 numbers");
 }
@@ -249,6 +293,7 @@ TEST_F(LayoutTest, Tum) {
   EXPECT_TRUE(fs::is_directory(layout.image_path));
   EXPECT_TRUE(ReadImageTimes(layout.image_times_path).ok());
   EXPECT_TRUE(layout.camera_params.empty());
+  ExpectErrorWithout("tum", "desk", {"desk/rgb", "desk/rgb.txt"});
 }
 
 }  // namespace
