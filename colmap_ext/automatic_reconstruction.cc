@@ -128,12 +128,14 @@ Status Reconstructor::ExtractAll(const std::vector<std::string>& names) {
        << images->num_cameras
        << (images->num_cameras == 1 ? " camera" : " cameras");
   if (options_.features.camera_params.empty()) {
-    text << ", focal lengths from EXIF: " << images->num_known_focal_lengths;
+    text << ", focal lengths from EXIF: " << images->num_known_focal_lengths
+         << ", guessed: "
+         << images->num_cameras - images->num_known_focal_lengths;
   }
   message_(text.str());
   if (!images->unreadable.empty()) {
-    Warn({std::to_string(images->unreadable.size()) +
-          " files are not images (the first one is " +
+    Warn({"not images: " + std::to_string(images->unreadable.size()) + " of " +
+          std::to_string(names.size()) + " files (the first one is " +
           images->unreadable.front() + ")"});
   }
   return ExtractFeatures(
@@ -146,7 +148,7 @@ Status Reconstructor::ExtractAll(const std::vector<std::string>& names) {
 
 Status Reconstructor::Features() {
   const StatusOr<std::vector<std::string>> names =
-      ListFilesRecursively(paths_.image_path);
+      ListFilesRecursively(paths_.image_path, paths_.workspace_path);
   if (!names.ok()) return names.status();
   if (names->empty()) {
     return Status::Error("the folder " + paths_.image_path +

@@ -77,7 +77,7 @@ std::string DigestFiles(const std::string& folder,
 }
 
 StatusOr<std::vector<std::string>> ListFilesRecursively(
-    const std::string& folder) {
+    const std::string& folder, const std::string& excluded) {
   std::error_code error;
   if (!fs::is_directory(folder, error)) {
     return Status::Error("the folder " + folder +
@@ -89,11 +89,15 @@ StatusOr<std::vector<std::string>> ListFilesRecursively(
   for (; !error && entry != fs::recursive_directory_iterator();
        entry.increment(error)) {
     const bool is_hidden = entry->path().filename().string()[0] == '.';
-    if (is_hidden) {
-      if (entry->is_directory()) entry.disable_recursion_pending();
+    if (entry->is_directory()) {
+      std::error_code none;
+      if (is_hidden || (!excluded.empty() &&
+                        fs::equivalent(entry->path(), excluded, none))) {
+        entry.disable_recursion_pending();
+      }
       continue;
     }
-    if (!entry->is_regular_file()) continue;
+    if (is_hidden || !entry->is_regular_file()) continue;
     names.push_back(entry->path().lexically_relative(folder).generic_string());
   }
   if (error) {

@@ -24,8 +24,8 @@ std::string DigestFiles(const std::string& folder,
                         const std::vector<std::string>& names);
 
 // The regular files below a folder, hidden ones left out, as paths relative to
-// it, sorted.
+// it, sorted; without those in `excluded`, a folder that may lie in it.
 StatusOr<std::vector<std::string>> ListFilesRecursively(
-    const std::string& folder);
+    const std::string& folder, const std::string& excluded = "");
 
 }  // namespace adasfm

@@ -2,6 +2,7 @@
 #include "colmap_ext/prepare_reconstruction.h"
 
 #include <algorithm>
+#include <filesystem>
 #include <fstream>
 #include <sstream>
 #include <string>
@@ -62,6 +63,12 @@ Status PrepareReconstruction(AutomaticReconstructionOptions* options,
   if (!paths->data_format.empty()) {
     const Status status = ApplyLayout(options, paths);
     if (!status.ok()) return status;
+  }
+  std::error_code none;
+  if (std::filesystem::equivalent(paths->image_path, paths->workspace_path,
+                                  none)) {
+    return Status::Error("the workspace " + paths->workspace_path +
+                         " is the folder of the photos; choose another one");
   }
   if (HasSensors(*paths) && paths->sensors_path.empty()) {
     return Status::Error(

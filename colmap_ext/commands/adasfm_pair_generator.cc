@@ -5,6 +5,7 @@
 #include "colmap_ext/commands/pair_options.h"
 #include "colmap_ext/commands/progress_display.h"
 #include "colmap_ext/commands/registry.h"
+#include "colmap_ext/host/database.h"
 #include "colmap_ext/output_files.h"
 #include "colmap_ext/select_pairs.h"
 #include "core/check_options.h"
@@ -35,6 +36,10 @@ Status RunAdasfmPairGenerator(int argc, char** argv) {
   if (!parsed.ok() || command.HelpShown()) return parsed;
   const Status valid = CheckOptions(options);
   if (!valid.ok()) return valid;
+  // A name that no list can hold is better known before the search.
+  Status names = CheckDatabase(database_path);
+  if (names.ok()) names = FormatPairList({}, database_path).status();
+  if (!names.ok()) return names;
 
   ProgressDisplay display;
   const StatusOr<PairSelection> selection =

@@ -131,6 +131,26 @@ TEST_F(AutomaticTest, PhotosAndSensorsThenAgainThenWithOtherOptions) {
   ExpectModel();
 }
 
+TEST_F(AutomaticTest, TheWorkspaceMayLieAmongThePhotos) {
+  const std::string photos = folder_.File("phötos of a day");
+  fs::copy(drive_->File("images"), photos);
+  std::ofstream(photos + "/notes.txt") << "no photo";
+  workspace_ = photos + "/work space";
+  const std::string command = "adasfm_automatic_reconstructor --image_path '" +
+                              photos + "' --workspace_path '" + workspace_ +
+                              "'" + " --camera_model PINHOLE --camera_params " +
+                              camera_params_ + " --max_num_features 400";
+  Run run = ExpectSuccess(command);
+  EXPECT_TRUE(Contains(run.out, "not images: 1 of ")) << run.out;
+  ExpectModel();
+  // What it wrote is taken for no photo.
+  run = ExpectSuccess(command);
+  EXPECT_TRUE(Contains(run.out, "features: done before")) << run.out;
+  ExpectError("adasfm_automatic_reconstructor --image_path '" + photos +
+                  "' --workspace_path '" + photos + "/../phötos of a day'",
+              "is the folder of the photos");
+}
+
 TEST_F(AutomaticTest, RestartDoesAllAnew) {
   ExpectSuccess(Photos());
   const std::string kept = workspace_ + "/notes.txt";

@@ -281,14 +281,15 @@ TEST_F(SelectPairsTest, WrongInputIsOneLine) {
               "one of them must be positive");
   {
     SqliteConnection database(database_, SqliteConnection::Mode::kWrite);
-    database.Execute("UPDATE images SET name = 'a b.png' WHERE image_id = 1");
-  }
-  ExpectError(call + database_, "'a b.png' has a space");
-  {
-    SqliteConnection database(database_, SqliteConnection::Mode::kWrite);
     database.Execute("DELETE FROM descriptors");
   }
   ExpectError(call + database_, "feature_extractor");
+  // Names are looked at before descriptors.
+  {
+    SqliteConnection database(database_, SqliteConnection::Mode::kWrite);
+    database.Execute("UPDATE images SET name = 'a b.png' WHERE image_id = 1");
+  }
+  ExpectError(call + database_, "'a b.png' has a space");
 }
 
 // Features and matches of learned models come in through COLMAP's own
