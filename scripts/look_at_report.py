@@ -153,6 +153,17 @@ def check_space(browser):
         'document.getElementById("space").dispatchEvent(new WheelEvent('
         '"wheel", {deltaY: -80, ctrlKey: true, cancelable: true}))')
     is_new('the wheel')
+    browser.execute_script('''
+      const canvas = document.getElementById("space");
+      canvas.setPointerCapture = () => {};  // no finger is there to capture
+      const touch = (name, id, x) => canvas.dispatchEvent(new PointerEvent(
+        name, {pointerId: id, clientX: x, clientY: 50}));
+      touch("pointerdown", 91, 100);
+      touch("pointerdown", 92, 180);
+      touch("pointermove", 92, 120);
+      touch("pointerup", 91, 100);
+      touch("pointerup", 92, 120);''')
+    is_new('pinching')
     canvas.send_keys(webdriver.Keys.ARROW_LEFT)
     is_new('an arrow key')
     browser.find_element(By.ID, 'show-points').click()

@@ -1,16 +1,21 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: BSD-3-Clause
-# Makes the pictures of the report in docs/images/ from the demo's drive, which it
-# runs unless the folder is there.
+# Makes the pictures of the report from the demo's drive, which it runs unless the
+# folder is there.
 #
-#   scripts/screenshots.sh [DEMO_FOLDER]      default: adasfm-demo/
+#   scripts/screenshots.sh [DEMO_FOLDER [PICTURES]]
+#                                 default: adasfm-demo/ and docs/images/
+#
+# Environment: COLMAP, an executable that is built already (default: setup.sh's).
 set -euo pipefail
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
 demo=${1:-adasfm-demo}
+pictures=$(realpath -m "${2:-$root/docs/images}")
 
-"$root/scripts/setup.sh" --for-tests
-[ -e "$demo/sparse/0" ] || "$root/scripts/demo.sh" "$demo"
-colmap=${ADASFM_BUILD_DIR:-$root/build}/bin/colmap
+colmap=${COLMAP:-${ADASFM_BUILD_DIR:-$root/build}/bin/colmap}
+[ -n "${COLMAP:-}" ] || "$root/scripts/setup.sh" --for-tests
+[ -e "$demo/global/0" ] || "$root/scripts/demo.sh" "$demo"
+colmap=$(realpath "$colmap")
 # Several parts, to show their colours; from inside the folder, as the page names
 # the paths that it was made from.
 cd "$demo"
@@ -23,4 +28,4 @@ cd "$demo"
   --coarse_path global/0 --database_path database.db --image_path images \
   --ground_truth_path gt.txt
 /usr/bin/python3 "$root/scripts/look_at_report.py" parts.html \
-  --screenshots "$root/docs/images"
+  --screenshots "$pictures"

@@ -15,22 +15,19 @@ done
 "$colmap" adasfm_synthesizer --output_path "$work" --num_images 150 \
   --spacing 2 --num_keypoints 100 --alias_ratio 0.05 > /dev/null
 # Photos are any picture; OpenCV goes by the content and not by the name.
-mkdir "$work/photos"
+mkdir "$work/images"
 sqlite3 "$work/database.db" 'SELECT name FROM images' | while read -r name; do
   { printf 'P6 80 50 255\n'; head -c 12000 /dev/zero | tr '\0' '\140'; } \
-    > "$work/photos/$name"
+    > "$work/images/$name"
 done
 "$colmap" adasfm_prior_importer --database_path "$work/database.db" \
   --image_times_path "$work/times.csv" --imu_path "$work/imu.csv" \
   --wheel_path "$work/wheel.csv" --sensors_path "$work/sensors.yaml" > /dev/null
 "$colmap" adasfm_global --database_path "$work/database.db" \
   --output_path "$work/global" > /dev/null
-"$colmap" adasfm_mapper --database_path "$work/database.db" \
-  --input_path "$work/global/0" --output_path "$work/sparse" \
-  --AdaSfmPartition.max_num_images_undivided 30 \
-  --AdaSfmPartition.max_part_size 30 > /dev/null
-"$colmap" adasfm_reporter --output_path "$work/report.html" \
-  --input_path "$work/sparse/0" --coarse_path "$work/global/0" \
-  --database_path "$work/database.db" --image_path "$work/photos" \
-  --ground_truth_path "$work/gt.txt" > /dev/null
-/usr/bin/python3 "$root/scripts/look_at_report.py" "$work/report.html"
+# Reports on several parts, checks them, and takes the documentation's pictures.
+COLMAP=$colmap "$root/scripts/screenshots.sh" "$work" "$work/pictures"
+for picture in "$root"/docs/images/report_*; do
+  [ -s "$work/pictures/$(basename "$picture")" ] ||
+    { echo "screenshots.sh does not make $picture"; exit 1; }
+done
