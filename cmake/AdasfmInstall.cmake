@@ -67,16 +67,17 @@ install(FILES ${launcher_link}
         DESTINATION ${CMAKE_INSTALL_LIBDIR}/adasfm/bin COMPONENT runtime)
 
 find_package(Python3 REQUIRED COMPONENTS Interpreter)
-set(man_page ${PROJECT_BINARY_DIR}/install/colmap-adasfm.1.gz)
+set(man_folder ${PROJECT_BINARY_DIR}/install/man1)
+set(man_page ${man_folder}/colmap-adasfm.1.gz)
 add_custom_command(
   OUTPUT ${man_page}
   COMMAND Python3::Interpreter ${PROJECT_SOURCE_DIR}/packaging/make_man_page.py
-          $<TARGET_FILE:adasfm_launcher> ${PROJECT_VERSION} ${man_page}
+          $<TARGET_FILE:adasfm_launcher> ${PROJECT_VERSION} ${man_folder}
   DEPENDS adasfm_launcher ${PROJECT_SOURCE_DIR}/packaging/make_man_page.py
           ${PROJECT_SOURCE_DIR}/packaging/command_help.py
-  COMMENT "Writing the manual page from the commands' own help")
+  COMMENT "Writing the manual pages from the commands' own help")
 add_custom_target(adasfm_man_page ALL DEPENDS ${man_page})
-install(FILES ${man_page} DESTINATION ${CMAKE_INSTALL_MANDIR}/man1
+install(DIRECTORY ${man_folder} DESTINATION ${CMAKE_INSTALL_MANDIR}
         COMPONENT runtime)
 install(FILES ${PROJECT_SOURCE_DIR}/packaging/colmap-adasfm.bash
         DESTINATION ${CMAKE_INSTALL_DATADIR}/bash-completion/completions

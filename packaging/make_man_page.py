@@ -1,8 +1,9 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSD-3-Clause
-"""Writes the manual page from the commands' own help, so that it cannot go
-stale: make_man_page.py COLMAP VERSION OUTPUT.1.gz"""
+"""Writes the manual page, and one of each command, from the commands' own help,
+so that they cannot go stale: make_man_page.py COLMAP VERSION FOLDER"""
 import gzip
+import pathlib
 import re
 import sys
 
@@ -80,24 +81,41 @@ def format_option(option):
     return '.TP\n%s\n%s\n' % (name, escape(option.help or ' '))
 
 
-def main():
-    colmap, version, output = sys.argv[1:]
+def make_command_page(command):
+    """A page of its own, for `man adasfm_mapper`."""
+    name = escape(command.name)
+    page = '.SH NAME\n%s \\- %s\n' % (name, escape(command.summary))
+    page += '.SH SYNOPSIS\n.B colmap\\-adasfm %s\n' % name
+    page += '.RI [ \\-\\-option\n.IR value ]...\n'
+    page += '.SH DESCRIPTION\n%s\n' % escape(command.description)
+    page += '.SH OPTIONS\nDefaults stand in parentheses.\n'
+    page += ''.join(map(format_option, command.options))
+    return page + '.SH SEE ALSO\n.BR colmap\\-adasfm (1)\n'
+
+
+def write_page(folder, name, version, text):
     page = '.\\" Made from the commands\' own help.\n'
-    page += '.TH COLMAP\\-ADASFM 1 "" "adasfm %s" "User commands"\n' % version
-    page += INTRODUCTION
-    page += '.SH COMMANDS\nDefaults stand in parentheses.\n'
+    page += '.TH %s 1 "" "adasfm %s" "User commands"\n' % (
+        escape(name.upper()), version)
+    # Without a time stamp, the same page is the same file.
+    with gzip.GzipFile(folder / (name + '.1.gz'), 'wb', 9, mtime=0) as file:
+        file.write((page + text).encode())
+
+
+def main():
+    colmap, version, folder = sys.argv[1:]
+    folder = pathlib.Path(folder)
+    folder.mkdir(parents=True, exist_ok=True)
     commands = read_commands(colmap)
     if not commands:
         sys.exit('make_man_page.py: %s lists no commands' % colmap)
+    page = INTRODUCTION + '.SH COMMANDS\nDefaults stand in parentheses.\n'
     for command in commands:
         page += '.SS %s\n%s\n' % (escape(command.name),
                                   escape(command.description))
-        for option in command.options:
-            page += format_option(option)
-    page += END
-    # Without a time stamp, the same page is the same file.
-    with gzip.GzipFile(output, 'wb', 9, mtime=0) as file:
-        file.write(page.encode())
+        page += ''.join(map(format_option, command.options))
+        write_page(folder, command.name, version, make_command_page(command))
+    write_page(folder, 'colmap-adasfm', version, page + END)
 
 
 if __name__ == '__main__':

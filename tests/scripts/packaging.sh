@@ -54,10 +54,13 @@ for command in $commands; do
   [ "$(wc -l <<< "$options")" -ge 4 ] || fail "$command has no options"
   complete_words "$program" "$command" -- > "$work/offered"
   sed -n "/^\.SS $command$/,/^\.S[SH] /p" "$work/page" > "$work/section"
+  zcat "$work/root/share/man/man1/$command.1.gz" | sed 's/\\-/-/g' > "$work/own-page"
   for option in $options; do
     grep -qxe "$option" "$work/offered" || fail "$command $option is not completed"
     grep -qFe "\\fB$option\\fR" "$work/section" ||
       fail "$command $option is not in the manual"
+    grep -qFe "\\fB$option\\fR" "$work/own-page" ||
+      fail "$command $option is not in its own manual page"
   done
 done
 
