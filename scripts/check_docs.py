@@ -8,9 +8,11 @@ Every `colmap` command of the text must exist and have the options that it is
 shown with; every `--option` and `Group.option` named anywhere must exist; links
 to files must lead somewhere; and each option's help must explain it, with a unit
 and a default. Blocks of commands are ```sh, which --run runs in the order of the
-text, on a small rendered drive that lies in the folder under the names the
-documentation uses; or ```console REASON, which are shown only, and listed.
-```python is run as well where the modules that it wants are installed."""
+text, in a stand-in for a checkout, with a small rendered drive under the names
+that the documentation uses; SMALLER lists the arguments that keep this short.
+```console REASON is shown only, and listed. ```python is run as well where the
+modules that it wants are installed, ```cmake in a project of its own against what
+`cmake --install` has installed before."""
 import argparse
 import importlib.util
 import os
@@ -25,22 +27,41 @@ import time
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT / 'packaging'))
 from command_help import read_commands, read_host_options  # noqa: E402
-from docs_drive import make_drive  # noqa: E402
+from docs_drive import (  # noqa: E402
+    make_checkout, make_drive, write_program)
 
 # Options of other programs that the text may name; those of our scripts are read
 # from them.
 OTHER_OPTIONS = {
-    'import_path', 'Group.name', 'option', 'install', 'prefix', 'bag',
-    'topics', 'models', 'cam', 'imu', 'target', 'build', 'host',
-    'benchmark_filter'}
+    'Group.name', 'option', 'install', 'prefix', 'build', 'target', 'simulate'}
 # What the first word of a shown command may be, besides ours and paths in this
 # repository.
 OTHER_PROGRAMS = {
-    'cmake', 'export', 'sudo', 'cd', 'cp', 'cpack', 'mkdir', 'rosrun',
-    'sqlite3'}
+    'cmake', 'export', 'sudo', 'cd', 'cp', 'cpack', 'mkdir', 'sqlite3'}
 COMMAND = re.compile(
-    r'((colmap|colmap-adasfm|cmake|cpack|sudo|rosrun)\s|scripts/\w'
+    r'((colmap|colmap-adasfm|cmake|cpack|sudo)\s|scripts/\w'
     r'|[\w./$"-]*/bin/\w)')
+# What is appended to a command when it is run, so that it takes seconds.
+SMALLER = {
+    'scripts/benchmark.sh': '--max_num_images 100 --methods limit',
+    'scripts/benchmark.py':
+        '--max_num_images 100 --methods adasfm_no_candidates',
+    'scripts/global_tables.py': '--sizes 100 --num_seeds 1',
+    'scripts/import_benchmark.py': '200',
+    'scripts/profile.sh': '20',
+    'scripts/setup.sh': '--configure-only',
+    'cmake --build build ': '--target adasfm_core',
+    'build-fuzz/bin/': '-max_total_time=2',
+    'sudo apt install': '--simulate',
+}
+# Run where nothing has been built yet.
+FRESH = re.compile(r'scripts/setup\.sh|cmake -[SB]')
+# Blocks that are left out, and said to be, where what they need is missing.
+NEEDS = [('clang++', ['clang++', '--version']),
+         ('profile.sh', ['perf', 'record', '-q', '-e', 'cpu-clock', '-o',
+                         '/dev/null', 'true'])]
+# What our program says when it was built without an optional library.
+NOT_BUILT = 'this build cannot read ROS bags'
 UNITS = {'px': r'\[px', 'deg': r'\[deg', 'm': r'\[m', 's': r'\[s',
          'm_s': r'\[m/s', 'hz': r'\[Hz', 'rad': r'\[rad', 'gb': r'\[GB'}
 
@@ -186,45 +207,106 @@ class Checker:
                         fail(where, 'has no unit in its help: ' + option.help)
 
 
-def run_block(folder, language, text, log):
-    """The exit code; None when it needs what is not installed."""
-    if language == 'python':
-        modules = re.findall(r'^import (\w+)', text, re.MULTILINE)
-        if not all(map(importlib.util.find_spec, modules)):
-            compile(text, 'block', 'exec')
-            return None
-        command = [sys.executable, '-c', text]
-    else:
-        command = ['bash', '-euo', 'pipefail', '-c', text]
-    environment = dict(os.environ, PATH='%s/bin:%s' %
-                       (folder, os.environ['PATH']))
-    with open(log, 'wb') as file:
-        return subprocess.run(command, cwd=folder, env=environment,
-                              stdout=file, stderr=file, check=False).returncode
+def make_smaller(line):
+    line = re.sub(r'\s+# .*', '', line)
+    for beginning, arguments in SMALLER.items():
+        if (line + ' ').startswith(beginning):
+            return line + ' ' + arguments
+    return line
+
+
+def is_there(command):
+    try:
+        return subprocess.run(command, stdout=subprocess.DEVNULL, check=False,
+                              stderr=subprocess.DEVNULL).returncode == 0
+    except FileNotFoundError:
+        return False
+
+
+class Runner:
+    """Runs blocks in a folder that looks like a checkout."""
+
+    def __init__(self, colmap, folder):
+        self.folder = folder
+        self.log = folder / 'log'
+        colmap = pathlib.Path(colmap).resolve()
+        build = colmap.parent.parent
+        make_checkout(ROOT, folder, build)
+        self.words = {'FX,FY,CX,CY': make_drive(colmap, folder)}
+        cache = (build / 'CMakeCache.txt').read_text()
+        self.words['PREFIX'] = re.search(
+            r'^COLMAP_DIR:\w+=(.*)/share/colmap$', cache, re.MULTILINE)[1]
+        programs = folder / 'programs'
+        programs.mkdir()
+        (programs / 'colmap').symlink_to(colmap)
+        # Nothing is installed into the system: neither by apt ...
+        write_program(programs / 'sudo', 'exec "$@"')
+        self.environment = dict(
+            os.environ, PATH='%s:%s' % (programs, os.environ['PATH']),
+            # ... nor by cmake --install.
+            DESTDIR=str(folder / 'installed'),
+            # The next run finds what this one compiled, wherever that was.
+            CCACHE_BASEDIR=str(folder), CCACHE_NOHASHDIR='1')
+        self.environment.pop('ADASFM_BUILD_DIR', None)
+
+    def call(self, command, folder):
+        with open(self.log, 'wb') as file:
+            return subprocess.run(command, cwd=folder, stdout=file,
+                                  stderr=file, env=self.environment,
+                                  check=False).returncode
+
+    def build_project(self, lines):
+        project = self.folder / 'mine'
+        project.mkdir()
+        (project / 'CMakeLists.txt').write_text('\n'.join(
+            ['cmake_minimum_required(VERSION 3.18)', 'project(mine CXX)',
+             'add_executable(mine main.cc)'] + lines))
+        (project / 'main.cc').write_text('int main() { return 0; }\n')
+        code = self.call(
+            ['cmake', '-S', '.', '-B', 'build', '-DCMAKE_PREFIX_PATH=%s' %
+             (self.folder / 'installed/usr/local'), '-DCOLMAP_DIR=%s' %
+             (self.words['PREFIX'] + '/share/colmap')], project)
+        return code or self.call(['cmake', '--build', 'build'], project)
+
+    def run(self, language, lines):
+        """The exit code, and why the block was left out."""
+        if language == 'python':
+            text = '\n'.join(lines)
+            modules = re.findall(r'^import (\w+)', text, re.MULTILINE)
+            if not all(map(importlib.util.find_spec, modules)):
+                return 0, 'its modules are not installed'
+            return self.call([sys.executable, '-c', text], self.folder), ''
+        if language == 'cmake':
+            return self.build_project(lines), ''
+        text = '\n'.join(map(make_smaller, read_lines(lines)))
+        for word, value in self.words.items():
+            text = text.replace(word, value)
+        for word, command in NEEDS:
+            if word in text and not is_there(command):
+                return 0, command[0] + ' cannot be used here'
+        folder = self.folder / 'fresh' if FRESH.search(text) else self.folder
+        code = self.call(['bash', '-euo', 'pipefail', '-c', text], folder)
+        if code and NOT_BUILT in self.log.read_text():
+            return 0, NOT_BUILT
+        return code, ''
 
 
 def run_blocks(colmap, files):
     with tempfile.TemporaryDirectory() as name:
-        folder = pathlib.Path(name)
-        camera = make_drive(colmap, folder)
-        (folder / 'bin').mkdir()
-        (folder / 'bin/colmap').symlink_to(pathlib.Path(colmap).resolve())
-        (folder / 'scripts').symlink_to(ROOT / 'scripts')
-        log = folder / 'log'
+        runner = Runner(colmap, pathlib.Path(name))
         for path in files:
             for number, language, lines in read_blocks(path):
-                if language not in ('sh', 'python'):
+                if language not in ('sh', 'python', 'cmake'):
                     continue
-                text = '\n'.join(lines).replace('FX,FY,CX,CY', camera)
                 where = '%s:%d' % (path.name, number)
                 start = time.monotonic()
-                code = run_block(folder, language, text, log)
-                print('%s %s (%.1f s)' % (
-                    'compiled, modules are missing:' if code is None else
-                    'ran', where, time.monotonic() - start), flush=True)
+                code, why = runner.run(language, lines)
+                print('left out, as %s: %s' % (why, where) if why else
+                      'ran %s (%.1f s)' % (where, time.monotonic() - start),
+                      flush=True)
                 if code:
                     fail(where, 'exit code %d:\n%s' %
-                         (code, log.read_text()[-2000:]))
+                         (code, runner.log.read_text()[-2000:]))
 
 
 def main():

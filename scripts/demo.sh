@@ -61,8 +61,7 @@ cat <<TEXT
 Where to look:
   $output/report.html       everything in one page: open it in a browser
   $output/images            the rendered photos
-  $output/sparse/0          the model; open it with COLMAP's GUI:
-                            colmap gui --import_path $output/sparse/0 \\
-                              --database_path $database --image_path $output/images
+  $output/sparse/0          the model; COLMAP's graphical interface opens it
+                            (File > Import model)
   $output/sparse/summary.json, $output/global/summary.json   figures of each stage
 TEXT

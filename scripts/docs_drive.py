@@ -7,7 +7,13 @@ import struct
 import subprocess
 import sys
 
+from docs_bag import write_drive_bag
+
+# The drive's last images lie in a bend: on a straight road COLMAP's own mapper
+# finds no pair to begin with.
 NUM_IMAGES = 12
+NUM_RENDERED = 40
+SEED = 2
 PAIR_BASE = 2147483647  # of COLMAP's pair ids
 
 
@@ -22,14 +28,52 @@ def make_drive(colmap, folder):
     """Photos, logs and calibration under the names of the documentation, and
     what learned models would give; returns the camera's parameters."""
     call(colmap, folder, 'adasfm_synthesizer', '--output_path', '.',
-         '--num_images', str(NUM_IMAGES), '--spacing', '1', '--image_width',
+         '--num_images', str(NUM_RENDERED), '--seed', str(SEED), '--image_width',
          '400', '--image_height', '250', '--render', '1')
     (folder / 'images').rename(folder / 'photos')
-    camera = re.search(r'intrinsics: *\[(.*)\]',
-                       (folder / 'sensors.yaml').read_text())[1]
+    for photo in sorted((folder / 'photos').iterdir())[:-NUM_IMAGES]:
+        photo.unlink()
+    for name in ('times.csv', 'gt.txt'):
+        lines = (folder / name).read_text().splitlines(keepends=True)
+        (folder / name).write_text(''.join(
+            [line for line in lines if line.startswith('#')] +
+            lines[-NUM_IMAGES:]))
+    calibration = (folder / 'sensors.yaml').read_text()
+    (folder / 'odometry.yaml').write_text(
+        calibration.replace('type: differential', 'type: odometry'))
+    write_drive_bag(folder, float(re.search(r'track_width: *(\S+)',
+                                            calibration)[1]))
+    camera = re.search(r'intrinsics: *\[(.*)\]', calibration)[1]
     camera = camera.replace(' ', '')
     write_learned(colmap, folder, camera)
     return camera
+
+
+def make_checkout(root, folder, build):
+    """Links to all of the repository but for what the commands write. build/ has
+    links to the build, so that packages end up here; in fresh/ there is none, as
+    after a clone. setup.sh has been run in the one and not in the other."""
+    fresh = folder / 'fresh'
+    fresh.mkdir()
+    for item in root.iterdir():
+        if item.name.startswith('build') or item.name == '.git':
+            continue
+        (fresh / item.name).symlink_to(item)
+        if item.name not in ('docs', 'scripts'):
+            (folder / item.name).symlink_to(item)
+    (folder / 'docs').mkdir()
+    for source, target in ((root / 'scripts', folder / 'scripts'),
+                           (build, folder / 'build')):
+        target.mkdir()
+        for item in source.iterdir():
+            if item.name not in ('setup.sh', '_CPack_Packages'):
+                (target / item.name).symlink_to(item)
+    write_program(folder / 'scripts/setup.sh', ':')
+
+
+def write_program(path, text):
+    path.write_text('#!/bin/sh\n' + text + '\n')
+    path.chmod(0o755)
 
 
 def write_learned(colmap, folder, camera):

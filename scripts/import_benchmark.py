@@ -10,13 +10,13 @@ as logs (images at 10 Hz, IMU at 200 Hz, wheels at 50 Hz), then imported:
 
 import argparse
 import math
-import os
 import random
 import sqlite3
 import struct
 import subprocess
 import tempfile
-import time
+
+from benchmarking.process import Failed, run
 
 SPEED = 8.0
 SENSORS = """cam0:
@@ -81,21 +81,19 @@ def measure(colmap, num_images):
     with tempfile.TemporaryDirectory() as folder:
         write_logs(folder, num_images)
         write_database(colmap, f"{folder}/database.db", num_images)
-        start = time.monotonic()
-        process = subprocess.Popen(
-            [colmap, "adasfm_prior_importer",
-             "--database_path", f"{folder}/database.db",
-             "--sensors_path", f"{folder}/sensors.yaml",
-             "--imu_path", f"{folder}/imu.csv",
-             "--wheel_path", f"{folder}/wheel.csv"],
-            stdout=subprocess.DEVNULL)
-        _, status, usage = os.wait4(process.pid, 0)
-        if status != 0:
-            raise SystemExit(f"the import of {num_images} images failed")
-        wall_s = time.monotonic() - start
-        print(f"{num_images:7d} images: {wall_s:6.1f} s, CPU "
-              f"{usage.ru_utime + usage.ru_stime:6.1f} s, peak memory "
-              f"{usage.ru_maxrss / 1024:6.0f} MB", flush=True)
+        try:
+            usage = run(
+                [colmap, "adasfm_prior_importer",
+                 "--database_path", f"{folder}/database.db",
+                 "--sensors_path", f"{folder}/sensors.yaml",
+                 "--imu_path", f"{folder}/imu.csv",
+                 "--wheel_path", f"{folder}/wheel.csv"], f"{folder}/log")
+        except Failed:
+            with open(f"{folder}/log") as log:
+                raise SystemExit(log.read())
+        print(f"{num_images:7d} images: {usage.seconds:6.1f} s, CPU "
+              f"{usage.cpu_seconds:6.1f} s, peak memory "
+              f"{usage.peak_mib:6.0f} MB", flush=True)
 
 
 def main():

@@ -23,7 +23,7 @@ mkdir -p "$folder"
 "$colmap" adasfm_synthesizer --output_path "$folder" --num_images "$images" \
   > "$folder/make.log" 2>&1
 printf '# Profile of %s images\n\nCommit %s, %s.\n' "$images" \
-  "$(git describe --always --dirty)" "$(nproc) cores" > "$folder/profile.md"
+  "$(git describe --always --dirty 2> /dev/null || echo unknown)" "$(nproc) cores" > "$folder/profile.md"
 
 # Runs one command under perf and appends its table. Sampling by the CPU's clock
 # works in virtual machines too.

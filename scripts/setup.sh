@@ -4,11 +4,11 @@
 # COLMAP once into a cache folder, configures and builds the project.
 # Run it again at any time: what is done is not done twice.
 #
-#   scripts/setup.sh [--host-only] [--for-tests] [CMake arguments...]
+#   scripts/setup.sh [--host-only] [--for-tests] [--configure-only] [CMake arguments...]
 #
 # --host-only stops after the host, --for-tests also installs the browser that
 # the report's test and the screenshots need, and what the packages and the
-# documentation are checked with.
+# documentation are checked with; --configure-only leaves the project unbuilt.
 # Environment: ADASFM_CACHE (default: the user's cache folder) holds the host;
 # ADASFM_BUILD_DIR (default: build/); ADASFM_BUILD_TYPE (default: Release).
 # With -DCOLMAP_DIR=PREFIX/share/colmap that COLMAP is used instead.
@@ -39,7 +39,7 @@ packages=(
   # For the scripts that draw tables and compare models.
   python3 python3-numpy python3-matplotlib sqlite3)
 test_packages=(chromium chromium-driver python3-selenium file lintian
-  python3-h5py)
+  python3-h5py clang libclang-rt-14-dev linux-perf)
 
 say() { printf '\n== %s\n' "$*"; }
 die() { printf 'setup: %s\n' "$*" >&2; exit 1; }
@@ -138,29 +138,29 @@ main() {
   [ -r /etc/debian_version ] || die 'this script knows Debian 12 only; see docs/install.md for other systems'
   mkdir -p "$cache" && [ -w "$cache" ] ||
     die "cannot write to the cache folder $cache; set ADASFM_CACHE to another one"
-  local host_only=0
-  while true; do
-    case ${1:-} in
+  local host_only=0 configure_only=0 argument cmake_arguments=()
+  local colmap_dir=$host_prefix/share/colmap
+  for argument in "$@"; do
+    case $argument in
       --host-only) host_only=1 ;;
       --for-tests) packages+=("${test_packages[@]}") ;;
-      *) break ;;
+      --configure-only) configure_only=1 ;;
+      -DCOLMAP_DIR=*) colmap_dir=${argument#*=} ;;
+      -*) cmake_arguments+=("$argument") ;;
+      *) die "unknown argument: $argument" ;;
     esac
-    shift
   done
   install_packages
-  local colmap_dir=$host_prefix/share/colmap argument
-  for argument in "$@"; do
-    case $argument in -DCOLMAP_DIR=*) colmap_dir=${argument#*=} ;; esac
-  done
   if [ "$colmap_dir" = "$host_prefix/share/colmap" ]; then build_host; fi
   if [ "$host_only" = 1 ]; then return; fi
   say "Building the project into $build (about $((14 / jobs + 1)) minutes the first time, seconds later)"
   cmake -S "$root" -B "$build" -G Ninja \
     -DCMAKE_BUILD_TYPE="${ADASFM_BUILD_TYPE:-Release}" \
-    -DCOLMAP_DIR="$colmap_dir" -DADASFM_WERROR=ON "$@" > "$cache/configure.log" 2>&1 || {
+    -DCOLMAP_DIR="$colmap_dir" -DADASFM_WERROR=ON "${cmake_arguments[@]}" > "$cache/configure.log" 2>&1 || {
     tail -n 20 "$cache/configure.log" >&2
     die "configuring failed; see $cache/configure.log"
   }
+  if [ "$configure_only" = 1 ]; then return; fi
   cmake --build "$build" --parallel "$jobs" ||
     die 'building the project failed; the messages above say where'
 }

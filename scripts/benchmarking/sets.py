@@ -44,6 +44,11 @@ def size_of(world):
   return int(world.partition('-')[2])
 
 
+def shrink(world, max_num_images):
+  return '%s-%d' % (world.partition('-')[0],
+                    min(size_of(world), max_num_images))
+
+
 def camera_params(sensors_path):
   with open(sensors_path) as file:
     match = re.search(r'intrinsics:\s*\[([^\]]*)\]', file.read())

@@ -130,6 +130,10 @@ class WholeBenchmarkTest(unittest.TestCase):
     for name in sets.QUICK + sets.FULL:
       self.assertTrue(sets.is_world(name), name)
 
+  def test_worlds_shrink_and_do_not_grow(self):
+    self.assertEqual(sets.shrink('alias-300', 100), 'alias-100')
+    self.assertEqual(sets.shrink('clean-50', 100), 'clean-50')
+
 
 if __name__ == '__main__':
   unittest.main()
