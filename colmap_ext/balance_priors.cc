@@ -81,7 +81,9 @@ bool PriorBalanceOptions::IsValid(std::string* error) const {
 double ComputePriorChi2PerDof(const std::vector<PosePriorEdge>& priors,
                               const colmap::Reconstruction& reconstruction) {
   PriorTerms terms;
-  for (const PosePriorEdge& edge : priors) terms.Add(edge, reconstruction);
+  for (const PosePriorEdge& edge : priors) {
+    if (edge.is_held_by_points) terms.Add(edge, reconstruction);
+  }
   return std::max(
       {terms.rotations.Mean(), terms.directions.Mean(), terms.lengths.Mean()});
 }

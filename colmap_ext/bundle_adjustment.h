@@ -28,6 +28,10 @@ struct PosePriorEdge {
   double rotation_sigma_rad = std::numeric_limits<double>::infinity();
   double direction_sigma_rad = std::numeric_limits<double>::infinity();
   double length_sigma_m = std::numeric_limits<double>::infinity();
+  // Whether keypoints hold both images too. An edge that bridges a gap by
+  // itself keeps its full weight, as dropping it would open the gap, and says
+  // nothing of the balance between keypoints and priors.
+  bool is_held_by_points = true;
 };
 
 // The edge of a sensor prior with the sigmas of its covariance; what its flags

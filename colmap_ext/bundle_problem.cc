@@ -154,7 +154,8 @@ void BundleProblem::AddPriors(const std::vector<PosePriorEdge>& edges) {
     }
     const auto add = [&](Term term, double sigma) {
       if (!std::isfinite(sigma) || !(sigma > 0.0)) return;
-      AddPrior(edge, term, &image1->second, &image2->second, prior_loss_.get());
+      AddPrior(edge, term, &image1->second, &image2->second,
+               edge.is_held_by_points ? prior_loss_.get() : nullptr);
     };
     add(Term::kRotation, edge.rotation_sigma_rad);
     add(Term::kDirection, edge.direction_sigma_rad);

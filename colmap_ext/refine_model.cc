@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <stdexcept>
+#include <utility>
 #include <vector>
 
 #include "colmap_ext/bundle_adjustment.h"
@@ -44,21 +45,21 @@ class ModelRefiner {
   void JoinParts() {
     if (!options_.join_parts) return;
     const double loose_px = 3.0 * options_.filter_max_reproj_error_px;
-    Adjust(10, 1e-3);
+    AdjustTentatively(10);
     Filter(loose_px);
     triangulator_.CompleteAndMergeTracks(loose_px);
   }
 
   void AdjustRoughly() {
     TriangulateWeakImages();
-    Adjust(15, 1e-3);
+    AdjustTentatively(15);
     Filter(options_.filter_max_reproj_error_px);
-    if (PutBackContradictedImages()) Adjust(10, 1e-3);
+    if (PutBackContradictedImages()) AdjustTentatively(10);
   }
 
   void AdjustFinely() {
     triangulator_.CompleteAndMergeTracks(options_.filter_max_reproj_error_px);
-    Adjust(25, 1e-6);
+    Adjust(25, 1e-6, FindPriors(), &summary_.keypoint_sigma_factor);
     Filter(options_.filter_max_reproj_error_px);
     LeaveOutUnsupportedImages();
   }
@@ -119,12 +120,37 @@ class ModelRefiner {
     }
   }
 
-  void Adjust(int max_num_iterations, double function_tolerance) {
+  void MarkPriorsInGaps(std::vector<PosePriorEdge>* edges) const {
+    const auto is_held = [this](image_t image_id) {
+      return reconstruction_.Image(image_id).NumPoints3D() >=
+             kMinNumPointsToHold;
+    };
+    for (PosePriorEdge& edge : *edges) {
+      edge.is_held_by_points =
+          is_held(edge.image_id1) && is_held(edge.image_id2);
+    }
+  }
+
+  std::vector<PosePriorEdge> FindPriors() const {
+    if (!options_.use_priors_in_adjustment) return {};
+    return FindPriorEdges(scene_, RegisteredImages());
+  }
+
+  // Until parts and gaps are in place, priors are off for other reasons than
+  // keypoints; the balance found then serves this adjustment only.
+  void AdjustTentatively(int max_num_iterations) {
+    std::vector<PosePriorEdge> priors = FindPriors();
+    MarkPriorsInGaps(&priors);
+    double keypoint_sigma_factor = summary_.keypoint_sigma_factor;
+    Adjust(max_num_iterations, 1e-3, std::move(priors), &keypoint_sigma_factor);
+  }
+
+  void Adjust(int max_num_iterations, double function_tolerance,
+              std::vector<PosePriorEdge> priors,
+              double* keypoint_sigma_factor) {
     PriorBundleAdjustmentProblem problem;
     problem.images = RegisteredImages();
-    if (options_.use_priors_in_adjustment) {
-      problem.priors = FindPriorEdges(scene_, problem.images);
-    }
+    problem.priors = std::move(priors);
     AddCoarseEdges(&problem.priors);
     PriorBundleAdjustmentOptions options;
     options.keypoint_sigma_px = options_.keypoint_sigma_px;
@@ -136,10 +162,10 @@ class ModelRefiner {
     options.num_threads = options_.num_threads;
     summary_.num_iterations +=
         AdjustBundleInBalance(options_.balance, options, problem,
-                              &reconstruction_, &summary_.keypoint_sigma_factor)
+                              &reconstruction_, keypoint_sigma_factor)
             .num_iterations;
     summary_.keypoint_sigma_px =
-        options_.keypoint_sigma_px * summary_.keypoint_sigma_factor;
+        options_.keypoint_sigma_px * *keypoint_sigma_factor;
     summary_.prior_chi2_per_dof =
         ComputePriorChi2PerDof(problem.priors, reconstruction_);
   }

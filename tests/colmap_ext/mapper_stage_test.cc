@@ -100,6 +100,35 @@ TEST_F(MapperStageTest, BlackoutIsBridgedByPriors) {
   EXPECT_LT(errors.rmse_m, 0.5 * CoarseRmseM(world));
 }
 
+// Only the priors know the way through the gaps when the coarse poses do not:
+// where these stand must not matter to the model.
+TEST_F(MapperStageTest, GapsDoNotDependOnTheCoarsePoses) {
+  for (uint64_t seed = 1; seed <= 3; ++seed) {
+    MapperWorldOptions options;
+    options.world.num_images = 100;
+    options.world.seed = seed;
+    options.world.num_blackouts = 2;
+    options.world.blackout_num_images = 16;
+    options.priors.rotation_sigma_rad = 0.0005;
+    options.priors.translation_sigma_m = 0.005;
+    options.center_sigma_m = 0.1;
+    const double expected_m =
+        ComputeAlignedErrors(Run(BuildMapperWorld(options)),
+                             BuildMapperWorld(options).true_poses, {})
+            .rmse_m;
+    std::filesystem::remove_all(folder_);
+    options.center_sigma_m = 2.0;
+    options.rotation_sigma_rad = 0.1;
+    const MapperWorld world = BuildMapperWorld(options);
+    const AlignedErrors errors =
+        ComputeAlignedErrors(Run(world), world.true_poses, {});
+    std::filesystem::remove_all(folder_);
+    EXPECT_EQ(errors.num_images, options.world.num_images);
+    // The same optimum, up to points that one of the two has found.
+    EXPECT_LT(errors.rmse_m, 1.2 * expected_m) << "seed " << seed;
+  }
+}
+
 // Without priors nothing says where they are but a coarse pose.
 TEST_F(MapperStageTest, ImagesThatNothingHoldsAreLeftOut) {
   for (uint64_t seed = 1; seed <= 2; ++seed) {
