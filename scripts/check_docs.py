@@ -33,7 +33,8 @@ from docs_drive import (  # noqa: E402
 # Options of other programs that the text may name; those of our scripts are read
 # from them.
 OTHER_OPTIONS = {
-    'Group.name', 'option', 'install', 'prefix', 'build', 'target', 'simulate'}
+    'Group.name', 'option', 'install', 'prefix', 'build', 'target', 'simulate',
+    'benchmark_filter'}
 # What the first word of a shown command may be, besides ours and paths in this
 # repository.
 OTHER_PROGRAMS = {
@@ -52,6 +53,13 @@ SMALLER = {
     'scripts/setup.sh': '--configure-only',
     'cmake --build build ': '--target adasfm_core',
     'build-fuzz/bin/': '-max_total_time=2',
+    'build/bin/benchmark_sensors':
+        '--benchmark_min_time=0 --benchmark_filter=/1000/',
+    'build/bin/benchmark_global':
+        '--benchmark_min_time=0 --benchmark_filter=Tracks/500',
+    'build/bin/benchmark_partition': '--benchmark_min_time=0',
+    'build/bin/benchmark_colmap_ext':
+        '--benchmark_min_time=0 --benchmark_filter=/100/',
     'sudo apt install': '--simulate',
 }
 # Run where nothing has been built yet.
@@ -182,6 +190,9 @@ class Checker:
                         fail(where, 'no command has the option --' + name)
             for command in re.findall(r'`(colmap adasfm_[^`]*)`', line):
                 self.check_command(where, command.split())
+            for script in re.findall(r'`(scripts/[\w./]+)', line):
+                if not (ROOT / script).exists():
+                    fail(where, 'there is no ' + script)
             for link in re.findall(r'\]\(([^)#]+)(?:#[^)]*)?\)', line):
                 if not re.match(r'\w+:', link) and not (
                         path.parent / link).exists():
@@ -234,8 +245,10 @@ class Runner:
         make_checkout(ROOT, folder, build)
         self.words = {'FX,FY,CX,CY': make_drive(colmap, folder)}
         cache = (build / 'CMakeCache.txt').read_text()
-        self.words['PREFIX'] = re.search(
-            r'^COLMAP_DIR:\w+=(.*)/share/colmap$', cache, re.MULTILINE)[1]
+        self.colmap_dir = re.search(r'^COLMAP_DIR:\w+=(.*)$', cache,
+                                    re.MULTILINE)[1]
+        if self.colmap_dir.endswith('/share/colmap'):
+            self.words['PREFIX'] = self.colmap_dir[:-len('/share/colmap')]
         programs = folder / 'programs'
         programs.mkdir()
         (programs / 'colmap').symlink_to(colmap)
@@ -264,8 +277,8 @@ class Runner:
         (project / 'main.cc').write_text('int main() { return 0; }\n')
         code = self.call(
             ['cmake', '-S', '.', '-B', 'build', '-DCMAKE_PREFIX_PATH=%s' %
-             (self.folder / 'installed/usr/local'), '-DCOLMAP_DIR=%s' %
-             (self.words['PREFIX'] + '/share/colmap')], project)
+             (self.folder / 'installed/usr/local'),
+             '-DCOLMAP_DIR=' + self.colmap_dir], project)
         return code or self.call(['cmake', '--build', 'build'], project)
 
     def run(self, language, lines):
@@ -281,6 +294,11 @@ class Runner:
         text = '\n'.join(map(make_smaller, read_lines(lines)))
         for word, value in self.words.items():
             text = text.replace(word, value)
+        if 'PREFIX' in text:
+            return 0, 'COLMAP_DIR of the build does not end in share/colmap'
+        if 'bin/benchmark_' in text and not (
+                self.folder / 'build/bin/benchmark_global').exists():
+            return 0, 'the benchmarks are not built'
         for word, command in NEEDS:
             if word in text and not is_there(command):
                 return 0, command[0] + ' cannot be used here'
