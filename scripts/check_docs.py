@@ -260,7 +260,8 @@ class Runner:
             DESTDIR=str(folder / 'installed'),
             # The next run finds what this one compiled, wherever that was.
             CCACHE_BASEDIR=str(folder), CCACHE_NOHASHDIR='1')
-        self.environment.pop('ADASFM_BUILD_DIR', None)
+        for name in ('ADASFM_BUILD_DIR', 'COLMAP'):
+            self.environment.pop(name, None)
 
     def call(self, command, folder):
         with open(self.log, 'wb') as file:

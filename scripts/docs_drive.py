@@ -8,13 +8,13 @@ import subprocess
 import sys
 
 from docs_bag import write_drive_bag
+from pair_recall import MAX_NUM_IMAGES
 
 # The drive's last images lie in a bend: on a straight road COLMAP's own mapper
 # finds no pair to begin with.
 NUM_IMAGES = 12
 NUM_RENDERED = 40
 SEED = 2
-PAIR_BASE = 2147483647  # of COLMAP's pair ids
 
 
 def call(colmap, folder, *arguments):
@@ -92,8 +92,8 @@ def write_learned(colmap, folder, camera):
     with open(folder / 'matches.txt', 'w') as file:
         for pair_id, data in database.execute(
                 'SELECT pair_id, data FROM matches WHERE rows > 0'):
-            file.write('%s %s\n' % (names[pair_id // PAIR_BASE],
-                                    names[pair_id % PAIR_BASE]))
+            file.write('%s %s\n' % (names[pair_id // MAX_NUM_IMAGES],
+                                    names[pair_id % MAX_NUM_IMAGES]))
             for match in struct.iter_unpack('<2I', data):
                 file.write('%d %d\n' % match)
             file.write('\n')

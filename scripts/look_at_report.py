@@ -4,7 +4,7 @@
 and without asking for anything else, that its controls work, and that nothing is
 wider than a phone.
 
-  scripts/look_at_report.py REPORT.html [--screenshots FOLDER]
+  scripts/look_at_report.py REPORT.html [--screenshots FOLDER] [--sections ID...]
 
 Needs Debian's chromium, chromium-driver and python3-selenium."""
 import argparse

@@ -3,12 +3,13 @@
 # Profiles the three commands on a clean world with perf (Debian's linux-perf):
 # profile.sh [images]. The symbols with most CPU time of their own, per command,
 # go to adasfm-benchmark/profile-IMAGES/profile.md.
+# Environment: COLMAP, the executable (default: setup.sh's).
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 
 images=${1:-1000}
-colmap=${ADASFM_LAUNCHER:-${ADASFM_BUILD_DIR:-build}/bin/colmap}
-folder=${ADASFM_PROFILE_DIR:-adasfm-benchmark/profile-$images}
+colmap=${COLMAP:-${ADASFM_BUILD_DIR:-build}/bin/colmap}
+folder=adasfm-benchmark/profile-$images
 [[ $images =~ ^[1-9][0-9]*$ ]] || {
   echo 'profile.sh takes a number of images' >&2
   exit 2
