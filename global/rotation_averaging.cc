@@ -3,13 +3,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
-#include <tuple>
 #include <vector>
 
 #include "core/so3.h"
 #include "global/laplacian_solver.h"
 #include "global/rotation_sdp.h"
+#include "global/rotation_spanning_tree.h"
 
 namespace adasfm {
 namespace {
@@ -27,53 +26,6 @@ std::vector<RotationEdge> CollectEdges(const RotationAveragingOptions& options,
          std::max(edge.rotation_sigma_rad, options.min_rotation_sigma_rad)});
   }
   return edges;
-}
-
-// Rotations along the spanning tree of the most certain edges (Kruskal; ties in
-// order of the edges), from node 0. False when the edges do not connect all.
-bool StartFromSpanningTree(const std::vector<RotationEdge>& edges,
-                           size_t num_nodes, Rotations* rotations) {
-  std::vector<int> order(edges.size());
-  std::iota(order.begin(), order.end(), 0);
-  std::stable_sort(order.begin(), order.end(), [&edges](int a, int b) {
-    return edges[a].sigma_rad < edges[b].sigma_rad;
-  });
-  std::vector<int> parent(num_nodes);
-  std::iota(parent.begin(), parent.end(), 0);
-  const auto find = [&parent](int i) {
-    while (parent[i] != i) i = parent[i] = parent[parent[i]];
-    return i;
-  };
-  std::vector<std::vector<int>> tree(num_nodes);
-  for (const int e : order) {
-    const int a = find(edges[e].i);
-    const int b = find(edges[e].j);
-    if (a == b) continue;
-    parent[a] = b;
-    tree[edges[e].i].push_back(e);
-    tree[edges[e].j].push_back(e);
-  }
-
-  rotations->assign(num_nodes, Eigen::Matrix3d::Identity());
-  std::vector<bool> is_visited(num_nodes, false);
-  std::vector<int> queue = {0};
-  is_visited[0] = true;
-  for (size_t head = 0; head < queue.size(); ++head) {
-    for (const int e : tree[queue[head]]) {
-      const RotationEdge& edge = edges[e];
-      const bool is_forward = edge.i == queue[head];
-      const int other = is_forward ? edge.j : edge.i;
-      if (is_visited[other]) continue;
-      is_visited[other] = true;
-      if (is_forward) {
-        (*rotations)[other] = edge.rotation * (*rotations)[edge.i];
-      } else {
-        (*rotations)[other] = edge.rotation.transpose() * (*rotations)[edge.j];
-      }
-      queue.push_back(other);
-    }
-  }
-  return queue.size() == num_nodes;
 }
 
 // Log(R_j^T R_ij R_i) = omega_j - omega_i to first order, for R Exp(omega).
@@ -278,7 +230,8 @@ GlobalRotations EstimateGlobalRotations(const RotationAveragingOptions& options,
   const size_t num_nodes = graph.images.size();
   const std::vector<RotationEdge> edges = CollectEdges(options, graph);
   Rotations rotations;
-  if (num_nodes == 0 || !StartFromSpanningTree(edges, num_nodes, &rotations)) {
+  if (num_nodes == 0 ||
+      !SpreadRotationsOverTree(edges, num_nodes, &rotations)) {
     return result;
   }
   if (options.use_sdp_start) StartFromSdp(options, edges, &rotations, &result);
