@@ -32,6 +32,7 @@ class CoarsePoseEstimator {
   RotationRateReport BuildChain();
   std::vector<std::optional<RotationPrediction>> PredictRotations() const;
   void FilterLoops();
+  VisualSteps CompleteSteps() const;
   void EstimateRotations();
   void FilterByRotation();
   void RepeatRotations();
@@ -43,6 +44,7 @@ class CoarsePoseEstimator {
                                  CoarseComponent* component) const;
   int RemoveEdgesOffPositions();
   EdgeLengths EstimateLengths() const;
+  std::map<ImagePair, double> KnownLengths() const;
   std::vector<std::optional<EdgeLength>> SelectLengths(
       const ViewGraph& subgraph) const;
   std::map<image_t, Eigen::Vector3d> StartFromChain(

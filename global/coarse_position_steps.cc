@@ -157,6 +157,11 @@ int CoarsePoseEstimator::RemoveEdgesOffPositions() {
 
 // Metres of the priors that augment the graph, spread over shared points.
 EdgeLengths CoarsePoseEstimator::EstimateLengths() const {
+  return EstimateEdgeLengths(options_.lengths, graph_, KnownLengths(),
+                             correspondences_, lengths_);
+}
+
+std::map<ImagePair, double> CoarsePoseEstimator::KnownLengths() const {
   std::map<ImagePair, double> known_lengths_m;
   for (const RelativePosePrior& prior : priors_) {
     const double length = prior.cam2_from_cam1.translation.norm();
@@ -166,8 +171,7 @@ EdgeLengths CoarsePoseEstimator::EstimateLengths() const {
       known_lengths_m[ImagePair(prior.image_id1, prior.image_id2)] = length;
     }
   }
-  return EstimateEdgeLengths(options_.lengths, graph_, known_lengths_m,
-                             correspondences_, lengths_);
+  return known_lengths_m;
 }
 
 std::vector<std::optional<EdgeLength>> CoarsePoseEstimator::SelectLengths(

@@ -6,6 +6,7 @@
 #include "core/so3.h"
 #include "global/coarse_pose_estimator.h"
 #include "global/filter_edges_by_rotation.h"
+#include "global/visual_steps.h"
 
 namespace adasfm {
 namespace {
@@ -88,14 +89,39 @@ void CoarsePoseEstimator::FilterLoops() {
     return;
   }
   lengths_ = EstimateLengths();
-  const LoopFilterReport report =
-      FilterLoopsByOdometry(options_.loops, chain_, lengths_, &graph_);
-  EndStep("loop gating",
-          std::to_string(report.num_tested) + " pairs tested, " +
-              std::to_string(report.num_contradicting) +
-              " contradict the odometry, " +
-              std::to_string(report.num_in_false_runs) + " more lie in its " +
-              std::to_string(report.num_false_runs) + " false runs");
+  const VisualSteps steps = CompleteSteps();
+  const OdometryChain chain = steps.priors.empty()
+                                  ? chain_
+                                  : OdometryChain(steps.priors, options_.chain);
+  LoopFilterOptions options = options_.loops;
+  options.min_position_error_m *= steps.unit_m;
+  const LoopFilterReport report = FilterLoopsByOdometry(
+      options, chain, steps.priors.empty() ? lengths_ : steps.lengths, &graph_);
+  std::string summary =
+      std::to_string(report.num_tested) + " pairs tested, " +
+      std::to_string(report.num_contradicting) + " contradict the odometry, " +
+      std::to_string(report.num_in_false_runs) + " more lie in its " +
+      std::to_string(report.num_false_runs) + " false runs";
+  if (!steps.priors.empty()) {
+    summary += "; vision added " + std::to_string(steps.num_by_vision) +
+               " steps, " + std::to_string(steps.num_coasting) +
+               " are taken to go on as before";
+  }
+  EndStep("loop gating", summary);
+}
+
+// Empty where the sensors saw every step.
+VisualSteps CoarsePoseEstimator::CompleteSteps() const {
+  const bool is_complete = priors_.size() + 1 >= graph_.images.size() &&
+                           std::all_of(priors_.begin(), priors_.end(),
+                                       [](const RelativePosePrior& prior) {
+                                         return prior.HasRotation() &&
+                                                prior.HasDirection() &&
+                                                prior.HasLength();
+                                       });
+  if (is_complete || !options_.visual_steps.enabled) return VisualSteps();
+  return AddVisualSteps(options_.visual_steps, options_.lengths, graph_,
+                        correspondences_, KnownLengths(), priors_);
 }
 
 void CoarsePoseEstimator::EstimateRotations() {

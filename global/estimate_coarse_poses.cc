@@ -62,10 +62,10 @@ bool CoarsePoseOptions::IsValid(std::string* error) const {
   }
   return chain.IsValid(error) && rotation_rates.IsValid(error) &&
          relative_poses.IsValid(error) && lengths.IsValid(error) &&
-         loops.IsValid(error) && rotations.IsValid(error) &&
-         translations.IsValid(error) && augmentation.IsValid(error) &&
-         positions.IsValid(error) && position_filter.IsValid(error) &&
-         joins.IsValid(error);
+         visual_steps.IsValid(error) && loops.IsValid(error) &&
+         rotations.IsValid(error) && translations.IsValid(error) &&
+         augmentation.IsValid(error) && positions.IsValid(error) &&
+         position_filter.IsValid(error) && joins.IsValid(error);
 }
 
 CoarsePoses EstimateCoarsePoses(const CoarsePoseOptions& options,

@@ -20,6 +20,7 @@
 #include "global/rotation_averaging.h"
 #include "global/translation_averaging.h"
 #include "global/view_graph.h"
+#include "global/visual_steps.h"
 
 namespace adasfm {
 
@@ -29,6 +30,7 @@ struct CoarsePoseOptions {
   RotationRateOptions rotation_rates;
   RelativePoseRefinementOptions relative_poses;
   EdgeLengthOptions lengths;
+  VisualStepOptions visual_steps;
   LoopFilterOptions loops;
   RotationAveragingOptions rotations;
   // eps_R.
@@ -106,7 +108,8 @@ struct CoarsePoses {
 // graph. Numbered steps:
 //   1 least-squares relative poses            RefineRelativePoses
 //     odometry's rotation rates               CorrectRotationRates
-//   2 odometry chain, lengths, loop gating    FilterLoopsByOdometry
+//   2 odometry chain, lengths, loop gating    AddVisualSteps
+//                                             FilterLoopsByOdometry
 //   3 sensor edges, rotation averaging        EstimateGlobalRotations
 //   4 edges off the rotations                 FilterEdgesByRotation
 //   5 directions, sensor translations         EstimateRelativeTranslations

@@ -142,12 +142,17 @@ class PairGrid {
   std::map<std::pair<int, int>, std::vector<int>> cells_;
 };
 
-// Whether an open pair stands in a run that the chain excludes.
+// Whether an open pair stands in a run that the chain excludes, or alone: where
+// a drive truly comes back, many pairs see it.
 bool IsInFalseRun(const LoopFilterOptions& options,
                   const std::vector<Test>& tests, const PairGrid& grid, int e) {
+  const std::vector<int> neighbours = grid.Neighbours(e);
+  if (neighbours.empty()) {
+    return tests[e].end - tests[e].begin > options.max_group_gap;
+  }
   int num_contradicting = 0;
   int num_decided = 0;
-  for (const int other : grid.Neighbours(e)) {
+  for (const int other : neighbours) {
     num_contradicting += tests[other].verdict == Verdict::kContradicts;
     num_decided += tests[other].verdict != Verdict::kOpen;
   }

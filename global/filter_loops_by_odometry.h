@@ -24,7 +24,7 @@ struct LoopFilterOptions {
   int max_group_gap = 4;
   // A pair that the chain neither confirms nor excludes goes when more than
   // this share of its decided neighbours contradict the chain: a run of pairs
-  // is one false loop, not fifty votes.
+  // is one false loop, not fifty votes. It goes too when it has no neighbours.
   double max_contradicting_ratio = 0.5;
 
   bool IsValid(std::string* error) const;

@@ -69,6 +69,13 @@ void GlobalOptionAdder::AddLoops() {
       "1 sigma of the wheels' common scale error, as a ratio");
   Add("gyro_bias_sigma_rad_s", &stage_->poses.chain.gyro_bias_sigma_rad_s,
       "1 sigma of the gyroscope bias that is left, per axis [rad/s]");
+  Add("visual_step_length_error",
+      &stage_->poses.visual_steps.length_error_ratio,
+      "1 sigma of the drift of lengths where vision completes the odometry, as "
+      "a ratio");
+  Add("max_coasting_s", &stage_->poses.visual_steps.max_coasting_s,
+      "motion that nothing sees is taken to go on for so long, to gate loops "
+      "[s]");
   Add("max_loop_sigmas", &stage_->poses.loops.max_num_sigmas,
       "pairs contradict the odometry beyond this many sigmas");
   Add("max_contradicting_ratio", &stage_->poses.loops.max_contradicting_ratio,
@@ -135,6 +142,9 @@ void GlobalOptionAdder::AddAblations() {
       "start the rotations from the SDP");
   Add("use_loop_gating", &stage_->poses.loops.enabled,
       "remove loops that the odometry excludes");
+  Add("use_visual_steps", &stage_->poses.visual_steps.enabled,
+      "vision completes the odometry that gates loops, where sensors have no "
+      "position (0 or 1)");
   Add("refine_relative_poses", &stage_->poses.relative_poses.enabled,
       "least-squares relative poses");
   Add("correct_rotation_rates", &stage_->poses.rotation_rates.enabled,

@@ -132,5 +132,27 @@ TEST(FilterLoopsByOdometry, DropsUntestablePairsOfAFalseRun) {
   }
 }
 
+// One pair that nothing confirms, with no length to test, in streets of one
+// direction: where the drive truly comes back, its neighbours would see it too.
+TEST(FilterLoopsByOdometry, ALonePairIsNoEvidence) {
+  LoopProblem problem = BuildProblem(1, 1.0);
+  AddEdge(10, 80, Rigid3d(Eigen::Quaterniond::Identity(), {0.1, 0.0, -1.0}),
+          true, false, &problem);
+  const size_t lone = problem.graph.edges.size() - 1;
+  FilterLoopsByOdometry(LoopFilterOptions(), problem.chain, problem.lengths,
+                        &problem.graph);
+  EXPECT_EQ(problem.graph.edges[lone].removal, EdgeRemoval::kFalseLoop);
+  // With others beside it the case is open.
+  problem = BuildProblem(1, 1.0);
+  for (const int k : {0, 1, 2}) {
+    AddEdge(10 + k, 80 + k,
+            Rigid3d(Eigen::Quaterniond::Identity(), {0.1, 0.0, -1.0}), true,
+            false, &problem);
+  }
+  FilterLoopsByOdometry(LoopFilterOptions(), problem.chain, problem.lengths,
+                        &problem.graph);
+  EXPECT_TRUE(problem.graph.edges[lone].IsKept());
+}
+
 }  // namespace
 }  // namespace adasfm
