@@ -67,6 +67,9 @@ struct PriorBundleAdjustmentOptions {
   int max_num_images_dense = 50;
   int max_num_images_sparse = 4000;
 
+  bool RefinesCameras() const {
+    return refine_focal_length || refine_principal_point || refine_extra_params;
+  }
   bool IsValid(std::string* error) const;
 };
 

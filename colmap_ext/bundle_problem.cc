@@ -37,11 +37,6 @@ void BundleProblem::PrepareForEvaluation(bool, bool new_evaluation_point) {
   for (auto& [image_id, block] : images_) block.pose->Update();
 }
 
-bool BundleProblem::RefinesCameras() const {
-  return options_.refine_focal_length || options_.refine_principal_point ||
-         options_.refine_extra_params;
-}
-
 void BundleProblem::AddImages(const PriorBundleAdjustmentProblem& problem,
                               const colmap::Reconstruction& reconstruction) {
   const auto add = [&](image_t image_id, bool is_constant) {
@@ -123,7 +118,7 @@ void BundleProblem::AddObservation(const colmap::Reconstruction& reconstruction,
                                    PointBlock* point) {
   ImageBlock& block = images_.at(observation.image_id);
   block.num_observations += 1;
-  if (!RefinesCameras()) {
+  if (!options_.RefinesCameras()) {
     reprojection_costs_.emplace_back(observation.keypoint, block.pose);
     problem_->AddResidualBlock(&reprojection_costs_.back(),
                                reprojection_loss_.get(), block.pose->parameters,

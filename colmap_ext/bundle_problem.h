@@ -85,7 +85,6 @@ class BundleProblem final : private ceres::EvaluationCallback {
                 ImageBlock* image1, ImageBlock* image2,
                 ceres::LossFunction* loss);
   void SetConstantBlocks(const colmap::Reconstruction& reconstruction);
-  bool RefinesCameras() const;
 
   const PriorBundleAdjustmentOptions options_;
   std::map<image_t, ImageBlock> images_;

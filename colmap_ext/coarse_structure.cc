@@ -5,7 +5,9 @@
 #include <cmath>
 
 #include "colmap_ext/align_to_gravity.h"
+#include "colmap_ext/find_focal_length_error.h"
 #include "colmap_ext/host/pose_conversion.h"
+#include "colmap_ext/scene_bearings.h"
 
 namespace adasfm {
 namespace {
@@ -45,13 +47,17 @@ std::vector<TriangulatedTrack> SelectPoints(
   return result;
 }
 
+// Cameras are those of the model before, as far as it has adjusted them.
 colmap::Reconstruction CreateReconstruction(
-    const SceneData& scene, const std::map<image_t, Rigid3d>& cams_from_world) {
+    const SceneData& scene, const std::map<image_t, Rigid3d>& cams_from_world,
+    const colmap::Reconstruction& before) {
   colmap::Reconstruction reconstruction;
   for (const auto& [image_id, pose] : cams_from_world) {
     const SceneImage& scene_image = scene.images.at(image_id);
     if (!reconstruction.ExistsCamera(scene_image.camera_id)) {
-      reconstruction.AddCamera(scene.cameras.at(scene_image.camera_id));
+      reconstruction.AddCamera(before.ExistsCamera(scene_image.camera_id)
+                                   ? before.Camera(scene_image.camera_id)
+                                   : scene.cameras.at(scene_image.camera_id));
     }
     colmap::Image image;
     image.SetImageId(image_id);
@@ -161,6 +167,30 @@ RoundTracks BuildRoundTracks(const CoarseStructureOptions& options,
   return tracks;
 }
 
+// The model of a round before its adjustment: the poses (and cameras) so far,
+// and points triangulated afresh from them.
+void BuildRound(const CoarseStructureOptions& options, const SceneData& scene,
+                const std::map<image_t, std::vector<Bearing>>& bearings,
+                const CoarseModelInput& input, const RoundTracks& tracks,
+                int round, CoarseModel* model) {
+  const bool is_first = round == 0;
+  const std::map<image_t, Rigid3d> cams_from_world =
+      is_first ? input.cams_from_world : CamsFromWorld(model->reconstruction);
+  std::map<image_t, std::vector<Bearing>> refined;
+  if (!is_first && options.bundle.RefinesCameras()) {
+    refined = ComputeModelBearings(model->reconstruction,
+                                   options.triangulation.num_threads);
+  }
+  std::vector<TriangulatedTrack> points =
+      TriangulateTracks(TriangulationOptions(options, round), cams_from_world,
+                        refined.empty() ? bearings : refined,
+                        tracks.Of(round + 1 == options.num_rounds));
+  model->reconstruction =
+      CreateReconstruction(scene, cams_from_world, model->reconstruction);
+  AddPoints(SelectPoints(options, std::move(points), &model->min_angle_deg),
+            &model->reconstruction);
+}
+
 // The balance of vision and priors means something at the optimum only, so the
 // last round finds it.
 PriorBundleAdjustmentSummary AdjustRound(
@@ -229,21 +259,15 @@ CoarseModel BuildCoarseModel(
 
   double keypoint_sigma_factor = 1.0;
   for (int round = 0; round < options.num_rounds; ++round) {
-    const std::map<image_t, Rigid3d> cams_from_world =
-        round == 0 ? input.cams_from_world
-                   : CamsFromWorld(model.reconstruction);
-    model.reconstruction = CreateReconstruction(scene, cams_from_world);
-    AddPoints(
-        SelectPoints(options,
-                     TriangulateTracks(
-                         TriangulationOptions(options, round), cams_from_world,
-                         bearings, tracks.Of(round + 1 == options.num_rounds)),
-                     &model.min_angle_deg),
-        &model.reconstruction);
+    BuildRound(options, scene, bearings, input, tracks, round, &model);
     model.rounds.push_back(AdjustRound(options, problem, round,
                                        &model.reconstruction,
                                        &keypoint_sigma_factor));
     if (!model.rounds.back().success) break;
+  }
+  if (keypoint_sigma_factor > 1.0 && !options.bundle.RefinesCameras()) {
+    model.focal_length_ratio = FindFocalLengthError(
+        options.balance, options.bundle, problem, model.reconstruction);
   }
   model.reconstruction.FilterAllPoints3D(
       options.final_max_reproj_error_px,
@@ -254,6 +278,8 @@ CoarseModel BuildCoarseModel(
       options.bundle.keypoint_sigma_px * keypoint_sigma_factor;
   model.prior_chi2_per_dof =
       ComputePriorChi2PerDof(problem.priors, model.reconstruction);
+  model.priors_agree =
+      model.prior_chi2_per_dof <= options.balance.max_chi2_per_dof;
   FillFigures(options, &model);
   return model;
 }

@@ -4,6 +4,7 @@
 #include <base/reconstruction.h>
 
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -71,6 +72,10 @@ struct CoarseModel {
   // As in RefineModelSummary.
   double keypoint_sigma_px = 0.0;
   double prior_chi2_per_dof = 0.0;
+  // Whether vision and the priors agree within what the balance may ask for.
+  bool priors_agree = true;
+  // FindFocalLengthError, when keypoints could not keep their sigma.
+  std::optional<double> focal_length_ratio;
   // Smallest triangulation angle that had to be accepted.
   double min_angle_deg = 0.0;
   // Images with fewer points than asked for, in spite of that.

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "colmap_ext/global_report.h"
 
+#include <cmath>
 #include <iomanip>
 #include <nlohmann/json.hpp>
 #include <sstream>
@@ -48,6 +49,8 @@ Json ModelJson(const SceneData& scene, const CoarseComponent& component,
           {"min_triangulation_angle_deg", model.min_angle_deg},
           {"keypoint_sigma_px", model.keypoint_sigma_px},
           {"prior_chi2_per_dof", model.prior_chi2_per_dof},
+          {"priors_agree", model.priors_agree},
+          {"focal_length_ratio", model.focal_length_ratio.value_or(1.0)},
           {"metric", model.metric},
           {"gravity_aligned", model.gravity_aligned},
           {"rotations_converged", component.rotations_converged},
@@ -57,6 +60,31 @@ Json ModelJson(const SceneData& scene, const CoarseComponent& component,
           {"rotation_optimality", component.sdp_optimality},
           {"unverified_joins", JoinsJson(scene, component.unverified_joins)},
           {"adjustments", rounds}};
+}
+
+void AppendPriorWarnings(const CoarseModel& model,
+                         std::vector<std::string>* warnings) {
+  std::ostringstream text;
+  text << std::fixed << std::setprecision(1);
+  if (model.focal_length_ratio.has_value()) {
+    text << "vision and sensors agree only with a focal length that is "
+         << 100.0 * std::abs(*model.focal_length_ratio - 1.0) << " % "
+         << (*model.focal_length_ratio > 1.0 ? "longer" : "shorter")
+         << ": check the intrinsics, or have them refined "
+            "(--AdaSfmGlobal.ba_refine_focal_length 1 and "
+            "--AdaSfmMapper.refine_focal_length 1)";
+  } else if (!model.priors_agree) {
+    text << "vision and sensors contradict each other (squared errors of the "
+            "sensors are "
+         << model.prior_chi2_per_dof
+         << " times what their noise allows, though keypoints were taken for "
+         << model.keypoint_sigma_px
+         << " px): check the intrinsics, T_cam_imu, timeshift_cam_imu and the "
+            "noise figures of the sensors";
+  } else {
+    return;
+  }
+  warnings->push_back(text.str());
 }
 
 }  // namespace
@@ -125,6 +153,9 @@ std::string FormatGlobalReportText(const GlobalStageResult& result,
 std::vector<std::string> ListGlobalWarnings(const SceneData& scene,
                                             const GlobalStageResult& result) {
   std::vector<std::string> warnings;
+  for (const CoarseModel& model : result.models) {
+    AppendPriorWarnings(model, &warnings);
+  }
   for (const CoarseComponent& component : result.poses.components) {
     if (!component.positions_converged) {
       std::ostringstream text;

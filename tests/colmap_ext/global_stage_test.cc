@@ -111,6 +111,76 @@ TEST(RunGlobalStageTest, SameResultOnAnyNumberOfThreads) {
   EXPECT_EQ(single.geometries.size(), several.geometries.size());
 }
 
+// A focal length that is 3 % too long bends the epipolar lines; once the
+// adjustment has found the right one, the matches are judged by that.
+TEST(RunGlobalStageTest, MatchesAreRefinedUnderRefinedCameras) {
+  for (const uint64_t seed : {1, 2}) {
+    SyntheticWorldOptions world_options = SmallWorld();
+    world_options.seed = seed;
+    const SyntheticWorld world = BuildSyntheticWorld(world_options);
+    SceneData scene = BuildSyntheticScene(world, SyntheticPriorOptions());
+    const auto set_focal_length = [&](double focal_px) {
+      scene.cameras.at(1).InitializeWithName(
+          "SIMPLE_PINHOLE", focal_px, world.camera.width, world.camera.height);
+      scene.cameras.at(1).SetCameraId(1);
+    };
+    set_focal_length(world.camera.focal_px);
+    const GlobalStageResult right = RunStage(scene);
+    set_focal_length(1.03 * world.camera.focal_px);
+    GlobalStageOptions options;
+    options.structure.bundle.refine_focal_length = true;
+    const GlobalStageResult refined = RunStage(scene, options);
+    ASSERT_EQ(refined.models.size(), 1);
+    EXPECT_NEAR(refined.models[0].reconstruction.Camera(1).FocalLength() /
+                    world.camera.focal_px,
+                1.0, 0.003);
+    EXPECT_NEAR(refined.refinement.num_kept, right.refinement.num_kept,
+                0.005 * right.refinement.num_kept)
+        << seed;
+  }
+}
+
+// A camera that is mounted 3 deg off what the calibration says: no weights
+// bring vision and sensors together.
+TEST(RunGlobalStageTest, WarnsWhenSensorsAndVisionContradictEachOther) {
+  const SyntheticWorld world = BuildSyntheticWorld(SmallWorld());
+  SceneData scene = BuildSyntheticScene(world, SyntheticPriorOptions());
+  EXPECT_TRUE(ListGlobalWarnings(scene, RunStage(scene)).empty());
+  const Eigen::Quaterniond turn =
+      ExpSo3(DegToRad(3.0) * Eigen::Vector3d::UnitY());
+  for (RelativePosePrior& prior : scene.priors) {
+    prior.cam2_from_cam1 =
+        Rigid3d(turn * prior.cam2_from_cam1.rotation * turn.conjugate(),
+                turn * prior.cam2_from_cam1.translation);
+  }
+  const GlobalStageResult result = RunStage(scene);
+  EXPECT_FALSE(result.models[0].priors_agree);
+  const std::vector<std::string> warnings = ListGlobalWarnings(scene, result);
+  ASSERT_EQ(warnings.size(), 1);
+  EXPECT_NE(warnings[0].find("T_cam_imu"), std::string::npos);
+}
+
+// 90 m of road show a focal length that is a tenth off; more road shows less.
+TEST(RunGlobalStageTest, WarnsOfAWrongFocalLength) {
+  for (const double ratio : {0.9, 1.1}) {
+    const SyntheticWorld world = BuildSyntheticWorld(SmallWorld());
+    SceneData scene = BuildSyntheticScene(world, SyntheticPriorOptions());
+    for (const size_t i : scene.cameras.at(1).FocalLengthIdxs()) {
+      scene.cameras.at(1).Params(i) *= ratio;
+    }
+    const GlobalStageResult result = RunStage(scene);
+    ASSERT_TRUE(result.models[0].focal_length_ratio.has_value()) << ratio;
+    EXPECT_NEAR(*result.models[0].focal_length_ratio, 1.0 / ratio, 0.01);
+    const std::vector<std::string> warnings = ListGlobalWarnings(scene, result);
+    ASSERT_FALSE(warnings.empty());
+    EXPECT_NE(warnings[0].find(ratio > 1.0 ? "shorter" : "longer"),
+              std::string::npos);
+    // The cameras are the user's: told, not changed.
+    EXPECT_EQ(result.models[0].reconstruction.Camera(1).Params(),
+              scene.cameras.at(1).Params());
+  }
+}
+
 TEST(RunGlobalStageTest, SwitchesOffMatchRefinement) {
   const SyntheticWorld world = BuildSyntheticWorld(SmallWorld());
   GlobalStageOptions options;
