@@ -18,55 +18,68 @@ size_t UpperBound(const std::vector<ImuSample>& samples, timestamp_t time_ns) {
          samples.begin();
 }
 
-// Appends one step of constant angular velocity and specific force. Noise is
-// white with the densities in noise: a step's mean has the variance
-// density^2 / dt.
-void IntegrateStep(const Eigen::Vector3d& angular_velocity,
-                   const Eigen::Vector3d& specific_force, double dt,
-                   const ImuNoise& noise, ImuPreintegration* sum) {
-  const Eigen::Vector3d turn = angular_velocity * dt;
-  const Eigen::Quaterniond step_rotation = ExpSo3(turn);
-  const Eigen::Matrix3d step_transposed =
-      step_rotation.toRotationMatrix().transpose();
-  const Eigen::Matrix3d right_jacobian = RightJacobianSo3(turn);
-  // The force turns with the body: its mean over the step, in the frame at the
-  // step's start, is close to that at the middle.
-  const Eigen::Matrix3d middle =
-      (sum->delta_rotation * ExpSo3(0.5 * turn)).toRotationMatrix();
-  const Eigen::Vector3d acceleration = middle * specific_force;
-  // d (middle f) = -middle [f]x (dtheta at the middle).
-  const Eigen::Matrix3d by_rotation = -middle * Hat(specific_force);
-  const Eigen::Matrix3d half_transposed =
-      ExpSo3(0.5 * turn).toRotationMatrix().transpose();
-  const Eigen::Matrix3d force_by_rotation = by_rotation * half_transposed;
+// What a step of constant rate and force turns and accelerates by, and how that
+// depends on its first attitude.
+struct ImuStep {
+  ImuStep(const Eigen::Vector3d& angular_velocity,
+          const Eigen::Vector3d& specific_force, double step_s,
+          const Eigen::Quaterniond& delta_rotation)
+      : dt(step_s), half_dt2(0.5 * step_s * step_s) {
+    const Eigen::Vector3d turn = angular_velocity * dt;
+    rotation = ExpSo3(turn);
+    right_jacobian = RightJacobianSo3(turn);
+    // The force turns with the body: its mean over the step, in the frame at
+    // the step's start, is close to that at the middle.
+    middle = (delta_rotation * ExpSo3(0.5 * turn)).toRotationMatrix();
+    acceleration = middle * specific_force;
+    // d (middle f) = -middle [f]x (dtheta at the middle).
+    force_by_middle = -middle * Hat(specific_force);
+    half_transposed = ExpSo3(0.5 * turn).toRotationMatrix().transpose();
+    transposed = rotation.toRotationMatrix().transpose();
+  }
 
-  // Bias Jacobians, from the last row up: each uses the old ones.
+  double dt;
+  double half_dt2;
+  Eigen::Quaterniond rotation;
+  Eigen::Matrix3d transposed, half_transposed, right_jacobian, middle;
+  Eigen::Vector3d acceleration;
+  Eigen::Matrix3d force_by_middle;
+};
+
+// From the last row up: each uses the old ones.
+void IntegrateBiasJacobians(const ImuStep& step, ImuPreintegration* sum) {
   const Eigen::Matrix3d middle_by_gyroscope =
-      half_transposed * sum->rotation_by_gyroscope -
-      0.5 * dt * Eigen::Matrix3d::Identity();
-  const Eigen::Matrix3d force_by_gyroscope = by_rotation * middle_by_gyroscope;
-  const double half_dt2 = 0.5 * dt * dt;
+      step.half_transposed * sum->rotation_by_gyroscope -
+      0.5 * step.dt * Eigen::Matrix3d::Identity();
+  const Eigen::Matrix3d force_by_gyroscope =
+      step.force_by_middle * middle_by_gyroscope;
   sum->position_by_gyroscope +=
-      dt * sum->velocity_by_gyroscope + half_dt2 * force_by_gyroscope;
+      step.dt * sum->velocity_by_gyroscope + step.half_dt2 * force_by_gyroscope;
   sum->position_by_accelerometer +=
-      dt * sum->velocity_by_accelerometer - half_dt2 * middle;
-  sum->velocity_by_gyroscope += dt * force_by_gyroscope;
-  sum->velocity_by_accelerometer -= dt * middle;
-  sum->rotation_by_gyroscope =
-      step_transposed * sum->rotation_by_gyroscope - dt * right_jacobian;
+      step.dt * sum->velocity_by_accelerometer - step.half_dt2 * step.middle;
+  sum->velocity_by_gyroscope += step.dt * force_by_gyroscope;
+  sum->velocity_by_accelerometer -= step.dt * step.middle;
+  sum->rotation_by_gyroscope = step.transposed * sum->rotation_by_gyroscope -
+                               step.dt * step.right_jacobian;
+}
 
-  // Covariance (Forster 2015, eq. 63).
+// Forster 2015, eq. 63.
+void IntegrateCovariance(const ImuStep& step, const ImuNoise& noise,
+                         ImuPreintegration* sum) {
+  const double dt = step.dt;
+  const Eigen::Matrix3d force_by_rotation =
+      step.force_by_middle * step.half_transposed;
   Eigen::Matrix<double, 9, 9> transition =
       Eigen::Matrix<double, 9, 9>::Identity();
-  transition.block<3, 3>(0, 0) = step_transposed;
+  transition.block<3, 3>(0, 0) = step.transposed;
   transition.block<3, 3>(3, 0) = dt * force_by_rotation;
-  transition.block<3, 3>(6, 0) = half_dt2 * force_by_rotation;
+  transition.block<3, 3>(6, 0) = step.half_dt2 * force_by_rotation;
   transition.block<3, 3>(6, 3) = dt * Eigen::Matrix3d::Identity();
   Eigen::Matrix<double, 9, 6> input = Eigen::Matrix<double, 9, 6>::Zero();
-  input.block<3, 3>(0, 0) = dt * right_jacobian;
-  input.block<3, 3>(3, 0) = half_dt2 * by_rotation;
-  input.block<3, 3>(3, 3) = dt * middle;
-  input.block<3, 3>(6, 3) = half_dt2 * middle;
+  input.block<3, 3>(0, 0) = dt * step.right_jacobian;
+  input.block<3, 3>(3, 0) = step.half_dt2 * step.force_by_middle;
+  input.block<3, 3>(3, 3) = dt * step.middle;
+  input.block<3, 3>(6, 3) = step.half_dt2 * step.middle;
   Eigen::Matrix<double, 6, 1> variance;
   variance.head<3>().setConstant(noise.gyroscope_noise_density *
                                  noise.gyroscope_noise_density / dt);
@@ -80,10 +93,21 @@ void IntegrateStep(const Eigen::Vector3d& angular_velocity,
   sum->covariance.bottomRightCorner<3, 3>().diagonal().array() +=
       noise.accelerometer_noise_density * noise.accelerometer_noise_density *
       dt * dt * dt / 12.0;
+}
 
-  sum->delta_position += dt * sum->delta_velocity + half_dt2 * acceleration;
-  sum->delta_velocity += dt * acceleration;
-  sum->delta_rotation = (sum->delta_rotation * step_rotation).normalized();
+// Appends one step of constant angular velocity and specific force. Noise is
+// white with the densities in noise: a step's mean has the variance
+// density^2 / dt.
+void IntegrateStep(const Eigen::Vector3d& angular_velocity,
+                   const Eigen::Vector3d& specific_force, double dt,
+                   const ImuNoise& noise, ImuPreintegration* sum) {
+  const ImuStep step(angular_velocity, specific_force, dt, sum->delta_rotation);
+  IntegrateBiasJacobians(step, sum);
+  IntegrateCovariance(step, noise, sum);
+  sum->delta_position +=
+      dt * sum->delta_velocity + step.half_dt2 * step.acceleration;
+  sum->delta_velocity += dt * step.acceleration;
+  sum->delta_rotation = (sum->delta_rotation * step.rotation).normalized();
   sum->dt_s += dt;
 }
 

@@ -60,6 +60,8 @@ class Smoother {
   double Step();
   // Thresholds are the options' times factor.
   void UpdateWeights(double factor);
+  OdometryMotion Motion(size_t k, const LinkCovariance& covariance) const;
+  std::vector<std::pair<size_t, double>> FindSlippingLinks() const;
   void FillResult(OdometryFusionResult* result) const;
 
   const OdometryFusionProblem& problem_;
@@ -179,61 +181,70 @@ void Smoother::UpdateWeights(double factor) {
   }
 }
 
+OdometryMotion Smoother::Motion(size_t k,
+                                const LinkCovariance& covariance) const {
+  OdometryMotion motion;
+  const Eigen::Matrix3d r2_transposed =
+      states_[k + 1].state.world_from_imu.toRotationMatrix().transpose();
+  const Eigen::Quaterniond r21 =
+      states_[k + 1].state.world_from_imu.conjugate() *
+      states_[k].state.world_from_imu;
+  const Eigen::Vector3d& step = states_[k + 1].step_in_previous;
+  motion.body2_from_body1 = Rigid3d(r21, r21 * -step);
+  motion.wheel_weight = weights_[k].wheel;
+  // dtheta = R2^T (d1 - d2), dt = [R21 u]x dtheta - R21 du.
+  Eigen::Matrix<double, 6, kLinkSize> map;
+  map.setZero();
+  map.block<3, 3>(0, ChainState::kRotation) = r2_transposed;
+  map.block<3, 3>(0, ChainState::kSize + ChainState::kRotation) =
+      -r2_transposed;
+  map.bottomRows<3>() = Hat(r21 * step) * map.topRows<3>();
+  map.block<3, 3>(3, ChainState::kSize + ChainState::kStep) -=
+      r21.toRotationMatrix();
+  motion.covariance = map * covariance * map.transpose();
+  return motion;
+}
+
+std::vector<std::pair<size_t, double>> Smoother::FindSlippingLinks() const {
+  std::vector<std::pair<size_t, double>> links;
+  for (size_t k = 0; k < problem_.links.size(); ++k) {
+    const OdometryLink& link = problem_.links[k];
+    if (!link.has_wheel || weights_[k].wheel > kSlipWeight) continue;
+    const double speed_error = ComputeWheelSpeedError(problem_, k, states_[k],
+                                                      states_[k + 1], globals_);
+    if (std::abs(speed_error) >= options_.slip_min_speed_m_s) {
+      links.emplace_back(k, speed_error);
+    }
+  }
+  return links;
+}
+
 void Smoother::FillResult(OdometryFusionResult* result) const {
+  constexpr int kLength = 2 * ChainState::kSize + ChainGlobals::kLoggedLength;
+  constexpr int kMount = 2 * ChainState::kSize + ChainGlobals::kMountYaw;
+  const double length = globals_.values[ChainGlobals::kLoggedLength];
   const size_t num_links = problem_.links.size();
   result->motions.resize(num_links);
   double gyro_variance = 0.0, accel_variance = 0.0;
   ComputeChainCovariances(
       num_links, FirstMessage(), [this](size_t k) { return Equations(k); },
       [&](size_t k, const LinkCovariance& covariance) {
-        OdometryMotion& motion = result->motions[k];
-        const Eigen::Matrix3d r2_transposed =
-            states_[k + 1].state.world_from_imu.toRotationMatrix().transpose();
-        const Eigen::Quaterniond r21 =
-            states_[k + 1].state.world_from_imu.conjugate() *
-            states_[k].state.world_from_imu;
-        const Eigen::Vector3d& step = states_[k + 1].step_in_previous;
-        motion.body2_from_body1 = Rigid3d(r21, r21 * -step);
-        motion.wheel_weight = weights_[k].wheel;
-        // dtheta = R2^T (d1 - d2), dt = [R21 u]x dtheta - R21 du.
-        Eigen::Matrix<double, 6, kLinkSize> map;
-        map.setZero();
-        map.block<3, 3>(0, ChainState::kRotation) = r2_transposed;
-        map.block<3, 3>(0, ChainState::kSize + ChainState::kRotation) =
-            -r2_transposed;
-        map.bottomRows<3>() = Hat(r21 * step) * map.topRows<3>();
-        map.block<3, 3>(3, ChainState::kSize + ChainState::kStep) -=
-            r21.toRotationMatrix();
-        motion.covariance = map * covariance * map.transpose();
-        gyro_variance +=
-            covariance.diagonal().segment<3>(ChainState::kGyro).mean();
-        accel_variance +=
-            covariance.diagonal().segment<3>(ChainState::kAccel).mean();
-        constexpr int kLength =
-            2 * ChainState::kSize + ChainGlobals::kLoggedLength;
-        const double length = globals_.values[ChainGlobals::kLoggedLength];
+        result->motions[k] = Motion(k, covariance);
+        const auto variances = covariance.diagonal();
+        gyro_variance += variances.segment<3>(ChainState::kGyro).mean();
+        accel_variance += variances.segment<3>(ChainState::kAccel).mean();
         result->wheel_scale_sigma =
             std::sqrt(covariance(kLength, kLength)) / (length * length);
-        constexpr int kMount = 2 * ChainState::kSize + ChainGlobals::kMountYaw;
-        result->wheel_mount_sigma =
-            covariance.diagonal().segment<2>(kMount).cwiseSqrt();
+        result->wheel_mount_sigma = variances.segment<2>(kMount).cwiseSqrt();
       });
-  result->wheel_scale = 1.0 / globals_.values[ChainGlobals::kLoggedLength];
+  result->wheel_scale = 1.0 / length;
   result->wheel_mount = globals_.values.segment<2>(ChainGlobals::kMountYaw);
   if (num_links > 0) {
     result->gyroscope_bias_sigma = std::sqrt(gyro_variance / num_links);
     result->accelerometer_bias_sigma = std::sqrt(accel_variance / num_links);
   }
   for (const ChainState& state : states_) result->states.push_back(state.state);
-  for (size_t k = 0; k < num_links; ++k) {
-    const OdometryLink& link = problem_.links[k];
-    if (!link.has_wheel || weights_[k].wheel > kSlipWeight) continue;
-    const double speed_error = ComputeWheelSpeedError(problem_, k, states_[k],
-                                                      states_[k + 1], globals_);
-    if (std::abs(speed_error) >= options_.slip_min_speed_m_s) {
-      result->slipping_links.emplace_back(k, speed_error);
-    }
-  }
+  result->slipping_links = FindSlippingLinks();
 }
 
 OdometryFusionResult Smoother::Run() {
