@@ -18,6 +18,28 @@ std::string ToText(const Eigen::Vector3d& vector) {
   return text.str();
 }
 
+std::string ImuLines(const SensorSummary& summary) {
+  std::ostringstream text;
+  text.precision(4);
+  text << "IMU                 " << summary.imu_rate_hz << " Hz, "
+       << summary.num_imu_gaps << " gaps (longest " << summary.max_imu_gap_s
+       << " s)\n"
+       << "gyroscope bias      " << ToText(summary.gyroscope_bias) << " +- "
+       << summary.gyroscope_bias_sigma << " rad/s\n"
+       << "accelerometer bias  " << ToText(summary.accelerometer_bias) << " +- "
+       << summary.accelerometer_bias_sigma << " m/s^2\n"
+       << "gravity             " << ToText(summary.first_gravity_in_cam)
+       << " in the first camera\n"
+       << "standstill          " << summary.standstill_s << " s\n"
+       << "vision in smoother  " << summary.num_visual_links << " pairs, +- "
+       << summary.visual_sigma_deg << " deg\n";
+  if (summary.gyroscope_lag_s > 0.0) {
+    text << "gyroscope filter    low-pass of " << summary.gyroscope_lag_s
+         << " s undone\n";
+  }
+  return text.str();
+}
+
 }  // namespace
 
 std::string FormatPriorImport(const PriorImport& import) {
@@ -32,20 +54,7 @@ std::string FormatPriorImport(const PriorImport& import) {
        << "time shift          " << summary.timeshift_cam_imu_s
        << " s, vision would add " << summary.visual_timeshift_correction_s
        << " s\n";
-  if (summary.imu_rate_hz > 0.0) {
-    text << "IMU                 " << summary.imu_rate_hz << " Hz, "
-         << summary.num_imu_gaps << " gaps (longest " << summary.max_imu_gap_s
-         << " s)\n"
-         << "gyroscope bias      " << ToText(summary.gyroscope_bias) << " +- "
-         << summary.gyroscope_bias_sigma << " rad/s\n"
-         << "accelerometer bias  " << ToText(summary.accelerometer_bias)
-         << " +- " << summary.accelerometer_bias_sigma << " m/s^2\n"
-         << "gravity             " << ToText(summary.first_gravity_in_cam)
-         << " in the first camera\n"
-         << "standstill          " << summary.standstill_s << " s\n"
-         << "vision in smoother  " << summary.num_visual_links << " pairs, +- "
-         << summary.visual_sigma_deg << " deg\n";
-  }
+  if (summary.imu_rate_hz > 0.0) text << ImuLines(summary);
   if (summary.wheel_rate_hz > 0.0) {
     text << "wheels              " << summary.wheel_rate_hz << " Hz, "
          << summary.num_wheel_gaps << " gaps (longest "
@@ -81,6 +90,8 @@ std::string PriorImportToJson(const PriorImport& import) {
       {"num_visual_rotations", import.num_visual_rotations},
       {"timeshift_cam_imu_s", summary.timeshift_cam_imu_s},
       {"visual_timeshift_correction_s", summary.visual_timeshift_correction_s},
+      {"gyroscope_lag_s", summary.gyroscope_lag_s},
+      {"gyroscope_delay_s", summary.gyroscope_delay_s},
       {"num_visual_links", summary.num_visual_links},
       {"visual_sigma_deg", summary.visual_sigma_deg},
       {"imu_rate_hz", summary.imu_rate_hz},

@@ -9,6 +9,7 @@
 #include "core/status.h"
 #include "core/types.h"
 #include "sensors/calibration.h"
+#include "sensors/gyroscope_filter.h"
 
 namespace adasfm {
 
@@ -52,6 +53,9 @@ struct VisionCheck {
   Eigen::Matrix3d best_axes = Eigen::Matrix3d::Identity();
   bool is_inverted = false;  // imu_from_cam in place of cam_from_imu
   Eigen::Vector3d gyroscope_bias = Eigen::Vector3d::Zero();
+  // On the IMU's clock as shifted by the correction above; without a lag unless
+  // vision is clearly better explained with one.
+  GyroscopeFilter filter;
   // The only mistake is the time shift.
   bool contradiction_is_time_shift = false;
   // Empty when vision and gyroscope agree; else one line that names the

@@ -3,25 +3,19 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <stdexcept>
-#include <tuple>
 
 #include "core/so3.h"
 #include "sensors/build_odometry_links.h"
 #include "sensors/check_against_vision.h"
 #include "sensors/compose_prior.h"
+#include "sensors/format_figures.h"
 #include "sensors/initial_odometry.h"
+#include "sensors/select_images.h"
 #include "sensors/visual_links.h"
 
 namespace adasfm {
 namespace {
-
-std::string Format(const char* format, double a, double b = 0.0) {
-  char buffer[256];
-  std::snprintf(buffer, sizeof(buffer), format, a, b);
-  return buffer;
-}
 
 timestamp_t NsFromSeconds(double seconds) {
   return std::llround(1e9 * seconds);
@@ -40,8 +34,9 @@ class PriorEstimator {
 
  private:
   void SelectLogs(const SensorLogs& logs);
-  Status SelectImages(std::vector<ImageStamp> images);
+  Status FindImagesInLogs();
   Status CheckVision();
+  void UndoFilter(const VisionCheck& check);
   void Fuse();
   void BuildPriors();
   void FillSummary();
@@ -82,43 +77,17 @@ void PriorEstimator::SelectLogs(const SensorLogs& logs) {
   SummarizeRates(logs_, &summary);
   if (summary.imu_rate_hz > 0.0 &&
       std::abs(summary.imu_rate_hz / calibration_.imu_rate_hz - 1.0) > 0.2) {
-    summary.warnings.push_back(
-        Format("the IMU log runs at %.1f Hz where imu0/update_rate says %.1f",
-               summary.imu_rate_hz, calibration_.imu_rate_hz));
+    summary.warnings.push_back(FormatFigures(
+        "the IMU log runs at %.1f Hz where imu0/update_rate says %.1f",
+        summary.imu_rate_hz, calibration_.imu_rate_hz));
   }
 }
 
-Status PriorEstimator::SelectImages(std::vector<ImageStamp> images) {
-  std::sort(images.begin(), images.end(),
-            [](const ImageStamp& a, const ImageStamp& b) {
-              return std::tie(a.timestamp_ns, a.image_id) <
-                     std::tie(b.timestamp_ns, b.image_id);
-            });
-  for (size_t i = 1; i < images.size(); ++i) {
-    if (images[i].timestamp_ns == images[i - 1].timestamp_ns) {
-      return Status::Error("images '" + images[i - 1].name + "' and '" +
-                           images[i].name +
-                           "' have the same time; one camera is expected");
-    }
-  }
-  all_images_ = std::move(images);
-  images_.clear();
-  const timestamp_t start = logs_.StartNs(), end = logs_.EndNs();
-  for (const ImageStamp& image : all_images_) {
-    const timestamp_t time = image.timestamp_ns + timeshift_ns_;
-    if (time >= start && time <= end) images_.push_back(image);
-  }
-  if (images_.empty()) {
-    const double first = SecondsFromNs(all_images_.front().timestamp_ns);
-    const double last = SecondsFromNs(all_images_.back().timestamp_ns);
-    return Status::Error(
-        Format("no image lies within the sensor logs: images run from %.3f to "
-               "%.3f s, ",
-               first, last) +
-        Format("logs from %.3f to %.3f s; check the clocks (units, epoch, "
-               "timeshift_cam_imu)",
-               SecondsFromNs(start), SecondsFromNs(end)));
-  }
+Status PriorEstimator::FindImagesInLogs() {
+  StatusOr<std::vector<ImageStamp>> images =
+      SelectImages(all_images_, timeshift_ns_, logs_.StartNs(), logs_.EndNs());
+  if (!images.ok()) return images.status();
+  images_ = std::move(images).value();
   return Status::Ok();
 }
 
@@ -148,7 +117,20 @@ Status PriorEstimator::CheckVision() {
   }
   has_visual_bias_ = options_.use_visual_rotations;
   visual_bias_ = check.gyroscope_bias;
+  if (options_.undo_gyroscope_filter) UndoFilter(check);
   return Status::Ok();
+}
+
+void PriorEstimator::UndoFilter(const VisionCheck& check) {
+  if (check.filter.lag_s == 0.0) return;
+  // Of the clock in use.
+  GyroscopeFilter filter = check.filter;
+  filter.delay_s += calibration_.timeshift_cam_imu_s +
+                    check.time_shift_correction_s -
+                    SecondsFromNs(timeshift_ns_);
+  UndoGyroscopeFilter(filter, &logs_.imu);
+  estimate_.summary.gyroscope_lag_s = filter.lag_s;
+  estimate_.summary.gyroscope_delay_s = filter.delay_s;
 }
 
 ImuBias PriorEstimator::FirstBias() const {
@@ -262,7 +244,10 @@ StatusOr<PriorEstimate> PriorEstimator::Run(
   }
   timeshift_ns_ = NsFromSeconds(calibration_.timeshift_cam_imu_s);
   // 1. Images inside the logs.
-  Status status = SelectImages(images);
+  StatusOr<std::vector<ImageStamp>> ordered = OrderImages(images);
+  if (!ordered.ok()) return ordered.status();
+  all_images_ = std::move(ordered).value();
+  Status status = FindImagesInLogs();
   if (!status.ok()) return status;
   // 2. Vision against the gyroscope; it may move the time shift.
   std::map<image_t, timestamp_t> times_ns;
@@ -273,7 +258,7 @@ StatusOr<PriorEstimate> PriorEstimator::Run(
   const timestamp_t calibrated_shift = timeshift_ns_;
   status = CheckVision();
   if (status.ok() && timeshift_ns_ != calibrated_shift) {
-    status = SelectImages(images);
+    status = FindImagesInLogs();
   }
   if (!status.ok()) return status;
   // 3. and 4. Preintegration and smoother.

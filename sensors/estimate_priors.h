@@ -60,6 +60,9 @@ struct PriorEstimationOptions {
   // Whether the time shift that vision and gyroscope agree on is added to the
   // calibration's.
   bool estimate_time_shift = false;
+  // Whether a low-pass filter in the gyroscope's log that vision clearly shows
+  // (sensors/gyroscope_filter.h) is undone.
+  bool undo_gyroscope_filter = true;
   OdometryFusionOptions fusion;
 
   bool IsValid(std::string* error) const;

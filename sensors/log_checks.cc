@@ -3,9 +3,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 
 #include "core/median.h"
+#include "sensors/format_figures.h"
 
 namespace adasfm {
 namespace {
@@ -19,12 +19,6 @@ constexpr double kRestTolerance = 0.05;
 // Gyroscopes of machines saturate near 2000 deg/s = 35 rad/s; an rms above
 // this (290 deg/s over the whole log) is a log in degrees.
 constexpr double kMaxRateRms = 5.0;
-
-std::string Format(const char* format, double a, double b = 0.0) {
-  char buffer[256];
-  std::snprintf(buffer, sizeof(buffer), format, a, b);
-  return buffer;
-}
 
 // Samples in windows of about one second.
 constexpr double kWindowS = 1.0;
@@ -77,16 +71,17 @@ Status CheckForceUnits(const std::vector<ImuSample>& samples,
   if (median > 0.5 && median < 2.0) {
     return Status::Error(
         origin.Locate(0) +
-        Format(": |a| is %.2f over the log: accelerations look like g; "
-               "multiply columns 5 to 7 by 9.81 (m/s^2 are expected)",
-               median));
+        FormatFigures(": |a| is %.2f over the log: accelerations look like g; "
+                      "multiply columns 5 to 7 by 9.81 (m/s^2 are expected)",
+                      median));
   }
   if (median < 0.5 * kGravity || median > kMaxMeanForceInG * kGravity) {
     return Status::Error(
         origin.Locate(0) +
-        Format(": |a| is %.3g over the log where about 9.81 m/s^2 is "
-               "expected; accelerations must contain gravity and be in m/s^2",
-               median));
+        FormatFigures(
+            ": |a| is %.3g over the log where about 9.81 m/s^2 is "
+            "expected; accelerations must contain gravity and be in m/s^2",
+            median));
   }
   return Status::Ok();
 }
@@ -114,9 +109,10 @@ Status CheckLogTimes(const std::vector<timestamp_t>& times_ns,
     }
     return Status::Error(
         origin.Locate(i) +
-        Format(": time goes back by %.6f s; the log is not in order of time "
-               "or joins two recordings: sort it or cut it",
-               SecondsFromNs(times_ns[i - 1] - times_ns[i])));
+        FormatFigures(
+            ": time goes back by %.6f s; the log is not in order of time "
+            "or joins two recordings: sort it or cut it",
+            SecondsFromNs(times_ns[i - 1] - times_ns[i])));
   }
   const double period = ComputeMedianPeriod(times_ns);
   size_t num_gaps = 0, first = 0, longest = 0;
@@ -133,8 +129,8 @@ Status CheckLogTimes(const std::vector<timestamp_t>& times_ns,
   if (num_gaps > 0 && warnings != nullptr) {
     warnings->push_back(
         origin.Locate(first) + ": first of " + std::to_string(num_gaps) +
-        Format(" gaps of more than 3 periods; the longest lasts %.3f s",
-               longest_s) +
+        FormatFigures(" gaps of more than 3 periods; the longest lasts %.3f s",
+                      longest_s) +
         " before " + origin.unit + " " +
         std::to_string(origin.line_numbers[longest]) +
         "; samples were lost in the recording");
@@ -161,10 +157,11 @@ Status CheckImuUnits(const std::vector<ImuSample>& samples,
   if (rate_rms > kMaxRateRms) {
     return Status::Error(
         origin.Locate(largest) +
-        Format(": angular velocity is %.1f here and %.1f rms over the log: it "
-               "looks like deg/s; multiply columns 2 to 4 by pi / 180 (rad/s "
-               "are expected)",
-               samples[largest].angular_velocity.norm(), rate_rms));
+        FormatFigures(
+            ": angular velocity is %.1f here and %.1f rms over the log: it "
+            "looks like deg/s; multiply columns 2 to 4 by pi / 180 (rad/s "
+            "are expected)",
+            samples[largest].angular_velocity.norm(), rate_rms));
   }
   // At rest: windows with far less motion than any driving shows.
   for (const Window& window : ComputeWindows(samples)) {
@@ -175,9 +172,10 @@ Status CheckImuUnits(const std::vector<ImuSample>& samples,
     if (std::abs(norm - kGravity) > kRestTolerance * kGravity) {
       return Status::Error(
           origin.Locate(window.begin) +
-          Format(": |a| at rest is %.3f m/s^2, %.1f %% off 9.81; the "
-                 "accelerometer's scale or units are wrong: calibrate it",
-                 norm, 100.0 * std::abs(norm / kGravity - 1.0)));
+          FormatFigures(
+              ": |a| at rest is %.3f m/s^2, %.1f %% off 9.81; the "
+              "accelerometer's scale or units are wrong: calibrate it",
+              norm, 100.0 * std::abs(norm / kGravity - 1.0)));
     }
   }
   return Status::Ok();

@@ -39,6 +39,16 @@ Eigen::Vector3d RateIntegral::At(timestamp_t time_ns) const {
                0.5 * ratio * (b.angular_velocity - a.angular_velocity));
 }
 
+Eigen::Vector3d RateIntegral::MeanRate(timestamp_t time_ns) const {
+  constexpr timestamp_t kHalfWidthNs = 10'000'000;
+  const timestamp_t start =
+      std::max(time_ns - kHalfWidthNs, imu_.front().timestamp_ns);
+  const timestamp_t end =
+      std::min(time_ns + kHalfWidthNs, imu_.back().timestamp_ns);
+  if (end <= start) return Eigen::Vector3d::Zero();
+  return (At(end) - At(start)) / SecondsFromNs(end - start);
+}
+
 void RotationComparison::Append(const RotationComparison& other) {
   visual.insert(visual.end(), other.visual.begin(), other.visual.end());
   gyro.insert(gyro.end(), other.gyro.begin(), other.gyro.end());

@@ -19,6 +19,8 @@ class RateIntegral {
   bool Covers(timestamp_t time_ns) const;
   // Linear between samples; undefined outside of the log.
   Eigen::Vector3d At(timestamp_t time_ns) const;
+  // Mean angular velocity over 20 ms about a time, as far as the log reaches.
+  Eigen::Vector3d MeanRate(timestamp_t time_ns) const;
 
  private:
   const std::vector<ImuSample>& imu_;

@@ -39,6 +39,9 @@ struct SensorSummary {
   // The time shift in use, and what vision would add to it (0 when unknown).
   double timeshift_cam_imu_s = 0.0;
   double visual_timeshift_correction_s = 0.0;
+  // The low-pass filter that was undone (see GyroscopeFilter); 0: none.
+  double gyroscope_lag_s = 0.0;
+  double gyroscope_delay_s = 0.0;
   // Pairs whose two-view rotation took part in the smoother, and with which
   // sigma an axis.
   int num_visual_links = 0;

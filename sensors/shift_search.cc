@@ -16,6 +16,32 @@ constexpr double kMaxAngleRad = 1.0;
 // That many suffice; more would only take time.
 constexpr size_t kMaxNumRotations = 500;
 constexpr double kCoarseStepS = 0.02;
+constexpr double kMaxLagS = 0.1;
+
+// The argument of the least value between two bounds, by golden sections.
+template <typename Function>
+double Minimize(double low, double high, double tolerance,
+                const Function& function) {
+  constexpr double kRatio = 0.6180339887498949;
+  double a = high - kRatio * (high - low), b = low + kRatio * (high - low);
+  double value_a = function(a), value_b = function(b);
+  while (high - low > tolerance) {
+    if (value_a < value_b) {
+      high = b;
+      b = a;
+      value_b = value_a;
+      a = high - kRatio * (high - low);
+      value_a = function(a);
+    } else {
+      low = a;
+      a = b;
+      value_a = value_b;
+      b = low + kRatio * (high - low);
+      value_b = function(b);
+    }
+  }
+  return 0.5 * (low + high);
+}
 
 }  // namespace
 
@@ -40,20 +66,33 @@ void ShiftSearch::SelectRotations(const std::vector<TimedRotation>& rotations) {
     lengths.push_back(rotation.end_ns - rotation.start_ns);
   }
   std::sort(lengths.begin(), lengths.end());
+  if (lengths.empty()) return;
+  // The tenth part of the lengths is one frame's, however far the matching
+  // reached.
+  const timestamp_t frame_ns = lengths[lengths.size() / 10];
   for (const TimedRotation& rotation : usable) {
-    // Up to two frames: the tenth part of the lengths is one frame's, however
-    // far the matching reached.
-    const timestamp_t max_length = lengths[lengths.size() / 10] * 5 / 2;
-    if (rotation.end_ns - rotation.start_ns <= max_length &&
-        short_rotations_.size() < kMaxNumRotations) {
-      short_rotations_.push_back(rotation);
-    }
+    const timestamp_t length = rotation.end_ns - rotation.start_ns;
+    const auto add_up_to = [&](timestamp_t max_length_ns,
+                               std::vector<TimedRotation>* list) {
+      if (length > max_length_ns || list->size() >= kMaxNumRotations) return;
+      list->push_back(rotation);
+    };
+    add_up_to(frame_ns * 5 / 2, &short_rotations_);
+    add_up_to(frame_ns * 3 / 2, &frame_rotations_);
   }
+  const size_t min_num = 2 * options_.min_num_rotations;
+  if (short_rotations_.size() < min_num) short_rotations_ = rotations_;
+  if (frame_rotations_.size() < min_num) frame_rotations_ = short_rotations_;
 }
 
 RotationComparison ShiftSearch::Compare(
-    const std::vector<TimedRotation>& rotations, double shift_s) const {
+    const std::vector<TimedRotation>& rotations, double shift_s,
+    double lag_s) const {
   const timestamp_t shift = std::llround(1e9 * (timeshift_s_ + shift_s));
+  const auto turn_until = [&](timestamp_t time) -> Eigen::Vector3d {
+    if (lag_s == 0.0) return integral_.At(time);
+    return integral_.At(time) + lag_s * integral_.MeanRate(time);
+  };
   RotationComparison data;
   for (const TimedRotation& rotation : rotations) {
     const timestamp_t start = rotation.start_ns + shift;
@@ -61,7 +100,7 @@ RotationComparison ShiftSearch::Compare(
     if (!integral_.Covers(start) || !integral_.Covers(end)) continue;
     data.visual.push_back(LogSo3(rotation.cam2_from_cam1));
     // cam2_from_cam1 turns against the body's motion.
-    data.gyro.push_back(integral_.At(start) - integral_.At(end));
+    data.gyro.push_back(turn_until(start) - turn_until(end));
     data.dt_s.push_back(SecondsFromNs(end - start));
   }
   return data;
@@ -89,38 +128,53 @@ void ShiftSearch::SearchShifts(std::vector<Explanation>* explanations) const {
   }
 }
 
-// Golden section.
-void ShiftSearch::RefineShift(Explanation* explanation) const {
-  constexpr double kRatio = 0.6180339887498949;
-  double low = explanation->shift_s - kCoarseStepS;
-  double high = explanation->shift_s + kCoarseStepS;
-  const bool has_short =
-      short_rotations_.size() >= 2 * options_.min_num_rotations;
-  const auto cost = [&](double shift) {
-    const RotationComparison data =
-        Compare(has_short ? short_rotations_ : rotations_, shift);
-    return ComputeRotationFit(data, explanation->mistake.map).cost;
+double ShiftSearch::FindShift(const Explanation& explanation,
+                              const std::vector<TimedRotation>& rotations,
+                              double* cost) const {
+  const auto cost_at = [&](double shift) {
+    return ComputeRotationFit(Compare(rotations, shift, explanation.lag_s),
+                              explanation.mistake.map)
+        .cost;
   };
-  double a = high - kRatio * (high - low), b = low + kRatio * (high - low);
-  double cost_a = cost(a), cost_b = cost(b);
-  while (high - low > 1e-4) {
-    if (cost_a < cost_b) {
-      high = b;
-      b = a;
-      cost_b = cost_a;
-      a = high - kRatio * (high - low);
-      cost_a = cost(a);
-    } else {
-      low = a;
-      a = b;
-      cost_a = cost_b;
-      b = low + kRatio * (high - low);
-      cost_b = cost(b);
-    }
-  }
-  explanation->shift_s = 0.5 * (low + high);
-  explanation->fit = ComputeRotationFit(Compare(explanation->shift_s),
-                                        explanation->mistake.map);
+  const double shift_s =
+      Minimize(explanation.shift_s - kCoarseStepS,
+               explanation.shift_s + kCoarseStepS, 1e-4, cost_at);
+  *cost = cost_at(shift_s);
+  return shift_s;
+}
+
+void ShiftSearch::RefineShift(const std::vector<TimedRotation>& rotations,
+                              Explanation* explanation) const {
+  double cost;
+  explanation->shift_s = FindShift(*explanation, rotations, &cost);
+  explanation->fit = ComputeRotationFit(
+      Compare(rotations_, explanation->shift_s, explanation->lag_s),
+      explanation->mistake.map);
+}
+
+void ShiftSearch::RefineShift(Explanation* explanation) const {
+  RefineShift(short_rotations_, explanation);
+}
+
+void ShiftSearch::RefineShiftOfOneFrame(Explanation* explanation) const {
+  RefineShift(frame_rotations_, explanation);
+}
+
+void ShiftSearch::RefineLag(Explanation* explanation) const {
+  // What lags by more is shifted by less.
+  const auto with_lag = [&](double lag_s) {
+    Explanation other = *explanation;
+    other.lag_s = lag_s;
+    other.shift_s -= lag_s;
+    return other;
+  };
+  const double lag_s = Minimize(0.0, kMaxLagS, 1e-3, [&](double lag) {
+    double cost;
+    FindShift(with_lag(lag), short_rotations_, &cost);
+    return cost;
+  });
+  *explanation = with_lag(lag_s);
+  RefineShift(explanation);
 }
 
 double ShiftSearch::Evidence(const Explanation& worse,
@@ -129,8 +183,10 @@ double ShiftSearch::Evidence(const Explanation& worse,
   timestamp_t end_ns = rotations_.front().start_ns;
   double covered_s = 0.0, sum_s = 0.0;
   for (const TimedRotation& rotation : rotations_) {
-    const RotationComparison a = Compare({rotation}, worse.shift_s);
-    const RotationComparison b = Compare({rotation}, better.shift_s);
+    const RotationComparison a =
+        Compare({rotation}, worse.shift_s, worse.lag_s);
+    const RotationComparison b =
+        Compare({rotation}, better.shift_s, better.lag_s);
     if (a.visual.empty() || b.visual.empty()) continue;
     worse_data.Append(a);
     better_data.Append(b);

@@ -81,6 +81,9 @@ void AddOptions(PriorImportOptions* options, CommandOptions* command) {
   add("estimate_time_shift", &estimation->estimate_time_shift,
       "add the time shift that vision and gyroscope agree on to the "
       "calibration's (0 or 1)");
+  add("undo_gyroscope_filter", &estimation->undo_gyroscope_filter,
+      "undo a low-pass filter in the gyroscope's log when vision clearly shows "
+      "one (0 or 1)");
   add("max_visual_gap", &options->max_visual_gap,
       "two-view rotations are taken from images at most this many apart");
   AddFusionOptions(&estimation->fusion, command);

@@ -1,12 +1,14 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
 #include "synthetic_dataset.h"
 
 namespace adasfm {
 namespace {
 
-enum class Sensors { kBoth, kImu, kWheels, kPoorVision };
+enum class Sensors { kBoth, kImu, kWheels, kPoorVision, kFilteredImu };
 
 // An option, another value for it, and the sensors with which it matters.
 struct OptionChange {
@@ -28,6 +30,10 @@ class Drive {
     data_.calibration.timeshift_cam_imu_s = 0.0;
     const double vision_noise = sensors == Sensors::kPoorVision ? 6e-3 : 1e-3;
     vision_ = SimulateVision(world, 3, {vision_noise, 1, 0.05});
+    if (sensors == Sensors::kFilteredImu) {
+      Filter(0.15, &data_.logs.imu);
+      data_.calibration.timeshift_cam_imu_s = 0.13;
+    }
     const timestamp_t gap_ns = data_.images[20].timestamp_ns;
     Cut(gap_ns, 60'000'000, &data_.logs.imu);
     Cut(gap_ns, 120'000'000, &data_.logs.wheel);
@@ -58,6 +64,17 @@ class Drive {
   }
 
  private:
+  // A low-pass filter of that time constant.
+  static void Filter(double lag_s, std::vector<ImuSample>* imu) {
+    for (size_t i = 1; i < imu->size(); ++i) {
+      const double dt_s =
+          SecondsFromNs((*imu)[i].timestamp_ns - (*imu)[i - 1].timestamp_ns);
+      Eigen::Vector3d& rate = (*imu)[i].angular_velocity;
+      const Eigen::Vector3d& last = (*imu)[i - 1].angular_velocity;
+      rate = last + std::min(1.0, dt_s / lag_s) * (rate - last);
+    }
+  }
+
   template <typename Sample>
   static void Cut(timestamp_t start_ns, timestamp_t length_ns,
                   std::vector<Sample>* samples) {
@@ -101,6 +118,9 @@ INSTANTIATE_TEST_SUITE_P(
         OptionChange{"VisualBiasSigma",
                      [](Options* o) { o->visual_bias_sigma = 2e-5; },
                      Sensors::kPoorVision},
+        OptionChange{"UndoGyroscopeFilter",
+                     [](Options* o) { o->undo_gyroscope_filter = false; },
+                     Sensors::kFilteredImu},
         OptionChange{"EstimateTimeShift",
                      [](Options* o) { o->estimate_time_shift = true; }}),
     [](const auto& change) { return change.param.name; });
