@@ -52,12 +52,14 @@ void CoarsePoseEstimator::EstimatePositions() {
         FindUnverifiedJoins(options_.joins, ExtractSubgraph(graph_, images));
     num_joins += component.unverified_joins.size();
   }
-  EndStep("translation averaging",
-          std::to_string(num_images) + " images in " +
-              std::to_string(result_.components.size()) + " components, " +
-              std::to_string(num_iterations) + " iterations, " +
-              std::to_string(num_removed) + " edges removed, " +
-              std::to_string(num_joins) + " joins at one place only");
+  EndStep(
+      "translation averaging",
+      std::to_string(num_images) + " images in " +
+          std::to_string(result_.components.size()) +
+          (result_.components.size() == 1 ? " component, " : " components, ") +
+          std::to_string(num_iterations) + " iterations, " +
+          std::to_string(num_removed) + " edges removed, " +
+          std::to_string(num_joins) + " joins at one place only");
 }
 
 // Returns the number of iterations.

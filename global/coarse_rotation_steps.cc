@@ -145,7 +145,8 @@ void CoarsePoseEstimator::EstimateRotations() {
           std::to_string(num_added) + " sensor edges added, " +
               std::to_string(rotations_.size()) + " of " +
               std::to_string(graph_.images.size()) + " images in " +
-              std::to_string(num_components) + " components, " +
+              std::to_string(num_components) +
+              (num_components == 1 ? " component, " : " components, ") +
               std::to_string(num_converged) + " converged");
 }
 
