@@ -7,6 +7,7 @@
 #include <set>
 #include <utility>
 
+#include "core/median.h"
 #include "core/so3.h"
 
 namespace adasfm {
@@ -168,10 +169,7 @@ double MedianLength(const std::vector<RelativePosePrior>& priors) {
     const double length = prior.cam2_from_cam1.translation.norm();
     if (HasPosition(prior) && length > 0.0) lengths.push_back(length);
   }
-  if (lengths.empty()) return 1.0;
-  const auto middle = lengths.begin() + lengths.size() / 2;
-  std::nth_element(lengths.begin(), middle, lengths.end());
-  return *middle;
+  return lengths.empty() ? 1.0 : UpperMedian(&lengths);
 }
 
 }  // namespace

@@ -17,7 +17,7 @@ def _plain(method):
 
 def _over_images(records, value, label, path):
   runs = middle_runs(records)
-  figure, axes = pyplot.subplots(figsize=(6.4, 4.2))
+  figure, axes = pyplot.subplots(figsize=(8.0, 4.2))
   for method in ordered(records, 'method'):
     points = sorted((size_of(name), value(r)) for (name, m), r in runs.items()
                     if m == method and is_clean(name) and r['evaluation'])
@@ -29,7 +29,12 @@ def _over_images(records, value, label, path):
   axes.set_xlabel('images')
   axes.set_ylabel(label)
   axes.grid(True, which='both', alpha=0.25)
-  axes.legend(fontsize='small')
+  sizes = sorted({size_of(name) for name, _ in runs if is_clean(name)})
+  axes.set_xticks(sizes, ['{:,}'.format(size) for size in sizes])
+  axes.set_xticks([], minor=True)
+  axes.yaxis.set_major_formatter('{x:g}')
+  # Beside the lines: there is no corner that none of them crosses.
+  axes.legend(fontsize='small', loc='upper left', bbox_to_anchor=(1.0, 1.0))
   figure.tight_layout()
   figure.savefig(path, metadata={'Date': None})
   pyplot.close(figure)
@@ -60,7 +65,7 @@ def write_plots(records, folder):
   matplotlib.rcParams['svg.hashsalt'] = 'adasfm'
   _over_images(records, sim3_error, 'error after Sim3 [m]',
                os.path.join(folder, 'error.svg'))
-  _over_images(records, lambda r: r['seconds'], 'time [s]',
+  _over_images(records, lambda r: r['cpu_seconds'], 'CPU time [s]',
                os.path.join(folder, 'time.svg'))
   _over_images(records, lambda r: r['peak_mib'], 'peak memory [MiB]',
                os.path.join(folder, 'memory.svg'))
