@@ -80,8 +80,9 @@ class KillTest : public CommandLineTest {
 
   std::string Sqlite(const std::string& path, const std::string& statement) {
     const std::string out = folder_.File("sqlite_out");
-    EXPECT_EQ(std::system(("sqlite3 " + path + "/database.db \"" + statement +
-                           "\" > " + out)
+    // The shell is gone, but what it ran may be dying still, with its lock.
+    EXPECT_EQ(std::system(("sqlite3 -cmd '.timeout 10000' " + path +
+                           "/database.db \"" + statement + "\" > " + out)
                               .c_str()),
               0);
     return ReadBytes(out);
