@@ -28,10 +28,10 @@ struct PriorBalanceOptions {
   bool IsValid(std::string* error) const;
 };
 
-// The squared whitened residual per degree of freedom of the priors at the
-// reconstruction's poses: the largest of the means over rotation, direction and
-// length terms. Each term counts at most 25, so that a slipping wheel does not
-// speak for all. 0 without priors.
+// The squared whitened residual per degree of freedom, at the reconstruction's
+// poses, of the priors between images that points hold too: the largest of the
+// means over rotation, direction and length terms. Each term counts at most 25,
+// so that a slipping wheel does not speak for all. 0 without priors.
 double ComputePriorChi2PerDof(const std::vector<PosePriorEdge>& priors,
                               const colmap::Reconstruction& reconstruction);
 

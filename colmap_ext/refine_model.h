@@ -32,7 +32,8 @@ struct RefineModelOptions {
 
 struct RefineModelSummary {
   int num_iterations = 0;
-  // By which the keypoints' sigma is multiplied; the next round begins with it.
+  // By which the keypoints' sigma is multiplied. Every round begins with what
+  // the parts had; what the last one finds is kept.
   double keypoint_sigma_factor = 1.0;
   // 1 sigma of keypoints that agrees with the priors (balance_priors.h).
   double keypoint_sigma_px = 0.0;

@@ -113,8 +113,10 @@ def figures(model, folder, args, log_path):
 
 
 def read_warnings(log_path):
+  folder = os.path.dirname(log_path) + os.sep
   with open(log_path, errors='replace') as file:
-    return [line.strip() for line in file if 'WARNING: ' in line]
+    return [line.strip().replace(folder, '') for line in file
+            if 'WARNING: ' in line]
 
 
 def run_commands(row, folder, args, record):
