@@ -56,16 +56,6 @@ bool EdgeFromPrior(const AugmentationOptions& options,
          std::isfinite(edge->direction_sigma_rad);
 }
 
-ViewGraphEdge* FindEdge(const ImagePair& pair, ViewGraph* graph) {
-  const auto it =
-      std::lower_bound(graph->edges.begin(), graph->edges.end(), pair,
-                       [](const ViewGraphEdge& edge, const ImagePair& value) {
-                         return edge.Pair() < value;
-                       });
-  if (it == graph->edges.end() || !(it->Pair() == pair)) return nullptr;
-  return &*it;
-}
-
 }  // namespace
 
 bool AugmentationOptions::IsValid(std::string* error) const {
@@ -87,14 +77,14 @@ int AddSensorEdges(const AugmentationOptions& options,
     ViewGraphEdge edge;
     if (!EdgeFromPrior(options, prior, *graph, &edge)) continue;
     if (!edge.has_rotation) continue;
-    ViewGraphEdge* existing = FindEdge(edge.Pair(), graph);
-    if (existing == nullptr) {
+    const int existing = FindEdge(*graph, edge.Pair());
+    if (existing < 0) {
       added.push_back(edge);
       ++num_added;
-    } else if (!existing->IsKept()) {
+    } else if (!graph->edges[existing].IsKept()) {
       // Vision had something, but nothing useful.
       edge.num_inliers = 0;
-      *existing = edge;
+      graph->edges[existing] = edge;
       ++num_added;
     }
   }
@@ -120,8 +110,9 @@ int AugmentTranslations(const AugmentationOptions& options,
   for (const RelativePosePrior& prior : priors) {
     ViewGraphEdge sensor;
     if (!EdgeFromPrior(options, prior, *graph, &sensor)) continue;
-    ViewGraphEdge* edge = FindEdge(sensor.Pair(), graph);
-    if (edge == nullptr || !edge->IsKept()) continue;
+    const int e = FindEdge(*graph, sensor.Pair());
+    if (e < 0 || !graph->edges[e].IsKept()) continue;
+    ViewGraphEdge* edge = &graph->edges[e];
     if (sensor.has_translation) {
       edge->cam2_from_cam1.translation = sensor.cam2_from_cam1.translation;
       edge->direction_sigma_rad = sensor.direction_sigma_rad;

@@ -106,6 +106,16 @@ ViewGraph ExtractSubgraph(const ViewGraph& graph,
   return subgraph;
 }
 
+int FindEdge(const ViewGraph& graph, const ImagePair& pair) {
+  const auto it =
+      std::lower_bound(graph.edges.begin(), graph.edges.end(), pair,
+                       [](const ViewGraphEdge& edge, const ImagePair& value) {
+                         return edge.Pair() < value;
+                       });
+  if (it == graph.edges.end() || !(it->Pair() == pair)) return -1;
+  return static_cast<int>(it - graph.edges.begin());
+}
+
 std::map<EdgeRemoval, int> CountRemovals(const ViewGraph& graph) {
   std::map<EdgeRemoval, int> counts;
   for (const ViewGraphEdge& edge : graph.edges) {

@@ -80,4 +80,8 @@ ViewGraph ExtractSubgraph(const ViewGraph& graph,
 // How many edges were removed, by reason.
 std::map<EdgeRemoval, int> CountRemovals(const ViewGraph& graph);
 
+// The index of the pair's edge, kept or not; -1 where there is none. Edges are
+// in order of their pairs.
+int FindEdge(const ViewGraph& graph, const ImagePair& pair);
+
 }  // namespace adasfm

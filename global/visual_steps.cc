@@ -18,15 +18,12 @@ bool HasPosition(const RelativePosePrior& prior) {
 }
 
 int FindVisualEdge(const ViewGraph& graph, const ImagePair& pair) {
-  const auto it =
-      std::lower_bound(graph.edges.begin(), graph.edges.end(), pair,
-                       [](const ViewGraphEdge& edge, const ImagePair& value) {
-                         return edge.Pair() < value;
-                       });
-  const bool is_found = it != graph.edges.end() && it->Pair() == pair &&
-                        it->IsKept() && it->has_rotation &&
-                        it->source != EdgeSource::kSensor;
-  return is_found ? static_cast<int>(it - graph.edges.begin()) : -1;
+  const int e = FindEdge(graph, pair);
+  if (e < 0) return -1;
+  const ViewGraphEdge& edge = graph.edges[e];
+  const bool is_visual =
+      edge.IsKept() && edge.has_rotation && edge.source != EdgeSource::kSensor;
+  return is_visual ? e : -1;
 }
 
 // Images of neighbouring ids that share a pair, where one piece of the chain
