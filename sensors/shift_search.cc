@@ -85,6 +85,20 @@ void ShiftSearch::SelectRotations(const std::vector<TimedRotation>& rotations) {
   if (frame_rotations_.size() < min_num) frame_rotations_ = short_rotations_;
 }
 
+bool ShiftSearch::IsCovered(const TimedRotation& rotation,
+                            timestamp_t shift_ns) const {
+  return integral_.Covers(rotation.start_ns + shift_ns) &&
+         integral_.Covers(rotation.end_ns + shift_ns);
+}
+
+size_t ShiftSearch::CountCovered(double shift_s) const {
+  const timestamp_t shift_ns = std::llround(1e9 * (timeshift_s_ + shift_s));
+  return std::count_if(rotations_.begin(), rotations_.end(),
+                       [&](const TimedRotation& rotation) {
+                         return IsCovered(rotation, shift_ns);
+                       });
+}
+
 RotationComparison ShiftSearch::Compare(
     const std::vector<TimedRotation>& rotations, double shift_s,
     double lag_s) const {
@@ -95,9 +109,9 @@ RotationComparison ShiftSearch::Compare(
   };
   RotationComparison data;
   for (const TimedRotation& rotation : rotations) {
+    if (!IsCovered(rotation, shift)) continue;
     const timestamp_t start = rotation.start_ns + shift;
     const timestamp_t end = rotation.end_ns + shift;
-    if (!integral_.Covers(start) || !integral_.Covers(end)) continue;
     data.visual.push_back(LogSo3(rotation.cam2_from_cam1));
     // cam2_from_cam1 turns against the body's motion.
     data.gyro.push_back(turn_until(start) - turn_until(end));
@@ -109,20 +123,27 @@ RotationComparison ShiftSearch::Compare(
 void ShiftSearch::SearchShifts(std::vector<Explanation>* explanations) const {
   const int num_steps =
       static_cast<int>(std::ceil(options_.max_time_shift_s / kCoarseStepS));
+  const auto shift_at = [](int step) {
+    const int magnitude = (step + 1) / 2;
+    return kCoarseStepS * (step % 2 == 1 ? magnitude : -magnitude);
+  };
+  // A shift must not win by what it leaves out. The log may cover a part of the
+  // images only.
+  size_t max_num = 0;
+  for (int step = 0; step <= 2 * num_steps; ++step) {
+    max_num = std::max(max_num, CountCovered(shift_at(step)));
+  }
   const size_t min_num =
-      std::max<size_t>(options_.min_num_rotations, rotations_.size() / 2);
+      std::max<size_t>(options_.min_num_rotations, max_num / 2);
   // From no shift outwards: the nearest of equals wins.
   for (int step = 0; step <= 2 * num_steps; ++step) {
-    const int magnitude = (step + 1) / 2;
-    const double shift =
-        kCoarseStepS * (step % 2 == 1 ? magnitude : -magnitude);
-    const RotationComparison data = Compare(shift);
+    const RotationComparison data = Compare(shift_at(step));
     if (data.visual.size() < min_num) continue;
     for (Explanation& explanation : *explanations) {
       const RotationFit fit = ComputeRotationFit(data, explanation.mistake.map);
       if (fit.cost < explanation.fit.cost) {
         explanation.fit = fit;
-        explanation.shift_s = shift;
+        explanation.shift_s = shift_at(step);
       }
     }
   }

@@ -56,6 +56,8 @@ class ShiftSearch {
 
  private:
   void SelectRotations(const std::vector<TimedRotation>& rotations);
+  bool IsCovered(const TimedRotation& rotation, timestamp_t shift_ns) const;
+  size_t CountCovered(double shift_s) const;
   RotationComparison Compare(const std::vector<TimedRotation>& rotations,
                              double shift_s, double lag_s) const;
   // The best shift and its cost for the explanation's lag, within a step of the

@@ -230,5 +230,32 @@ TEST(VisionCheck, AcceptsARightCalibration) {
   }
 }
 
+// Logs that end or begin in the middle of a drive cover few of the images, and
+// no time shift covers more: nothing may be read into that.
+TEST(VisionCheck, AcceptsLogsOfAPartOfTheDrive) {
+  for (const uint64_t seed : {1, 2, 3, 4}) {
+    const SyntheticWorld world = BuildSyntheticWorld(SmallWorld(seed, 120));
+    const bool ends = seed % 2 == 0;
+    Dataset data = ToDataset(world);
+    // Just under a half of the images.
+    const timestamp_t time_ns =
+        world.images[ends ? 58 : 60].timestamp_ns + 50'000'000;
+    const auto is_cut = [&](const auto& sample) {
+      return ends == (sample.timestamp_ns > time_ns);
+    };
+    std::vector<ImuSample>& imu = data.logs.imu;
+    imu.erase(std::remove_if(imu.begin(), imu.end(), is_cut), imu.end());
+    std::vector<WheelSample>& wheels = data.logs.wheel;
+    wheels.erase(std::remove_if(wheels.begin(), wheels.end(), is_cut),
+                 wheels.end());
+    const StatusOr<PriorEstimate> estimate =
+        EstimatePriors(data.images, data.logs, data.calibration,
+                       SimulateVision(world, seed, {1e-3, 3, 0.02}), {});
+    ASSERT_TRUE(estimate.ok()) << estimate.status().message();
+    EXPECT_NEAR(estimate->summary.visual_timeshift_correction_s, 0.0, 0.005);
+    EXPECT_EQ(estimate->summary.gyroscope_lag_s, 0.0);
+  }
+}
+
 }  // namespace
 }  // namespace adasfm
