@@ -15,6 +15,7 @@
 #include "colmap_ext/output_files.h"
 #include "colmap_ext/two_view_geometry_backup.h"
 #include "core/check_options.h"
+#include "core/so3.h"
 
 namespace adasfm {
 namespace {
@@ -24,7 +25,8 @@ constexpr char kNoPriorsWarning[] =
     "(adasfm_prior_importer adds them)";
 
 bool ChangesDatabase(const GlobalStageOptions& options) {
-  return options.refinement.enabled || options.poses.rotation_rates.enabled;
+  return options.refinement.enabled || options.poses.camera_mount.enabled ||
+         options.poses.rotation_rates.enabled;
 }
 
 // Before any work: nothing is lost when the result cannot be written.
@@ -37,9 +39,19 @@ Status CheckGlobalPaths(const GlobalStageOptions& options,
     return Status::Error("the database " + database_path +
                          " is not writable; change its permissions or use "
                          "--AdaSfmGlobal.refine_matches 0 "
+                         "--AdaSfmGlobal.correct_camera_mount 0 "
                          "--AdaSfmGlobal.correct_rotation_rates 0");
   }
   return PrepareOutputFolder(output_path);
+}
+
+PriorCorrections CollectCorrections(const CoarsePoses& poses) {
+  PriorCorrections corrections;
+  if (poses.camera_mount.corrected) {
+    corrections.camera_mount = ExpSo3(poses.camera_mount.turn_rad);
+  }
+  if (poses.rotation_rates.corrected) corrections.priors = poses.priors;
+  return corrections;
 }
 
 // The models first: a crash in between leaves the database as it was.
@@ -60,9 +72,7 @@ Status WriteGlobalResult(const GlobalStageOptions& options,
   if (status.ok() && ChangesDatabase(options)) {
     status = RewriteTwoViewGeometries(database_path, result.geometries,
                                       result.removed_pairs,
-                                      result.poses.rotation_rates.corrected
-                                          ? result.poses.priors
-                                          : std::vector<RelativePosePrior>());
+                                      CollectCorrections(result.poses));
   }
   if (status.ok()) {
     status =

@@ -11,12 +11,13 @@
 namespace adasfm {
 
 std::optional<Eigen::Vector3d> FindGravityInWorld(
-    const SceneData& scene, const colmap::Reconstruction& reconstruction) {
+    const SceneData& scene, const colmap::Reconstruction& reconstruction,
+    const Eigen::Quaterniond& camera_mount) {
   std::vector<Eigen::Vector3d> directions;
   for (const auto& [image_id, pose] : CamsFromWorld(reconstruction)) {
     const auto image = scene.images.find(image_id);
     if (image == scene.images.end() || !image->second.gravity_in_cam) continue;
-    directions.push_back(pose.rotation.conjugate() *
+    directions.push_back(pose.rotation.conjugate() * camera_mount *
                          image->second.gravity_in_cam->normalized());
   }
   if (directions.empty()) return std::nullopt;
@@ -36,9 +37,10 @@ std::optional<Eigen::Vector3d> FindGravityInWorld(
 }
 
 bool AlignToGravity(const SceneData& scene,
-                    colmap::Reconstruction* reconstruction) {
+                    colmap::Reconstruction* reconstruction,
+                    const Eigen::Quaterniond& camera_mount) {
   const std::optional<Eigen::Vector3d> gravity =
-      FindGravityInWorld(scene, *reconstruction);
+      FindGravityInWorld(scene, *reconstruction, camera_mount);
   if (!gravity) return false;
   const std::map<image_t, Rigid3d> poses = CamsFromWorld(*reconstruction);
   const Eigen::Quaterniond level_from_world =

@@ -273,7 +273,8 @@ CoarseModel BuildCoarseModel(
       options.final_max_reproj_error_px,
       std::min(options.min_angle_floor_deg,
                options.triangulation.min_triangulation_angle_deg));
-  model.gravity_aligned = AlignToGravity(scene, &model.reconstruction);
+  model.gravity_aligned =
+      AlignToGravity(scene, &model.reconstruction, input.camera_mount);
   model.keypoint_sigma_px =
       options.bundle.keypoint_sigma_px * keypoint_sigma_factor;
   model.prior_chi2_per_dof =

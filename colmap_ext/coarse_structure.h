@@ -53,6 +53,9 @@ struct CoarseModelInput {
   std::map<ImagePair, std::vector<FeatureMatch>> matches;
   // Those of images of other components are passed over.
   std::vector<RelativePosePrior> priors;
+  // By which the cameras are turned against the scene's gravity directions;
+  // the priors have it already.
+  Eigen::Quaterniond camera_mount = Eigen::Quaterniond::Identity();
 };
 
 struct CoarseModel {

@@ -6,6 +6,8 @@
 #include <nlohmann/json.hpp>
 #include <sstream>
 
+#include "core/so3.h"
+
 namespace adasfm {
 namespace {
 
@@ -62,6 +64,38 @@ Json ModelJson(const SceneData& scene, const CoarseComponent& component,
           {"adjustments", rounds}};
 }
 
+Json MountJson(const CameraMountReport& mount) {
+  const Eigen::Matrix3d turn = ExpSo3(mount.turn_rad).toRotationMatrix();
+  Json rows = Json::array();
+  for (int row = 0; row < 3; ++row) {
+    rows.push_back({turn(row, 0), turn(row, 1), turn(row, 2)});
+  }
+  return {{"corrected", mount.corrected},
+          {"pairs", mount.num_pairs},
+          {"angle_deg", RadToDeg(mount.turn_rad.norm())},
+          {"sigma_deg", RadToDeg(mount.sigma_rad)},
+          {"chi2", mount.chi2},
+          {"turn_deg",
+           {RadToDeg(mount.turn_rad.x()), RadToDeg(mount.turn_rad.y()),
+            RadToDeg(mount.turn_rad.z())}},
+          {"true_from_stated", rows}};
+}
+
+void AppendMountWarning(const CameraMountReport& mount,
+                        std::vector<std::string>* warnings) {
+  if (!mount.corrected) return;
+  std::ostringstream text;
+  text << std::fixed << std::setprecision(2) << "the camera's mount is "
+       << RadToDeg(mount.turn_rad.norm()) << " +- " << RadToDeg(mount.sigma_rad)
+       << " deg off what T_cam_imu says (turned by "
+       << RadToDeg(mount.turn_rad.x()) << ", " << RadToDeg(mount.turn_rad.y())
+       << ", " << RadToDeg(mount.turn_rad.z())
+       << " deg about the camera's x, y, z); priors were corrected. Put "
+          "true_from_stated of summary.json, times T_cam_imu, into "
+          "--sensors_path";
+  warnings->push_back(text.str());
+}
+
 void AppendPriorWarnings(const CoarseModel& model,
                          std::vector<std::string>* warnings) {
   std::ostringstream text;
@@ -102,6 +136,7 @@ std::string FormatGlobalReportJson(const SceneData& scene,
     removals[EdgeRemovalName(removal)] = count;
   }
   report["edges"] = removals;
+  report["camera_mount"] = MountJson(result.poses.camera_mount);
   const RotationRateReport& rates = result.poses.rotation_rates;
   report["rotation_rates"] = {{"corrected", rates.corrected},
                               {"pairs", rates.num_pairs},
@@ -153,6 +188,7 @@ std::string FormatGlobalReportText(const GlobalStageResult& result,
 std::vector<std::string> ListGlobalWarnings(const SceneData& scene,
                                             const GlobalStageResult& result) {
   std::vector<std::string> warnings;
+  AppendMountWarning(result.poses.camera_mount, &warnings);
   for (const CoarseModel& model : result.models) {
     AppendPriorWarnings(model, &warnings);
   }

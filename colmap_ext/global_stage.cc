@@ -7,6 +7,7 @@
 
 #include "colmap_ext/refine_stage_matches.h"
 #include "colmap_ext/scene_bearings.h"
+#include "core/so3.h"
 
 namespace adasfm {
 namespace {
@@ -72,6 +73,9 @@ CoarseModelInput CreateModelInput(const CoarseComponent& component,
                                   const GlobalCorrespondences& matches) {
   CoarseModelInput input;
   input.priors = poses.priors;
+  if (poses.camera_mount.corrected) {
+    input.camera_mount = ExpSo3(poses.camera_mount.turn_rad);
+  }
   input.cams_from_world = component.cams_from_world;
   input.metric = component.metric;
   for (const ViewGraphEdge& edge : poses.graph.edges) {

@@ -35,12 +35,16 @@ void ReadScenePriors(SqliteConnection* database,
   for (const ImageTimeRow& row : loaded.tables.image_times) {
     scene->images.at(row.image_id).timestamp_ns = row.timestamp_ns;
   }
-  for (const GravityRow& row : loaded.tables.gravity) {
-    scene->images.at(row.image_id).gravity_in_cam = row.gravity_in_cam;
-  }
+  Eigen::Quaterniond camera_mount = Eigen::Quaterniond::Identity();
   scene->priors = std::move(loaded.tables.priors);
-  if (!options.use_original_two_view_geometries)
+  if (!options.use_original_two_view_geometries) {
     ApplyPriorCorrections(database, &scene->priors);
+    camera_mount = ReadCameraMount(database).value_or(camera_mount);
+  }
+  for (const GravityRow& row : loaded.tables.gravity) {
+    scene->images.at(row.image_id).gravity_in_cam =
+        camera_mount * row.gravity_in_cam;
+  }
   if (loaded.num_ignored_rows > 0) {
     scene->warnings.push_back(
         std::to_string(loaded.num_ignored_rows) +

@@ -58,7 +58,7 @@ struct SceneData {
 
 struct SceneDataOptions {
   bool read_raw_matches = false;
-  // Start from the two-view geometries, and the priors' rotations, as they were
+  // Start from the two-view geometries, the priors and gravity as they were
   // before adasfm_global changed them, where it did.
   bool use_original_two_view_geometries = false;
   // Pairs with fewer inlier matches are left out.

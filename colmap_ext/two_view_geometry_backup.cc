@@ -4,7 +4,6 @@
 #include <map>
 #include <optional>
 
-#include "colmap_ext/prior_corrections.h"
 #include "colmap_ext/prior_tables.h"
 
 namespace adasfm {
@@ -190,11 +189,10 @@ void RemoveRows(const std::vector<ImagePair>& pairs,
 
 }  // namespace
 
-Status RewriteTwoViewGeometries(
-    const std::string& database_path,
-    const std::vector<NewTwoViewGeometry>& rows,
-    const std::vector<ImagePair>& removed,
-    const std::vector<RelativePosePrior>& corrected_priors) {
+Status RewriteTwoViewGeometries(const std::string& database_path,
+                                const std::vector<NewTwoViewGeometry>& rows,
+                                const std::vector<ImagePair>& removed,
+                                const PriorCorrections& corrections) {
   const Status checked = CheckDatabase(database_path);
   if (!checked.ok()) return checked;
   std::vector<ImagePair> pairs = removed;
@@ -209,7 +207,7 @@ Status RewriteTwoViewGeometries(
     RemoveRows(removed, &database);
     WriteTwoViewGeometries(&database, rows);
     RecordDigests(rows, &database);
-    WritePriorCorrections(corrected_priors, &database);
+    WritePriorCorrections(corrections, &database);
     transaction.Commit();
   } catch (const SqliteError& error) {
     return Status::Error("cannot rewrite the two-view geometries of " +

@@ -5,8 +5,8 @@
 #include <vector>
 
 #include "colmap_ext/host/database.h"
+#include "colmap_ext/prior_corrections.h"
 #include "colmap_ext/sqlite.h"
-#include "core/relative_pose_prior.h"
 #include "core/status.h"
 #include "core/types.h"
 
@@ -18,20 +18,19 @@ namespace adasfm {
 // anew since, the present row is the original.
 
 // Puts `rows` in the place of the pairs' two-view geometries, removes those of
-// `removed`, and writes the corrected rotations of priors, all in one
-// transaction. What an earlier call replaced is put back first, so calling
-// twice equals calling once. On error nothing has changed.
-Status RewriteTwoViewGeometries(
-    const std::string& database_path,
-    const std::vector<NewTwoViewGeometry>& rows,
-    const std::vector<ImagePair>& removed,
-    const std::vector<RelativePosePrior>& corrected_priors = {});
+// `removed`, and writes the corrections of priors, all in one transaction. What
+// an earlier call replaced is put back first, so calling twice equals calling
+// once. On error nothing has changed.
+Status RewriteTwoViewGeometries(const std::string& database_path,
+                                const std::vector<NewTwoViewGeometry>& rows,
+                                const std::vector<ImagePair>& removed,
+                                const PriorCorrections& corrections = {});
 
 struct RestoreSummary {
   int num_restored = 0;
   // Rows that COLMAP has replaced in the meantime, or whose images changed.
   int num_outdated = 0;
-  // The priors' rotations had been corrected, and are as imported again.
+  // The priors had been corrected, and are as imported again.
   bool priors_restored = false;
 };
 

@@ -29,7 +29,7 @@ class CoarsePoseEstimator {
  private:
   using Rotations = std::map<image_t, Eigen::Quaterniond>;
   void RefinePairs();
-  RotationRateReport BuildChain();
+  void BuildChain();
   std::vector<std::optional<RotationPrediction>> PredictRotations() const;
   void FilterLoops();
   VisualSteps CompleteSteps() const;

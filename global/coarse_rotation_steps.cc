@@ -11,6 +11,14 @@
 namespace adasfm {
 namespace {
 
+std::string DescribeCameraMount(const CameraMountReport& mount) {
+  if (!mount.corrected) return "";
+  char text[96];
+  std::snprintf(text, sizeof(text), ", camera turned by %.2f +- %.2f deg",
+                RadToDeg(mount.turn_rad.norm()), RadToDeg(mount.sigma_rad));
+  return text;
+}
+
 std::string DescribeRotationRates(const RotationRateReport& rates) {
   if (!rates.corrected) return "";
   char text[64];
@@ -30,7 +38,7 @@ void CoarsePoseEstimator::RefinePairs() {
     edge.removal = EdgeRemoval::kFewInliers;
     ++num_removed;
   }
-  result_.rotation_rates = BuildChain();
+  BuildChain();
   if (options_.relative_poses.enabled) {
     RefineRelativePoses(options_.relative_poses, correspondences_,
                         PredictRotations(), &graph_);
@@ -38,31 +46,41 @@ void CoarsePoseEstimator::RefinePairs() {
   EndStep("relative poses", std::to_string(graph_.edges.size()) + " pairs, " +
                                 std::to_string(num_removed) +
                                 " with few inliers removed" +
+                                DescribeCameraMount(result_.camera_mount) +
                                 DescribeRotationRates(result_.rotation_rates));
 }
 
-// The chain, after vision has corrected its rotations.
-RotationRateReport CoarsePoseEstimator::BuildChain() {
+// The chain, after vision has corrected the camera's mount and the rotations.
+void CoarsePoseEstimator::BuildChain() {
   chain_ = OdometryChain(priors_, options_.chain);
+  const CameraMountOptions& mount = options_.camera_mount;
+  const RotationRateOptions& rates = options_.rotation_rates;
   if (chain_.empty() || !options_.relative_poses.enabled ||
-      !options_.rotation_rates.enabled) {
-    return RotationRateReport();
+      (!mount.enabled && !rates.enabled)) {
+    return;
   }
+  const int max_num_steps = std::max(mount.max_num_steps, rates.max_num_steps);
   ViewGraph near = graph_;
   near.edges.erase(
       std::remove_if(
           near.edges.begin(), near.edges.end(),
-          [this](const ViewGraphEdge& edge) {
+          [&](const ViewGraphEdge& edge) {
             return !chain_.IsConnected(edge.image_id1, edge.image_id2) ||
                    std::abs(chain_.NumSteps(edge.image_id1, edge.image_id2)) >
-                       options_.rotation_rates.max_num_steps;
+                       max_num_steps;
           }),
       near.edges.end());
   RefineRelativePoses(options_.relative_poses, correspondences_, {}, &near);
-  const RotationRateReport report =
-      CorrectRotationRates(options_.rotation_rates, chain_, near, &priors_);
-  chain_ = OdometryChain(priors_, options_.chain);
-  return report;
+  if (mount.enabled) {
+    result_.camera_mount =
+        CorrectCameraMount(mount, chain_, near, correspondences_, &priors_);
+    chain_ = OdometryChain(priors_, options_.chain);
+  }
+  if (rates.enabled) {
+    result_.rotation_rates =
+        CorrectRotationRates(rates, chain_, near, &priors_);
+    chain_ = OdometryChain(priors_, options_.chain);
+  }
 }
 
 std::vector<std::optional<RotationPrediction>>

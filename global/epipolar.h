@@ -37,6 +37,21 @@ inline EpipolarResidual ComputeEpipolarResidual(
   return residual;
 }
 
+// d distance_px / d (rotation in camera 2's frame, direction in `basis`, the
+// tangent plane of the translation), the root of ComputeEpipolarResidual held
+// fixed.
+inline Eigen::Matrix<double, 5, 1> EpipolarJacobian(
+    const Bearing& bearing1, const Bearing& bearing2,
+    const Eigen::Matrix3d& rotation, const Eigen::Vector3d& translation,
+    const Eigen::Matrix<double, 3, 2>& basis, double inverse_norm) {
+  const Eigen::Vector3d& x2 = bearing2.direction;
+  const Eigen::Vector3d x1_in_cam2 = rotation * bearing1.direction;
+  Eigen::Matrix<double, 5, 1> jacobian;
+  jacobian << x1_in_cam2.cross(x2.cross(translation)),
+      basis.transpose() * x1_in_cam2.cross(x2);
+  return inverse_norm * jacobian;
+}
+
 // Depths along both rays in units of |t|, of the point nearest to both:
 // depth2 x2 = depth1 R x1 + t. False when the rays are parallel.
 inline bool ComputeRayDepths(const Eigen::Vector3d& x1,

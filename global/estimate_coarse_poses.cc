@@ -60,12 +60,13 @@ bool CoarsePoseOptions::IsValid(std::string* error) const {
              " must be >= 0";
     return false;
   }
-  return chain.IsValid(error) && rotation_rates.IsValid(error) &&
-         relative_poses.IsValid(error) && lengths.IsValid(error) &&
-         visual_steps.IsValid(error) && loops.IsValid(error) &&
-         rotations.IsValid(error) && translations.IsValid(error) &&
-         augmentation.IsValid(error) && positions.IsValid(error) &&
-         position_filter.IsValid(error) && joins.IsValid(error);
+  return chain.IsValid(error) && camera_mount.IsValid(error) &&
+         rotation_rates.IsValid(error) && relative_poses.IsValid(error) &&
+         lengths.IsValid(error) && visual_steps.IsValid(error) &&
+         loops.IsValid(error) && rotations.IsValid(error) &&
+         translations.IsValid(error) && augmentation.IsValid(error) &&
+         positions.IsValid(error) && position_filter.IsValid(error) &&
+         joins.IsValid(error);
 }
 
 CoarsePoses EstimateCoarsePoses(const CoarsePoseOptions& options,
@@ -78,6 +79,7 @@ CoarsePoses EstimateCoarsePoses(const CoarsePoseOptions& options,
   }
   initial_graph.Check();
   CoarsePoseOptions step_options = options;
+  step_options.camera_mount.num_threads = options.num_threads;
   step_options.relative_poses.num_threads = options.num_threads;
   step_options.lengths.num_threads = options.num_threads;
   step_options.translations.num_threads = options.num_threads;

@@ -8,6 +8,7 @@
 #include "core/relative_pose_prior.h"
 #include "core/rigid3d.h"
 #include "global/augment_view_graph.h"
+#include "global/correct_camera_mount.h"
 #include "global/correct_rotation_rates.h"
 #include "global/correspondences.h"
 #include "global/edge_lengths.h"
@@ -27,6 +28,7 @@ namespace adasfm {
 // Nested by step, in order of their use.
 struct CoarsePoseOptions {
   OdometryChainOptions chain;
+  CameraMountOptions camera_mount;
   RotationRateOptions rotation_rates;
   RelativePoseRefinementOptions relative_poses;
   EdgeLengthOptions lengths;
@@ -98,6 +100,7 @@ struct CoarsePoses {
   ViewGraph graph;
   // The input's, with the rotations that vision corrected.
   std::vector<RelativePosePrior> priors;
+  CameraMountReport camera_mount;
   RotationRateReport rotation_rates;
   std::vector<CoarseStep> steps;
 };
@@ -107,6 +110,7 @@ struct CoarsePoses {
 // empty. Throws std::invalid_argument for invalid options or an inconsistent
 // graph. Numbered steps:
 //   1 least-squares relative poses            RefineRelativePoses
+//     the camera's mount                      CorrectCameraMount
 //     odometry's rotation rates               CorrectRotationRates
 //   2 odometry chain, lengths, loop gating    AddVisualSteps
 //                                             FilterLoopsByOdometry

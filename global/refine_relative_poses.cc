@@ -37,12 +37,9 @@ NormalEquations Accumulate(const EdgeBearings& edge, double loss_scale_px,
   for (size_t k = 0; k < edge.bearings1.size(); ++k) {
     const EpipolarResidual residual = ComputeEpipolarResidual(
         *edge.bearings1[k], *edge.bearings2[k], rotation, translation);
-    const Eigen::Vector3d& x2 = edge.bearings2[k]->direction;
-    const Eigen::Vector3d x1_in_cam2 = rotation * edge.bearings1[k]->direction;
-    Vector5d jacobian;
-    jacobian << x1_in_cam2.cross(x2.cross(translation)),
-        basis.transpose() * x1_in_cam2.cross(x2);
-    jacobian *= residual.inverse_norm;
+    const Vector5d jacobian =
+        EpipolarJacobian(*edge.bearings1[k], *edge.bearings2[k], rotation,
+                         translation, basis, residual.inverse_norm);
     const double squared = residual.distance_px * residual.distance_px;
     const double squared_scale = loss_scale_px * loss_scale_px;
     const double weight = 1.0 / (1.0 + squared / squared_scale);

@@ -11,6 +11,7 @@ class GlobalOptionAdder {
 
   void AddPaper();
   void AddRotations();
+  void AddMount();
   void AddLoops();
   void AddPositions();
   void AddStructure();
@@ -62,6 +63,18 @@ void GlobalOptionAdder::AddRotations() {
   Add("rotation_rate_offset_sigma_rad", &rates->offset_sigma_rad,
       "1 sigma of what all visual rotations are wrong by alike, per axis "
       "[rad]");
+}
+
+void GlobalOptionAdder::AddMount() {
+  CameraMountOptions* mount = &stage_->poses.camera_mount;
+  Add("camera_mount_max_num_steps", &mount->max_num_steps,
+      "pairs at most this many images apart tell the camera's mount");
+  Add("camera_mount_sigma_deg", &mount->sigma_deg,
+      "1 sigma of what T_cam_imu may be wrong by, per axis [deg]");
+  Add("camera_mount_min_sigma_deg", &mount->min_sigma_deg,
+      "least error granted to what pairs say of it, per axis [deg]");
+  Add("camera_mount_min_num_sigmas", &mount->min_num_sigmas,
+      "priors are corrected when the mount is off by so many sigmas");
 }
 
 void GlobalOptionAdder::AddLoops() {
@@ -147,6 +160,8 @@ void GlobalOptionAdder::AddAblations() {
       "position (0 or 1)");
   Add("refine_relative_poses", &stage_->poses.relative_poses.enabled,
       "least-squares relative poses");
+  Add("correct_camera_mount", &stage_->poses.camera_mount.enabled,
+      "take a wrong rotation of T_cam_imu out of the priors, by vision");
   Add("correct_rotation_rates", &stage_->poses.rotation_rates.enabled,
       "take the gyroscope's remaining bias out of the priors, by vision");
   Add("refine_translations", &stage_->poses.translations.enabled,
@@ -169,6 +184,7 @@ void AddGlobalOptions(GlobalStageOptions* stage, CommandOptions* command) {
   GlobalOptionAdder adder(stage, command);
   adder.AddPaper();
   adder.AddRotations();
+  adder.AddMount();
   adder.AddLoops();
   adder.AddPositions();
   adder.AddStructure();

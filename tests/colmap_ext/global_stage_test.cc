@@ -141,23 +141,34 @@ TEST(RunGlobalStageTest, MatchesAreRefinedUnderRefinedCameras) {
 }
 
 // A camera that is mounted 3 deg off what the calibration says: no weights
-// bring vision and sensors together.
-TEST(RunGlobalStageTest, WarnsWhenSensorsAndVisionContradictEachOther) {
+// bring vision and sensors together, unless the mount is corrected.
+TEST(RunGlobalStageTest, CorrectsTheMountOrWarnsOfTheContradiction) {
   const SyntheticWorld world = BuildSyntheticWorld(SmallWorld());
   SceneData scene = BuildSyntheticScene(world, SyntheticPriorOptions());
   EXPECT_TRUE(ListGlobalWarnings(scene, RunStage(scene)).empty());
   const Eigen::Quaterniond turn =
       ExpSo3(DegToRad(3.0) * Eigen::Vector3d::UnitY());
-  for (RelativePosePrior& prior : scene.priors) {
-    prior.cam2_from_cam1 =
-        Rigid3d(turn * prior.cam2_from_cam1.rotation * turn.conjugate(),
-                turn * prior.cam2_from_cam1.translation);
-  }
-  const GlobalStageResult result = RunStage(scene);
-  EXPECT_FALSE(result.models[0].priors_agree);
-  const std::vector<std::string> warnings = ListGlobalWarnings(scene, result);
+  for (RelativePosePrior& prior : scene.priors) TurnPrior(turn, &prior);
+  GlobalStageOptions options;
+  options.poses.camera_mount.enabled = false;
+  const GlobalStageResult left = RunStage(scene, options);
+  EXPECT_FALSE(left.models[0].priors_agree);
+  std::vector<std::string> warnings = ListGlobalWarnings(scene, left);
   ASSERT_EQ(warnings.size(), 1);
   EXPECT_NE(warnings[0].find("T_cam_imu"), std::string::npos);
+
+  const GlobalStageResult corrected = RunStage(scene);
+  EXPECT_TRUE(corrected.models[0].priors_agree);
+  EXPECT_TRUE(corrected.poses.camera_mount.corrected);
+  const CameraMountReport& mount = corrected.poses.camera_mount;
+  EXPECT_NEAR(mount.turn_rad.y(), -DegToRad(3.0), 4.0 * mount.sigma_rad);
+  // 90 m turn little, which tells the roll; it is left where it is uncertain.
+  EXPECT_LT(AngleBetweenRad(ExpSo3(mount.turn_rad) * turn,
+                            Eigen::Quaterniond::Identity()),
+            DegToRad(0.6));
+  warnings = ListGlobalWarnings(scene, corrected);
+  ASSERT_EQ(warnings.size(), 1);
+  EXPECT_NE(warnings[0].find("mount"), std::string::npos);
 }
 
 // 90 m of road show a focal length that is a tenth off; more road shows less.

@@ -9,6 +9,7 @@
 #include "colmap_ext/two_view_geometry_backup.h"
 #include "colmap_ext/write_synthetic_world.h"
 #include "core/so3.h"
+#include "global/correct_camera_mount.h"
 #include "tests/colmap_ext/synthetic_scene.h"
 #include "tests/colmap_ext/temporary_folder.h"
 
@@ -69,7 +70,8 @@ class PriorCorrectionsTest : public testing::Test {
 
 TEST_F(PriorCorrectionsTest, AreReadUntilTheyAreRestored) {
   ExpectRotations(Read(), tables_.priors);
-  ASSERT_TRUE(RewriteTwoViewGeometries(path_, {}, {}, corrected_).ok());
+  ASSERT_TRUE(
+      RewriteTwoViewGeometries(path_, {}, {}, {std::nullopt, corrected_}).ok());
   ExpectRotations(Read(), corrected_);
   // A second run of the global stage starts from the import.
   ExpectRotations(Read(true), tables_.priors);
@@ -81,19 +83,22 @@ TEST_F(PriorCorrectionsTest, AreReadUntilTheyAreRestored) {
 }
 
 TEST_F(PriorCorrectionsTest, TheLastRunCounts) {
-  ASSERT_TRUE(RewriteTwoViewGeometries(path_, {}, {}, corrected_).ok());
+  ASSERT_TRUE(
+      RewriteTwoViewGeometries(path_, {}, {}, {std::nullopt, corrected_}).ok());
   ASSERT_TRUE(RewriteTwoViewGeometries(path_, {}, {}).ok());
   ExpectRotations(Read(), tables_.priors);
 }
 
 TEST_F(PriorCorrectionsTest, ANewImportRemovesThem) {
-  ASSERT_TRUE(RewriteTwoViewGeometries(path_, {}, {}, corrected_).ok());
+  ASSERT_TRUE(
+      RewriteTwoViewGeometries(path_, {}, {}, {std::nullopt, corrected_}).ok());
   ASSERT_TRUE(WritePriorTables(path_, tables_).ok());
   ExpectRotations(Read(), tables_.priors);
 }
 
 TEST_F(PriorCorrectionsTest, FollowTheNamesOfImages) {
-  ASSERT_TRUE(RewriteTwoViewGeometries(path_, {}, {}, corrected_).ok());
+  ASSERT_TRUE(
+      RewriteTwoViewGeometries(path_, {}, {}, {std::nullopt, corrected_}).ok());
   SqliteConnection(path_, SqliteConnection::Mode::kWrite)
       .Execute(
           "UPDATE adasfm_prior_corrections SET name1 = 'gone' WHERE "
@@ -105,10 +110,53 @@ TEST_F(PriorCorrectionsTest, FollowTheNamesOfImages) {
 }
 
 TEST_F(PriorCorrectionsTest, DamagedRowsAreAnError) {
-  ASSERT_TRUE(RewriteTwoViewGeometries(path_, {}, {}, corrected_).ok());
+  ASSERT_TRUE(
+      RewriteTwoViewGeometries(path_, {}, {}, {std::nullopt, corrected_}).ok());
   SqliteConnection(path_, SqliteConnection::Mode::kWrite)
       .Execute("UPDATE adasfm_prior_corrections SET qvec = X'0102'");
   EXPECT_FALSE(ReadSceneData(path_, SceneDataOptions()).ok());
+}
+
+TEST_F(PriorCorrectionsTest, TurnTheCamera) {
+  const Eigen::Quaterniond mount = ExpSo3(Eigen::Vector3d(0.01, -0.03, 0.02));
+  tables_.gravity = {{tables_.priors[0].image_id1, Eigen::Vector3d::UnitY()}};
+  ASSERT_TRUE(WritePriorTables(path_, tables_).ok());
+  Priors turned = tables_.priors;
+  for (RelativePosePrior& prior : turned) TurnPrior(mount, &prior);
+  const auto gravity = [&](bool originals) {
+    SceneDataOptions options;
+    options.use_original_two_view_geometries = originals;
+    return *ReadSceneData(path_, options)
+                ->images.at(tables_.priors[0].image_id1)
+                .gravity_in_cam;
+  };
+  const auto expect_turned = [&](const Priors& expected) {
+    const Priors actual = Read();
+    ASSERT_EQ(actual.size(), expected.size());
+    for (size_t k = 0; k < actual.size(); ++k) {
+      EXPECT_LT(AngleBetweenRad(actual[k].cam2_from_cam1.rotation,
+                                expected[k].cam2_from_cam1.rotation),
+                1e-9);
+      EXPECT_LT((actual[k].cam2_from_cam1.translation -
+                 turned[k].cam2_from_cam1.translation)
+                    .norm(),
+                1e-9);
+      EXPECT_LT((actual[k].covariance - turned[k].covariance).norm(),
+                1e-9 * turned[k].covariance.norm());
+    }
+    EXPECT_LT((gravity(false) - mount * Eigen::Vector3d::UnitY()).norm(), 1e-9);
+  };
+  ASSERT_TRUE(RewriteTwoViewGeometries(path_, {}, {}, {mount, {}}).ok());
+  expect_turned(turned);
+  // Corrected rotations are those of turned cameras.
+  ASSERT_TRUE(
+      RewriteTwoViewGeometries(path_, {}, {}, {mount, corrected_}).ok());
+  expect_turned(corrected_);
+  EXPECT_EQ(gravity(true), Eigen::Vector3d::UnitY());
+  ExpectRotations(Read(true), tables_.priors);
+  ASSERT_TRUE(RestoreTwoViewGeometries(path_)->priors_restored);
+  EXPECT_EQ(gravity(false), Eigen::Vector3d::UnitY());
+  ExpectRotations(Read(), tables_.priors);
 }
 
 // A bias of 0.3 deg/s, whose steps of 0.2 s are far beyond their sigmas.
