@@ -5,6 +5,7 @@
 
 #include "core/so3.h"
 #include "global/coarse_pose_estimator.h"
+#include "global/drop_contradicted_steps.h"
 #include "global/filter_edges_by_rotation.h"
 #include "global/visual_steps.h"
 
@@ -101,16 +102,25 @@ CoarsePoseEstimator::PredictRotations() const {
 }
 
 void CoarsePoseEstimator::FilterLoops() {
-  if (chain_.empty() || !options_.loops.enabled) {
-    EndStep("loop gating",
-            chain_.empty() ? "skipped: no odometry" : "switched off");
+  if (!options_.loops.enabled) {
+    EndStep("loop gating", "switched off");
     return;
   }
   lengths_ = EstimateLengths();
-  const VisualSteps steps = CompleteSteps();
+  VisualSteps steps = CompleteSteps();
+  const int num_dropped =
+      steps.priors.empty()
+          ? 0
+          : DropContradictedSteps(options_.visual_steps, options_.loops,
+                                  options_.chain, graph_, priors_.size(),
+                                  &steps);
   const OdometryChain chain = steps.priors.empty()
                                   ? chain_
                                   : OdometryChain(steps.priors, options_.chain);
+  if (chain.empty()) {
+    EndStep("loop gating", "skipped: no odometry, and no sequence of images");
+    return;
+  }
   LoopFilterOptions options = options_.loops;
   options.min_position_error_m *= steps.unit_m;
   const LoopFilterReport report = FilterLoopsByOdometry(
@@ -122,7 +132,8 @@ void CoarsePoseEstimator::FilterLoops() {
       std::to_string(report.num_false_runs) + " false runs";
   if (!steps.priors.empty()) {
     summary += "; vision added " + std::to_string(steps.num_by_vision) +
-               " steps, " + std::to_string(steps.num_coasting) +
+               " steps, gave " + std::to_string(num_dropped) + " of them up, " +
+               std::to_string(steps.num_coasting) +
                " are taken to go on as before";
   }
   EndStep("loop gating", summary);

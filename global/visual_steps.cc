@@ -186,6 +186,12 @@ bool VisualStepOptions::IsValid(std::string* error) const {
         std::to_string(max_coasting_s) + " >= 0";
     return false;
   }
+  if (!(max_contradicting_ratio >= 0.0 && max_contradicting_ratio <= 1.0)) {
+    *error =
+        "max_contradicting_ratio = " + std::to_string(max_contradicting_ratio) +
+        " must be in [0, 1]";
+    return false;
+  }
   return true;
 }
 

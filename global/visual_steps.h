@@ -28,13 +28,17 @@ struct VisualStepOptions {
   // axis, 1 sigma; and for so long only.
   double coasting_error_ratio = 0.3;
   double max_coasting_s = 10.0;
+  // DropContradictedSteps: the share of the pairs across a step, and of those
+  // within a run of steps, that may contradict the chain.
+  double max_contradicting_ratio = 0.5;
+  double max_run_contradicting_ratio = 0.05;
 
   bool IsValid(std::string* error) const;
 };
 
 struct VisualSteps {
-  // The priors given, with what they lacked, and visual steps where there was
-  // no prior.
+  // The priors given, with what they lacked, and then visual steps where there
+  // was no prior.
   std::vector<RelativePosePrior> priors;
   // Of the edges of the graph, in the unit of the priors' translations.
   EdgeLengths lengths;
