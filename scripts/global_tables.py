@@ -16,10 +16,9 @@ import shutil
 import statistics
 import sys
 
+from benchmarking.figures import add_arguments, write_results
 from benchmarking.methods import evaluate
 from benchmarking.process import Failed, run
-
-ROOT = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
 
 # Options of adasfm_global for each ablation.
 VARIANTS = {
@@ -285,8 +284,7 @@ def report(records, args):
 
 def parse_arguments():
   parser = argparse.ArgumentParser(description=__doc__.split('\n')[0])
-  parser.add_argument('--output_path', default='adasfm-global-tables',
-                      help='folder of worlds and runs')
+  add_arguments(parser, 'global_results', 'adasfm-global-tables')
   parser.add_argument('--sizes', default='150,300', help='images of a world')
   parser.add_argument('--num_blackouts', type=int, default=1,
                       help='intervals without a keypoint')
@@ -299,14 +297,6 @@ def parse_arguments():
   parser.add_argument('--mapper_variants', default=','.join(VARIANTS),
                       help='those that adasfm_mapper completes; "" for coarse '
                       'models only')
-  parser.add_argument('--keep', type=int, default=0,
-                      help="1: keep the runs' models and databases")
-  parser.add_argument('--results_path',
-                      default=os.path.join(ROOT, 'docs', 'global_results'),
-                      help='of the .md and .json files')
-  parser.add_argument('--colmap', default=os.path.join(ROOT, 'build', 'bin',
-                                                       'colmap'),
-                      help='our launcher')
   args = parser.parse_args()
   args.sizes = [int(size) for size in args.sizes.split(',')]
   args.seeds = list(range(1, args.num_seeds + 1))
@@ -330,11 +320,7 @@ def main():
         print('%s, %s: %s' % (record['world'], variant,
                               record.get('error') or record.get('coarse')),
               file=sys.stderr, flush=True)
-      with open(args.results_path + '.json', 'w') as file:
-        json.dump(records, file, indent=1)
-        file.write('\n')
-      with open(args.results_path + '.md', 'w') as file:
-        file.write(report(records, args))
+      write_results(records, report(records, args), args)
 
 
 if __name__ == '__main__':

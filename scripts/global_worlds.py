@@ -15,14 +15,14 @@ import os
 import shutil
 import sys
 
-from benchmarking.methods import evaluate
+from benchmarking.figures import (add_arguments, measure, world_folder,
+                                  write_results)
 from benchmarking.process import Failed, run
 from benchmarking.spoil import (add_imu_noise, cut_logs, keep_every,
                                 scale_focal_length, scale_wheels,
                                 shift_clocks, shift_gyroscope,
                                 turn_camera, turn_wheels)
 
-ROOT = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
 BOTH = ('imu.csv', 'wheel.csv')
 REFINE = {'global': ['--AdaSfmGlobal.ba_refine_focal_length', '1'],
           'mapper': ['--AdaSfmMapper.refine_focal_length', '1']}
@@ -102,16 +102,6 @@ PLAIN = {'alias_ratio': 0.05, 'num_blackouts': 2, 'wheel_slips': 2}
 MAX_ERROR_M = 0.5
 
 
-def figures(model, folder, args, log_path):
-  evaluation = evaluate(model, os.path.join(folder, 'gt.txt'), args, log_path)
-  if not evaluation:
-    return None
-  best = evaluation['sim3_least_squares']
-  return {'images': evaluation['num_images'],
-          'true_images': evaluation['num_true_images'],
-          'rmse_m': best['translation_rmse_m'], 'scale': best['scale']}
-
-
 def read_warnings(log_path):
   folder = os.path.dirname(log_path) + os.sep
   with open(log_path, errors='replace') as file:
@@ -145,18 +135,17 @@ def run_commands(row, folder, args, record):
     model = json.load(file)['models'][0]
   record['converged'] = model['positions_converged']
   record['unverified_joins'] = len(model['unverified_joins'])
-  record['coarse'] = figures(os.path.join(coarse, '0'), folder, args, log_path)
+  record['coarse'] = measure(os.path.join(coarse, '0'), folder, args, log_path)
   if args.run_mapper:
     output = os.path.join(folder, 'model')
     run([args.colmap, 'adasfm_mapper', '--database_path', database,
          '--input_path', os.path.join(coarse, '0'), '--output_path', output] +
         row.get('mapper', []), log_path)
-    record['final'] = figures(output, folder, args, log_path)
+    record['final'] = measure(output, folder, args, log_path)
 
 
 def run_world(name, seed, args):
-  folder = os.path.join(args.output_path, '%s-%d' % (
-      ''.join(c if c.isalnum() else '_' for c in name), seed))
+  folder = world_folder(name, seed, args)
   shutil.rmtree(folder, ignore_errors=True)
   os.makedirs(folder)
   record = {'world': name, 'seed': seed, 'warnings': []}
@@ -226,19 +215,10 @@ def parse_arguments():
   parser = argparse.ArgumentParser(description=__doc__.split('\n')[0])
   parser.add_argument('worlds', nargs='*',
                       help='rows of the table; all when none is named')
-  parser.add_argument('--output_path', default='adasfm-global-worlds',
-                      help='folder of worlds and runs')
+  add_arguments(parser, 'global_worlds', 'adasfm-global-worlds')
   parser.add_argument('--seeds', default='1,2')
   parser.add_argument('--run_mapper', type=int, default=1,
                       help='0: coarse models only')
-  parser.add_argument('--keep', type=int, default=0,
-                      help="1: keep the runs' models and databases")
-  parser.add_argument('--results_path',
-                      default=os.path.join(ROOT, 'docs', 'global_worlds'),
-                      help='of the .md and .json files')
-  parser.add_argument('--colmap', default=os.path.join(ROOT, 'build', 'bin',
-                                                       'colmap'),
-                      help='our launcher')
   args = parser.parse_args()
   args.seeds = [int(seed) for seed in args.seeds.split(',')]
   for name in args.worlds:
@@ -257,11 +237,7 @@ def main():
       print('%s, seed %d: %s %s' % (name, seed, records[-1].get('coarse'),
                                     describe(records[-1])),
             file=sys.stderr, flush=True)
-      with open(args.results_path + '.json', 'w') as file:
-        json.dump(records, file, indent=1)
-        file.write('\n')
-      with open(args.results_path + '.md', 'w') as file:
-        file.write(report(records, args))
+      write_results(records, report(records, args), args)
 
 
 if __name__ == '__main__':
