@@ -94,16 +94,37 @@ Status CheckCoarseModel(const std::string& path) {
   return Status::Ok();
 }
 
-// The poses of a coarse model, whose images must be the scene's.
-StatusOr<CoarsePoseMap> ReadCoarsePoses(const std::string& path,
-                                        const SceneData& scene) {
+// Poses belong to the cameras that they were adjusted with.
+void TakeCameras(const colmap::Reconstruction& model, MapReport* report,
+                 SceneData* scene) {
+  for (const auto& [camera_id, camera] : model.Cameras()) {
+    const auto given = scene->cameras.find(camera_id);
+    if (given == scene->cameras.end() ||
+        given->second.ModelId() != camera.ModelId() ||
+        given->second.Params() == camera.Params()) {
+      continue;
+    }
+    std::ostringstream text;
+    text << "camera " << camera_id << " has the focal length "
+         << camera.MeanFocalLength() << " px in the coarse model and "
+         << given->second.MeanFocalLength()
+         << " px in the database; the coarse model's camera is used";
+    report->warnings.push_back(text.str());
+    given->second.SetParams(camera.Params());
+  }
+}
+
+// The poses of a coarse model, whose images must be the scene's; its cameras
+// become the scene's.
+StatusOr<CoarsePoseMap> ReadCoarseModel(const std::string& path,
+                                        MapReport* report, SceneData* scene) {
   const StatusOr<colmap::Reconstruction> reconstruction = ReadModel(path);
   if (!reconstruction.ok()) return reconstruction.status();
   const CoarsePoseMap poses = CamsFromWorld(*reconstruction);
   for (const auto& [image_id, pose] : poses) {
     const std::string& name = reconstruction->Image(image_id).Name();
-    const auto image = scene.images.find(image_id);
-    if (image == scene.images.end() || image->second.name != name) {
+    const auto image = scene->images.find(image_id);
+    if (image == scene->images.end() || image->second.name != name) {
       return Status::Error("image " + name + " of the coarse model " + path +
                            " is not in the database under its id; use the "
                            "model that adasfm_global made from it");
@@ -113,6 +134,7 @@ StatusOr<CoarsePoseMap> ReadCoarsePoses(const std::string& path,
     return Status::Error("the coarse model " + path +
                          " has fewer than two images");
   }
+  TakeCameras(*reconstruction, report, scene);
   return poses;
 }
 
@@ -251,14 +273,14 @@ StatusOr<MapReport> MapParts(const MapOptions& options,
   if (status.ok()) status = CheckCoarseModel(request.input_path);
   if (status.ok()) status = PrepareOutputFolder(request.output_path);
   if (!status.ok()) return status;
-  const StatusOr<SceneData> scene = ReadSceneData(request.database_path, {});
+  StatusOr<SceneData> scene = ReadSceneData(request.database_path, {});
   if (!scene.ok()) return scene.status();
-  const StatusOr<CoarsePoseMap> coarse =
-      ReadCoarsePoses(request.input_path, *scene);
-  if (!coarse.ok()) return coarse.status();
-
   MapReport report;
-  report.warnings = scene->warnings;
+  const StatusOr<CoarsePoseMap> coarse =
+      ReadCoarseModel(request.input_path, &report, &*scene);
+  if (!coarse.ok()) return coarse.status();
+  report.warnings.insert(report.warnings.begin(), scene->warnings.begin(),
+                         scene->warnings.end());
   if (scene->priors.empty()) report.warnings.push_back(kNoPriorsWarning);
   MapperStage stage(ResolveOptions(options, *scene), *scene, *coarse,
                     request.output_path, progress);

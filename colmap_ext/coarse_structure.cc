@@ -5,47 +5,12 @@
 #include <cmath>
 
 #include "colmap_ext/align_to_gravity.h"
-#include "colmap_ext/find_focal_length_error.h"
 #include "colmap_ext/host/pose_conversion.h"
 #include "colmap_ext/scene_bearings.h"
+#include "colmap_ext/select_coarse_points.h"
 
 namespace adasfm {
 namespace {
-
-// The angles that the images need: all tracks of the wanted angle, then, widest
-// first, those that help an image with too few points.
-std::vector<TriangulatedTrack> SelectPoints(
-    const CoarseStructureOptions& options,
-    std::vector<TriangulatedTrack> triangulated, double* min_angle_deg) {
-  std::vector<size_t> order(triangulated.size());
-  for (size_t i = 0; i < order.size(); ++i) order[i] = i;
-  std::stable_sort(order.begin(), order.end(), [&](size_t a, size_t b) {
-    return triangulated[a].angle_deg > triangulated[b].angle_deg;
-  });
-  std::map<image_t, int> num_points;
-  std::vector<char> selected(triangulated.size(), false);
-  *min_angle_deg = options.triangulation.min_triangulation_angle_deg;
-  for (const size_t i : order) {
-    const TriangulatedTrack& point = triangulated[i];
-    selected[i] =
-        point.angle_deg >= options.triangulation.min_triangulation_angle_deg ||
-        std::any_of(point.track.begin(), point.track.end(),
-                    [&](const TrackElement& element) {
-                      return num_points[element.image_id] <
-                             options.min_num_points_per_image;
-                    });
-    if (!selected[i]) continue;
-    *min_angle_deg = std::min(*min_angle_deg, point.angle_deg);
-    for (const TrackElement& element : point.track) {
-      ++num_points[element.image_id];
-    }
-  }
-  std::vector<TriangulatedTrack> result;
-  for (size_t i = 0; i < triangulated.size(); ++i) {
-    if (selected[i]) result.push_back(std::move(triangulated[i]));
-  }
-  return result;
-}
 
 // Cameras are those of the model before, as far as it has adjusted them.
 colmap::Reconstruction CreateReconstruction(
@@ -104,7 +69,9 @@ PriorBundleAdjustmentProblem CreateProblem(
   return problem;
 }
 
-void FillFigures(const CoarseStructureOptions& options, CoarseModel* model) {
+void FillFigures(const CoarseStructureOptions& options,
+                 const PriorBundleAdjustmentProblem& problem,
+                 CoarseModel* model) {
   const colmap::Reconstruction& reconstruction = model->reconstruction;
   model->num_points = reconstruction.NumPoints3D();
   model->num_observations = reconstruction.ComputeNumObservations();
@@ -117,6 +84,10 @@ void FillFigures(const CoarseStructureOptions& options, CoarseModel* model) {
     model->num_images_with_few_points +=
         num_points < options.min_num_points_per_image;
   }
+  model->prior_chi2_per_dof =
+      ComputePriorChi2PerDof(problem.priors, reconstruction);
+  model->priors_agree =
+      model->prior_chi2_per_dof <= options.balance.max_chi2_per_dof;
 }
 
 // The threshold falls from round to round, geometrically.
@@ -187,8 +158,9 @@ void BuildRound(const CoarseStructureOptions& options, const SceneData& scene,
                         tracks.Of(round + 1 == options.num_rounds));
   model->reconstruction =
       CreateReconstruction(scene, cams_from_world, model->reconstruction);
-  AddPoints(SelectPoints(options, std::move(points), &model->min_angle_deg),
-            &model->reconstruction);
+  AddPoints(
+      SelectCoarsePoints(options, std::move(points), &model->min_angle_deg),
+      &model->reconstruction);
 }
 
 // The balance of vision and priors means something at the optimum only, so the
@@ -206,6 +178,31 @@ PriorBundleAdjustmentSummary AdjustRound(
   }
   return AdjustBundleInBalance(balance, bundle, problem, reconstruction,
                                keypoint_sigma_factor);
+}
+
+bool KnowsFocalLengths(const colmap::Reconstruction& reconstruction) {
+  return std::all_of(
+      reconstruction.Cameras().begin(), reconstruction.Cameras().end(),
+      [](const auto& entry) { return entry.second.HasPriorFocalLength(); });
+}
+
+// The last round once more, after an adjustment that has found the focal
+// length.
+void RepeatWithFreeFocalLength(
+    CoarseStructureOptions options, const SceneData& scene,
+    const std::map<image_t, std::vector<Bearing>>& bearings,
+    const CoarseModelInput& input, const RoundTracks& tracks,
+    const PriorBundleAdjustmentProblem& problem, double* keypoint_sigma_factor,
+    CoarseModel* model) {
+  const int last = options.num_rounds - 1;
+  options.bundle.refine_focal_length = true;
+  *keypoint_sigma_factor = 1.0;
+  model->cameras_refined = true;
+  model->rounds.push_back(AdjustRound(
+      options, problem, last, &model->reconstruction, keypoint_sigma_factor));
+  BuildRound(options, scene, bearings, input, tracks, last, model);
+  model->rounds.push_back(AdjustRound(
+      options, problem, last, &model->reconstruction, keypoint_sigma_factor));
 }
 
 }  // namespace
@@ -265,9 +262,15 @@ CoarseModel BuildCoarseModel(
                                        &keypoint_sigma_factor));
     if (!model.rounds.back().success) break;
   }
-  if (keypoint_sigma_factor > 1.0 && !options.bundle.RefinesCameras()) {
-    model.focal_length_ratio = FindFocalLengthError(
+  model.cameras_refined = options.bundle.RefinesCameras();
+  if (model.rounds.back().success && !model.cameras_refined) {
+    model.focal_length_error = FindFocalLengthError(
         options.balance, options.bundle, problem, model.reconstruction);
+  }
+  if (model.focal_length_error && options.refine_unknown_focal_length &&
+      !KnowsFocalLengths(model.reconstruction)) {
+    RepeatWithFreeFocalLength(options, scene, bearings, input, tracks, problem,
+                              &keypoint_sigma_factor, &model);
   }
   model.reconstruction.FilterAllPoints3D(
       options.final_max_reproj_error_px,
@@ -277,11 +280,7 @@ CoarseModel BuildCoarseModel(
       AlignToGravity(scene, &model.reconstruction, input.camera_mount);
   model.keypoint_sigma_px =
       options.bundle.keypoint_sigma_px * keypoint_sigma_factor;
-  model.prior_chi2_per_dof =
-      ComputePriorChi2PerDof(problem.priors, model.reconstruction);
-  model.priors_agree =
-      model.prior_chi2_per_dof <= options.balance.max_chi2_per_dof;
-  FillFigures(options, &model);
+  FillFigures(options, problem, &model);
   return model;
 }
 

@@ -10,6 +10,7 @@
 
 #include "colmap_ext/balance_priors.h"
 #include "colmap_ext/bundle_adjustment.h"
+#include "colmap_ext/find_focal_length_error.h"
 #include "colmap_ext/scene_data.h"
 #include "core/bearing.h"
 #include "core/rigid3d.h"
@@ -40,6 +41,9 @@ struct CoarseStructureOptions {
   double early_function_tolerance = 1e-3;
   // Sensor priors take part in the adjustment.
   bool use_priors = true;
+  // Focal lengths that the database does not mark as known are adjusted when
+  // FindFocalLengthError finds them wrong; known ones are only reported.
+  bool refine_unknown_focal_length = true;
 
   bool IsValid(std::string* error) const;
 };
@@ -77,8 +81,10 @@ struct CoarseModel {
   double prior_chi2_per_dof = 0.0;
   // Whether vision and the priors agree within what the balance may ask for.
   bool priors_agree = true;
-  // FindFocalLengthError, when keypoints could not keep their sigma.
-  std::optional<double> focal_length_ratio;
+  // FindFocalLengthError, of the focal lengths that the scene states.
+  std::optional<FocalLengthError> focal_length_error;
+  // The cameras are not the scene's any more.
+  bool cameras_refined = false;
   // Smallest triangulation angle that had to be accepted.
   double min_angle_deg = 0.0;
   // Images with fewer points than asked for, in spite of that.

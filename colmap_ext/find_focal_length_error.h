@@ -10,14 +10,22 @@
 
 namespace adasfm {
 
-// Whether wrong focal lengths are why vision and the priors of an adjusted
-// model contradict each other: the model is adjusted once more with free focal
-// lengths and with keypoints at their plain sigma. When the priors then err no
-// more than the balance allows, the ratio of the new focal length to the old
-// one is returned (that of the camera that is farthest from 1); none when they
-// still do, or when it changes by less than calibrations repeat. The model is
-// left as it is.
-std::optional<double> FindFocalLengthError(
+struct FocalLengthError {
+  // The new focal length over the old one, of the camera farthest from 1.
+  double ratio = 1.0;
+  // 1 sigma of the ratio, by the change of the cost, and at least 0.1 %.
+  double sigma = 0.0;
+};
+
+// Whether the focal lengths of an adjusted model are wrong, as vision and the
+// priors together see it: at most 300 consecutive images, those that turn most,
+// are adjusted with given and with free focal lengths, keypoints at their plain
+// sigma. An error counts when it lowers the cost by 5 sigmas of the residuals
+// as they are, is beyond what calibrations repeat to, and leaves priors that
+// err no more than the balance allows: where they still do, keypoints share
+// errors of other kinds, and free focal lengths would take those up. None
+// without priors. The model is left as it is.
+std::optional<FocalLengthError> FindFocalLengthError(
     const PriorBalanceOptions& balance,
     const PriorBundleAdjustmentOptions& options,
     const PriorBundleAdjustmentProblem& problem,

@@ -27,6 +27,8 @@ Json JoinsJson(const SceneData& scene,
 
 Json ModelJson(const SceneData& scene, const CoarseComponent& component,
                const CoarseModel& model) {
+  const FocalLengthError focal =
+      model.focal_length_error.value_or(FocalLengthError());
   Json rounds = Json::array();
   for (const PriorBundleAdjustmentSummary& round : model.rounds) {
     rounds.push_back({{"success", round.success},
@@ -52,7 +54,9 @@ Json ModelJson(const SceneData& scene, const CoarseComponent& component,
           {"keypoint_sigma_px", model.keypoint_sigma_px},
           {"prior_chi2_per_dof", model.prior_chi2_per_dof},
           {"priors_agree", model.priors_agree},
-          {"focal_length_ratio", model.focal_length_ratio.value_or(1.0)},
+          {"focal_length_ratio", focal.ratio},
+          {"focal_length_ratio_sigma", focal.sigma},
+          {"cameras_refined", model.cameras_refined},
           {"metric", model.metric},
           {"gravity_aligned", model.gravity_aligned},
           {"rotations_converged", component.rotations_converged},
@@ -100,13 +104,20 @@ void AppendPriorWarnings(const CoarseModel& model,
                          std::vector<std::string>* warnings) {
   std::ostringstream text;
   text << std::fixed << std::setprecision(1);
-  if (model.focal_length_ratio.has_value()) {
-    text << "vision and sensors agree only with a focal length that is "
-         << 100.0 * std::abs(*model.focal_length_ratio - 1.0) << " % "
-         << (*model.focal_length_ratio > 1.0 ? "longer" : "shorter")
-         << ": check the intrinsics, or have them refined "
-            "(--AdaSfmGlobal.ba_refine_focal_length 1 and "
-            "--AdaSfmMapper.refine_focal_length 1)";
+  if (model.focal_length_error) {
+    const FocalLengthError& error = *model.focal_length_error;
+    text << std::setprecision(2)
+         << "vision and sensors agree with a focal length that is "
+         << 100.0 * std::abs(error.ratio - 1.0) << " +- " << 100.0 * error.sigma
+         << " % " << (error.ratio > 1.0 ? "longer" : "shorter")
+         << " than the database says";
+    if (model.cameras_refined) {
+      text << "; it was refined, as it is not marked as known";
+    } else {
+      text << ": check the intrinsics, or have them refined "
+              "(--AdaSfmGlobal.ba_refine_focal_length 1 and "
+              "--AdaSfmMapper.refine_focal_length 1)";
+    }
   } else if (!model.priors_agree) {
     text << "vision and sensors contradict each other (squared errors of the "
             "sensors are "

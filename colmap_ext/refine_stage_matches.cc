@@ -91,7 +91,7 @@ void RefineStageMatches(const GlobalStageOptions& options,
   for (size_t i = 0; i < result->models.size(); ++i) {
     const colmap::Reconstruction& model = result->models[i].reconstruction;
     std::map<image_t, std::vector<Bearing>> refined;
-    if (options.structure.bundle.RefinesCameras()) {
+    if (result->models[i].cameras_refined) {
       refined = ComputeModelBearings(model, options.num_threads);
     }
     const MatchRefinementReport report =

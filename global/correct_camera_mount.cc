@@ -283,10 +283,12 @@ CameraMountReport CorrectCameraMount(
   report.chi2 = report.turn_rad.dot(covariance.ldlt().solve(report.turn_rad));
   const Eigen::Vector3d axis = report.turn_rad.normalized();
   report.sigma_rad = std::sqrt(axis.dot(covariance * axis));
-  if (report.chi2 < options.min_num_sigmas * options.min_num_sigmas) {
+  const Eigen::Vector3d known = KeepKnown(report.turn_rad, covariance);
+  if (report.chi2 < options.min_num_sigmas * options.min_num_sigmas ||
+      known.norm() == 0.0) {
     return report;
   }
-  report.turn_rad = KeepKnown(report.turn_rad, covariance);
+  report.turn_rad = known;
   report.corrected = true;
   for (RelativePosePrior& prior : *priors) {
     TurnPrior(ExpSo3(report.turn_rad), &prior);

@@ -18,8 +18,8 @@ import sys
 from benchmarking.figures import (add_arguments, measure, world_folder,
                                   write_results)
 from benchmarking.process import Failed, run
-from benchmarking.spoil import (add_imu_noise, cut_logs, keep_every,
-                                scale_focal_length, scale_wheels,
+from benchmarking.spoil import (add_imu_noise, cut_logs, forget_focal_length,
+                                keep_every, scale_focal_length, scale_wheels,
                                 shift_clocks, shift_gyroscope,
                                 turn_camera, turn_wheels)
 
@@ -77,6 +77,8 @@ WORLDS = {
         spoil=lambda w: scale_focal_length(w, 1.01)),
     'focal length 2 % too short': world(
         spoil=lambda w: scale_focal_length(w, 0.98)),
+    'focal length 1 % too long, not marked as known': world(
+        spoil=lambda w: (scale_focal_length(w, 1.01), forget_focal_length(w))),
     'focal length 2 % too short, refined': world(
         spoil=lambda w: scale_focal_length(w, 0.98), **REFINE),
     'IMU without wheels, no blackout': world(
@@ -177,7 +179,8 @@ def describe(record):
   if record.get('unverified_joins'):
     said.append('unverified joins')
   for key, word in (('contradict each other', 'sensors against vision'),
-                    ('agree only with a focal', 'focal length'),
+                    ('agree with a focal', 'focal length'),
+                    ('mount is', 'camera mount'),
                     ('images and IMU differ', 'time shift'),
                     ('did not settle', 'smoother did not settle'),
                     ('gaps of more', 'hole in the log')):

@@ -142,6 +142,10 @@ void GlobalOptionAdder::AddStructure() {
       "1 sigma of a keypoint, against which sensor priors weigh [px]");
   Add("ba_refine_focal_length", &stage_->structure.bundle.refine_focal_length,
       "adjust focal lengths too");
+  Add("refine_unknown_focal_length",
+      &stage_->structure.refine_unknown_focal_length,
+      "adjust focal lengths that the database does not mark as known, when "
+      "vision and sensors show that they are wrong");
 }
 
 void GlobalOptionAdder::AddMatches() {

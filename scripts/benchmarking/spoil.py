@@ -136,3 +136,11 @@ def scale_focal_length(folder, factor):
       r'intrinsics: \[([\d.]+), ([\d.]+)',
       lambda match: 'intrinsics: [%g, %g' % tuple(
           factor * float(value) for value in match.groups()), text))
+
+
+def forget_focal_length(folder):
+  """The database does not mark it as known any more."""
+  database = sqlite3.connect(os.path.join(folder, 'database.db'))
+  database.execute('UPDATE cameras SET prior_focal_length = 0')
+  database.commit()
+  database.close()

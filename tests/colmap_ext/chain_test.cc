@@ -4,6 +4,10 @@
 #include <nlohmann/json.hpp>
 #include <string>
 
+#include "colmap_ext/double_blob.h"
+#include "colmap_ext/host/database.h"
+#include "colmap_ext/host/model.h"
+#include "colmap_ext/sqlite.h"
 #include "tests/colmap_ext/command_line_fixture.h"
 
 namespace adasfm {
@@ -50,6 +54,31 @@ class ChainTest : public CommandLineTest {
 
   std::string ModelBytes(const std::string& output) {
     return ReadBytes(folder_.File(output + "/0/images.bin"));
+  }
+
+  void Sql(const std::string& statement) {
+    SqliteConnection(database_, SqliteConnection::Mode::kWrite)
+        .Execute(statement);
+  }
+
+  // Those of the database.
+  void ScaleFocalLengths(double factor) {
+    SqliteConnection database(database_, SqliteConnection::Mode::kWrite);
+    for (auto& [camera_id, camera] : ReadCameras(&database)) {
+      std::vector<double> params = camera.Params();
+      for (const size_t i : camera.FocalLengthIdxs()) params[i] *= factor;
+      SqliteStatement statement(
+          &database, "UPDATE cameras SET params = ? WHERE camera_id = ?");
+      BindDoubles(&statement, 1, params.data(), params.size());
+      statement.BindInt(2, camera_id);
+      statement.Step();
+    }
+  }
+
+  double FocalLength(const std::string& model) {
+    const auto reconstruction = ReadModel(folder_.File(model));
+    EXPECT_TRUE(reconstruction.ok());
+    return reconstruction->Cameras().begin()->second.MeanFocalLength();
   }
 
   std::string database_ = folder_.File("database.db");
@@ -122,6 +151,27 @@ TEST_F(ChainTest, TwiceIsOnceAndTheRestorerUndoes) {
   EXPECT_EQ(ModelBytes("again"), ModelBytes("global"));
   ExpectSuccess("adasfm_restorer --database_path " + database_);
   EXPECT_EQ(rows(), original);
+}
+
+// The coarse stage finds a focal length that nobody marked as known, and the
+// mapper goes on with it, though the database has the wrong one.
+TEST_F(ChainTest, TheMapperTakesTheCoarseModelsCameras) {
+  Make("--num_images 80 --seed 4");
+  Import();
+  Sql("UPDATE cameras SET prior_focal_length = 0");
+  ExpectSuccess(GlobalArguments());
+  const std::string fixed =
+      " --AdaSfmMapper.refine_focal_length 0 "
+      "--AdaSfmMapper.refine_extra_params 0";
+  Run run = ExpectSuccess(MapperArguments("right") + fixed);
+  EXPECT_EQ(run.out.find("coarse model's camera"), std::string::npos);
+  ScaleFocalLengths(1.05);
+  ExpectSuccess(GlobalArguments());
+  run = ExpectSuccess(MapperArguments("wrong") + fixed);
+  EXPECT_NE(run.out.find("coarse model's camera"), std::string::npos);
+  EXPECT_NEAR(FocalLength("wrong/0") / FocalLength("right/0"), 1.0, 0.003);
+  EXPECT_EQ(FocalLength("wrong/0"), FocalLength("global/0"));
+  ExpectGoodMetricModel(Evaluate("wrong/0"), 80);
 }
 
 TEST_F(ChainTest, WithoutSensorsThereIsOneWarningAndAModel) {

@@ -85,6 +85,8 @@ const std::vector<OptionCase>& Cases() {
              structure.early_function_tolerance),
       OPTION("ba_keypoint_sigma_px", 0.7, structure.bundle.keypoint_sigma_px),
       OPTION("ba_refine_focal_length", 1, structure.bundle.refine_focal_length),
+      OPTION("refine_unknown_focal_length", 0,
+             structure.refine_unknown_focal_length),
       OPTION("min_num_matches", 30, refinement.min_num_matches),
       OPTION("use_sdp_start", 0, poses.rotations.use_sdp_start),
       OPTION("use_loop_gating", 0, poses.loops.enabled),

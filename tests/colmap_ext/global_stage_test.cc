@@ -171,25 +171,57 @@ TEST(RunGlobalStageTest, CorrectsTheMountOrWarnsOfTheContradiction) {
   EXPECT_NE(warnings[0].find("mount"), std::string::npos);
 }
 
-// 90 m of road show a focal length that is a tenth off; more road shows less.
+void ScaleFocalLength(double ratio, SceneData* scene) {
+  for (const size_t i : scene->cameras.at(1).FocalLengthIdxs()) {
+    scene->cameras.at(1).Params(i) *= ratio;
+  }
+}
+
+// 90 m of road know the focal length to half a per cent.
 TEST(RunGlobalStageTest, WarnsOfAWrongFocalLength) {
-  for (const double ratio : {0.9, 1.1}) {
+  for (const double ratio : {0.9, 0.97, 1.0, 1.05}) {
     const SyntheticWorld world = BuildSyntheticWorld(SmallWorld());
     SceneData scene = BuildSyntheticScene(world, SyntheticPriorOptions());
-    for (const size_t i : scene.cameras.at(1).FocalLengthIdxs()) {
-      scene.cameras.at(1).Params(i) *= ratio;
-    }
+    ScaleFocalLength(ratio, &scene);
+    scene.cameras.at(1).SetPriorFocalLength(true);
     const GlobalStageResult result = RunStage(scene);
-    ASSERT_TRUE(result.models[0].focal_length_ratio.has_value()) << ratio;
-    EXPECT_NEAR(*result.models[0].focal_length_ratio, 1.0 / ratio, 0.01);
+    const auto& error = result.models[0].focal_length_error;
+    ASSERT_EQ(error.has_value(), ratio != 1.0) << ratio;
+    if (!error) continue;
+    EXPECT_NEAR(error->ratio, 1.0 / ratio, 0.01);
+    EXPECT_NEAR(error->ratio, 1.0 / ratio, 4.0 * error->sigma);
     const std::vector<std::string> warnings = ListGlobalWarnings(scene, result);
     ASSERT_FALSE(warnings.empty());
     EXPECT_NE(warnings[0].find(ratio > 1.0 ? "shorter" : "longer"),
               std::string::npos);
     // The cameras are the user's: told, not changed.
+    EXPECT_FALSE(result.models[0].cameras_refined);
     EXPECT_EQ(result.models[0].reconstruction.Camera(1).Params(),
               scene.cameras.at(1).Params());
   }
+}
+
+TEST(RunGlobalStageTest, RefinesAFocalLengthThatNobodyKnows) {
+  const SyntheticWorld world = BuildSyntheticWorld(SmallWorld());
+  SceneData scene = BuildSyntheticScene(world, SyntheticPriorOptions());
+  const double focal_px = scene.cameras.at(1).MeanFocalLength();
+  const GlobalStageResult right = RunStage(scene);
+  ScaleFocalLength(1.05, &scene);
+  scene.cameras.at(1).SetPriorFocalLength(false);
+  const GlobalStageResult refined = RunStage(scene);
+  EXPECT_TRUE(refined.models[0].cameras_refined);
+  EXPECT_NEAR(
+      refined.models[0].reconstruction.Camera(1).MeanFocalLength() / focal_px,
+      1.0, 0.003);
+  EXPECT_NEAR(refined.refinement.num_kept, right.refinement.num_kept,
+              0.005 * right.refinement.num_kept);
+  GlobalStageOptions options;
+  options.structure.refine_unknown_focal_length = false;
+  const GlobalStageResult left = RunStage(scene, options);
+  EXPECT_FALSE(left.models[0].cameras_refined);
+  EXPECT_TRUE(left.models[0].focal_length_error.has_value());
+  EXPECT_LT(ComparePoses(world, refined.models[0].reconstruction).rmse_m,
+            ComparePoses(world, left.models[0].reconstruction).rmse_m);
 }
 
 TEST(RunGlobalStageTest, SwitchesOffMatchRefinement) {
