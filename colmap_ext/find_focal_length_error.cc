@@ -90,8 +90,7 @@ std::optional<FocalLengthError> FindFocalLengthError(
   if (std::abs(error.ratio - 1.0) < kMinRatio || num_sigmas < kMinNumSigmas) {
     return std::nullopt;
   }
-  error.sigma =
-      std::hypot(std::abs(error.ratio - 1.0) / num_sigmas, kMinSigma);
+  error.sigma = std::hypot(std::abs(error.ratio - 1.0) / num_sigmas, kMinSigma);
   return error;
 }
 
