@@ -2,11 +2,11 @@
 #include "colmap_ext/select_pairs.h"
 
 #include <algorithm>
-#include <cctype>
 #include <map>
 #include <set>
 #include <stdexcept>
 
+#include "colmap_ext/capture_order.h"
 #include "colmap_ext/host/database.h"
 #include "colmap_ext/nearest_rows.h"
 #include "colmap_ext/prior_tables.h"
@@ -14,41 +14,6 @@
 
 namespace adasfm {
 namespace {
-
-bool IsDigit(char c) { return std::isdigit(static_cast<unsigned char>(c)); }
-
-// The end of the digits that begin at `begin`, and the first one but zeros.
-size_t SkipNumber(const std::string& text, size_t begin, size_t* first) {
-  *first = begin;
-  while (*first < text.size() && text[*first] == '0') ++*first;
-  size_t end = *first;
-  while (end < text.size() && IsDigit(text[end])) ++end;
-  return end;
-}
-
-// Runs of digits are compared as numbers, everything else byte by byte.
-bool NaturallyLess(const std::string& a, const std::string& b) {
-  size_t i = 0, j = 0;
-  while (i < a.size() && j < b.size()) {
-    if (!IsDigit(a[i]) || !IsDigit(b[j])) {
-      if (a[i] != b[j]) return a[i] < b[j];
-      ++i, ++j;
-      continue;
-    }
-    size_t first_i = 0, first_j = 0;
-    const size_t end_i = SkipNumber(a, i, &first_i);
-    const size_t end_j = SkipNumber(b, j, &first_j);
-    if (end_i - first_i != end_j - first_j) {
-      return end_i - first_i < end_j - first_j;
-    }
-    const int order =
-        a.compare(first_i, end_i - first_i, b, first_j, end_j - first_j);
-    if (order != 0) return order < 0;
-    i = end_i, j = end_j;
-  }
-  if (a.size() - i != b.size() - j) return a.size() - i < b.size() - j;
-  return a < b;
-}
 
 StatusOr<std::map<image_t, timestamp_t>> TimesFromDatabase(
     const std::string& database_path) {
@@ -165,17 +130,15 @@ StatusOr<std::vector<image_t>> OrderImages(const std::string& database_path,
                                : TimesFromFile(image_times_path, images);
   if (!times_or.ok()) return times_or.status();
   const std::map<image_t, timestamp_t>& times = *times_or;
-  *ordered_by_time = !times.empty() && times.size() == images.size();
-  std::stable_sort(images.begin(), images.end(),
-                   [&](const DatabaseImage& a, const DatabaseImage& b) {
-                     if (*ordered_by_time) {
-                       return times.at(a.image_id) < times.at(b.image_id);
-                     }
-                     return NaturallyLess(a.name, b.name);
-                   });
-  std::vector<image_t> image_ids;
-  for (const DatabaseImage& image : images) image_ids.push_back(image.image_id);
-  return image_ids;
+  std::vector<CapturedImage> captured;
+  for (const DatabaseImage& image : images) {
+    const auto time = times.find(image.image_id);
+    captured.push_back({image.image_id, image.name,
+                        time == times.end()
+                            ? std::nullopt
+                            : std::optional<timestamp_t>(time->second)});
+  }
+  return OrderByCapture(std::move(captured), ordered_by_time);
 }
 
 StatusOr<PairSelection> SelectPairs(const PairSelectionOptions& options,

@@ -9,6 +9,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "colmap_ext/capture_order.h"
 #include "core/parallel.h"
 #include "global/epipolar.h"
 
@@ -157,8 +158,15 @@ InitialViewGraph BuildInitialViewGraph(
     const TwoViewPoseOptions& options, const SceneData& scene,
     const std::map<image_t, std::vector<Bearing>>& bearings) {
   InitialViewGraph initial;
+  std::vector<CapturedImage> captured;
   for (const auto& [image_id, image] : scene.images) {
     initial.graph.images.push_back(image_id);
+    captured.push_back({image_id, image.name, image.timestamp_ns});
+  }
+  initial.graph.capture_ranks.resize(captured.size());
+  int64_t rank = 0;
+  for (const image_t image_id : OrderByCapture(std::move(captured))) {
+    initial.graph.capture_ranks[initial.graph.IndexOf(image_id)] = rank++;
   }
   std::vector<PoseOrigin> origins(scene.pairs.size(), PoseOrigin::kNone);
   std::vector<Rigid3d> poses(scene.pairs.size());

@@ -32,8 +32,8 @@ class DisjointSets {
 struct Crossing {
   int piece1 = 0;  // < piece2
   int piece2 = 0;
-  int64_t image_id1 = 0;
-  int64_t image_id2 = 0;
+  int64_t rank1 = 0;
+  int64_t rank2 = 0;
   const ViewGraphEdge* edge = nullptr;
 };
 
@@ -51,7 +51,7 @@ std::vector<Crossing> CollectCrossings(const ViewGraph& graph, int max_gap,
   for (const ViewGraphEdge& edge : graph.edges) {
     if (!edge.IsKept()) continue;
     if (edge.source == EdgeSource::kVisual &&
-        edge.image_id2 - edge.image_id1 > static_cast<image_t>(max_gap)) {
+        graph.CaptureGap(edge) > max_gap) {
       continue;
     }
     sets.Join(graph.IndexOf(edge.image_id1), graph.IndexOf(edge.image_id2));
@@ -62,19 +62,20 @@ std::vector<Crossing> CollectCrossings(const ViewGraph& graph, int max_gap,
   std::vector<Crossing> crossings;
   for (const ViewGraphEdge& edge : graph.edges) {
     if (!edge.IsKept()) continue;
-    Crossing crossing{(*piece_of)[graph.IndexOf(edge.image_id1)],
-                      (*piece_of)[graph.IndexOf(edge.image_id2)],
-                      edge.image_id1, edge.image_id2, &edge};
+    const int i = graph.IndexOf(edge.image_id1);
+    const int j = graph.IndexOf(edge.image_id2);
+    Crossing crossing{(*piece_of)[i], (*piece_of)[j], graph.CaptureRank(i),
+                      graph.CaptureRank(j), &edge};
     if (crossing.piece1 > crossing.piece2) {
       std::swap(crossing.piece1, crossing.piece2);
-      std::swap(crossing.image_id1, crossing.image_id2);
+      std::swap(crossing.rank1, crossing.rank2);
     }
     if (crossing.piece1 != crossing.piece2) crossings.push_back(crossing);
   }
   std::sort(crossings.begin(), crossings.end(),
             [](const Crossing& a, const Crossing& b) {
-              return std::tie(a.piece1, a.piece2, a.image_id1, a.image_id2) <
-                     std::tie(b.piece1, b.piece2, b.image_id1, b.image_id2);
+              return std::tie(a.piece1, a.piece2, a.rank1, a.rank2) <
+                     std::tie(b.piece1, b.piece2, b.rank1, b.rank2);
             });
   return crossings;
 }
@@ -86,11 +87,10 @@ std::vector<Place> GroupCrossings(const std::vector<Crossing>& crossings,
     for (size_t b = a + 1; b < crossings.size(); ++b) {
       if (crossings[b].piece1 != crossings[a].piece1 ||
           crossings[b].piece2 != crossings[a].piece2 ||
-          crossings[b].image_id1 - crossings[a].image_id1 > max_gap) {
+          crossings[b].rank1 - crossings[a].rank1 > max_gap) {
         break;
       }
-      if (std::abs(crossings[b].image_id2 - crossings[a].image_id2) <=
-          max_gap) {
+      if (std::abs(crossings[b].rank2 - crossings[a].rank2) <= max_gap) {
         sets.Join(b, a);
       }
     }

@@ -10,7 +10,7 @@
 namespace adasfm {
 
 struct UnverifiedJoinOptions {
-  // Images at most this far apart in the order of their ids are taken to follow
+  // Images at most this far apart in the order of capture are taken to follow
   // each other; edges of that kind make the pieces of a drive.
   int max_sequence_gap = 10;
   // Smaller pieces are let be.

@@ -39,6 +39,9 @@ int ViewGraph::IndexOf(image_t image_id) const {
 }
 
 void ViewGraph::Check() const {
+  if (!capture_ranks.empty() && capture_ranks.size() != images.size()) {
+    throw std::invalid_argument("ViewGraph: not one capture rank per image");
+  }
   for (size_t i = 1; i < images.size(); ++i) {
     if (images[i - 1] >= images[i]) {
       throw std::invalid_argument("ViewGraph: images are not sorted");
@@ -97,6 +100,11 @@ ViewGraph ExtractSubgraph(const ViewGraph& graph,
                           const std::vector<image_t>& images) {
   ViewGraph subgraph;
   subgraph.images = images;
+  for (const image_t image_id : images) {
+    if (graph.capture_ranks.empty()) break;
+    subgraph.capture_ranks.push_back(
+        graph.capture_ranks[graph.IndexOf(image_id)]);
+  }
   for (const ViewGraphEdge& edge : graph.edges) {
     if (subgraph.IndexOf(edge.image_id1) >= 0 &&
         subgraph.IndexOf(edge.image_id2) >= 0) {

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <cstdint>
+#include <cstdlib>
 #include <limits>
 #include <map>
 #include <optional>
@@ -58,12 +60,24 @@ struct ViewGraphEdge {
 struct ViewGraph {
   std::vector<image_t> images;       // sorted
   std::vector<ViewGraphEdge> edges;  // sorted by pair, one per pair
+  // Where each image stands in the order of capture, all different; empty:
+  // that of the ids.
+  std::vector<int64_t> capture_ranks;
 
   // The position of an image in images, -1 when absent.
   int IndexOf(image_t image_id) const;
+  // Of the image at an index.
+  int64_t CaptureRank(int index) const {
+    return capture_ranks.empty() ? images[index] : capture_ranks[index];
+  }
+  // Of a pair: how far its images are apart in the order of capture.
+  int64_t CaptureGap(const ViewGraphEdge& edge) const {
+    return std::abs(CaptureRank(IndexOf(edge.image_id2)) -
+                    CaptureRank(IndexOf(edge.image_id1)));
+  }
   // Throws std::invalid_argument unless both lists are sorted without
-  // duplicates, all edges join two of the images, and all kept values are
-  // finite.
+  // duplicates, all edges join two of the images, all kept values are finite,
+  // and ranks are none or one per image.
   void Check() const;
 };
 

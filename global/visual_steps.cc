@@ -26,8 +26,19 @@ int FindVisualEdge(const ViewGraph& graph, const ImagePair& pair) {
   return is_visual ? e : -1;
 }
 
-// Images of neighbouring ids that share a pair, where one piece of the chain
-// ends and another begins. A step without anything, to be filled.
+std::vector<image_t> InOrderOfCapture(const ViewGraph& graph) {
+  std::vector<std::pair<int64_t, image_t>> ranked;
+  for (size_t i = 0; i < graph.images.size(); ++i) {
+    ranked.emplace_back(graph.CaptureRank(i), graph.images[i]);
+  }
+  std::sort(ranked.begin(), ranked.end());
+  std::vector<image_t> images;
+  for (const auto& [rank, image_id] : ranked) images.push_back(image_id);
+  return images;
+}
+
+// Neighbours in the order of capture that share a pair, where one piece of the
+// chain ends and another begins. A step without anything, to be filled.
 std::vector<RelativePosePrior> ContinueChain(
     const ViewGraph& graph, std::vector<RelativePosePrior> priors) {
   std::set<image_t> has_next, has_previous;
@@ -35,10 +46,11 @@ std::vector<RelativePosePrior> ContinueChain(
     has_next.insert(prior.image_id1);
     has_previous.insert(prior.image_id2);
   }
-  for (size_t k = 0; k + 1 < graph.images.size(); ++k) {
+  const std::vector<image_t> images = InOrderOfCapture(graph);
+  for (size_t k = 0; k + 1 < images.size(); ++k) {
     RelativePosePrior step;
-    step.image_id1 = graph.images[k];
-    step.image_id2 = graph.images[k + 1];
+    step.image_id1 = images[k];
+    step.image_id2 = images[k + 1];
     if (has_next.count(step.image_id1) || has_previous.count(step.image_id2) ||
         FindVisualEdge(graph, ImagePair(step.image_id1, step.image_id2)) < 0) {
       continue;

@@ -54,9 +54,10 @@ struct VisualSteps {
 // and length, in metres as far as metres of other steps spread through shared
 // points, else in a unit of the scene; where vision sees nothing the motion of
 // the steps before and behind is taken to go on. Where the chain is interrupted
-// (a gap of the logs), images of neighbouring ids continue it that share a
-// pair. The result serves to exclude pairs and never as an edge.
-// known_lengths_m: metres of the priors' pairs, as for EstimateEdgeLengths.
+// (a gap of the logs) or there is none, neighbours in the order of capture
+// continue it that share a pair. The result serves to exclude pairs and never
+// as an edge. known_lengths_m: metres of the priors' pairs, as for
+// EstimateEdgeLengths.
 VisualSteps AddVisualSteps(const VisualStepOptions& options,
                            const EdgeLengthOptions& length_options,
                            const ViewGraph& graph,
