@@ -41,6 +41,7 @@ struct PriorTerms {
   TermMean rotations{3};
   TermMean directions{2};
   TermMean lengths{1};
+  TermMean translations{3};
 
   void Add(const PosePriorEdge& edge,
            const colmap::Reconstruction& reconstruction) {
@@ -59,6 +60,7 @@ struct PriorTerms {
     directions.Add(AngleBetweenRad(translation, prior),
                    edge.direction_sigma_rad);
     lengths.Add(translation.norm() - prior.norm(), edge.length_sigma_m);
+    translations.Add((translation - prior).norm(), edge.translation_sigma_m);
   }
 };
 
@@ -84,8 +86,8 @@ double ComputePriorChi2PerDof(const std::vector<PosePriorEdge>& priors,
   for (const PosePriorEdge& edge : priors) {
     if (edge.is_held_by_points) terms.Add(edge, reconstruction);
   }
-  return std::max(
-      {terms.rotations.Mean(), terms.directions.Mean(), terms.lengths.Mean()});
+  return std::max({terms.rotations.Mean(), terms.directions.Mean(),
+                   terms.lengths.Mean(), terms.translations.Mean()});
 }
 
 int CountTornPriors(const std::vector<PosePriorEdge>& priors,
@@ -95,7 +97,7 @@ int CountTornPriors(const std::vector<PosePriorEdge>& priors,
     PriorTerms terms;
     terms.Add(edge, reconstruction);
     num_torn += terms.rotations.num_torn + terms.directions.num_torn +
-                    terms.lengths.num_torn >
+                    terms.lengths.num_torn + terms.translations.num_torn >
                 0;
   }
   return num_torn;

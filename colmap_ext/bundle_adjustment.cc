@@ -18,6 +18,9 @@ constexpr double kGaugeLengthRatio = 1e-3;
 // The chain's length and bends are soft: the damping that Ceres begins with
 // (radius 1e4) would let them go a little at each of many steps.
 constexpr double kInitialTrustRegionRadius = 1e7;
+// Of priors: beyond, a direction is nearly any; below, there is no motion.
+constexpr double kMaxDirectionSigmaRad = 0.5;
+constexpr double kMinLengthM = 1e-9;
 // Problems with fewer residuals are solved faster by one thread.
 constexpr int kMinNumResidualsForThreads = 20000;
 
@@ -91,8 +94,8 @@ PosePriorEdge PosePriorEdgeFromPrior(const RelativePosePrior& prior) {
         sigma_or_infinity(prior.covariance.topLeftCorner<3, 3>().trace() / 3.0);
   }
   const Eigen::Vector3d& translation = prior.cam2_from_cam1.translation;
-  const double length = translation.norm();
-  if (!std::isfinite(length) || length <= 0.0) return edge;
+  const double length = std::max(kMinLengthM, translation.norm());
+  if (!std::isfinite(length)) return edge;
   const Eigen::Matrix3d covariance = prior.covariance.bottomRightCorner<3, 3>();
   const Eigen::Vector3d direction = translation / length;
   const double variance_along = direction.dot(covariance * direction);
@@ -103,8 +106,12 @@ PosePriorEdge PosePriorEdgeFromPrior(const RelativePosePrior& prior) {
     edge.direction_sigma_rad = sigma_or_infinity(variance_across) / length;
   }
   // A motion that drowns in its own noise has no direction.
-  if (edge.direction_sigma_rad > 0.5) {
+  if (edge.direction_sigma_rad > kMaxDirectionSigmaRad) {
     edge.direction_sigma_rad = std::numeric_limits<double>::infinity();
+    if (prior.HasDirection() && prior.HasLength()) {
+      edge.translation_sigma_m = sigma_or_infinity(covariance.trace() / 3.0);
+      edge.length_sigma_m = std::numeric_limits<double>::infinity();
+    }
   }
   return edge;
 }

@@ -20,6 +20,7 @@ namespace adasfm {
 //   rotation   Log(R R^^T) / rotation_sigma_rad            3 residuals
 //   direction  angle between t and t^ / direction_sigma_rad 2 residuals
 //   length     (|t| - |t^|) / length_sigma_m                1 residual
+//   translation  (t - t^) / translation_sigma_m             3 residuals
 // A term with an infinite sigma is left out.
 struct PosePriorEdge {
   image_t image_id1 = kInvalidImageId;
@@ -28,6 +29,9 @@ struct PosePriorEdge {
   double rotation_sigma_rad = std::numeric_limits<double>::infinity();
   double direction_sigma_rad = std::numeric_limits<double>::infinity();
   double length_sigma_m = std::numeric_limits<double>::infinity();
+  // In place of direction and length where the motion is too short to have a
+  // direction: with its length alone, every position around it would fit.
+  double translation_sigma_m = std::numeric_limits<double>::infinity();
   // Whether keypoints hold both images too. An edge that bridges a gap by
   // itself keeps its full weight, as dropping it would open the gap, and says
   // nothing of the balance between keypoints and priors.

@@ -155,6 +155,7 @@ void BundleProblem::AddPriors(const std::vector<PosePriorEdge>& edges) {
     add(Term::kRotation, edge.rotation_sigma_rad);
     add(Term::kDirection, edge.direction_sigma_rad);
     add(Term::kLength, edge.length_sigma_m);
+    add(Term::kTranslation, edge.translation_sigma_m);
   }
 }
 

@@ -63,6 +63,7 @@ PriorBundleAdjustmentProblem CreateProblem(
     PosePriorEdge edge = PosePriorEdgeFromPrior(prior);
     if (!input.metric) {
       edge.length_sigma_m = std::numeric_limits<double>::infinity();
+      edge.translation_sigma_m = std::numeric_limits<double>::infinity();
     }
     problem.priors.push_back(edge);
   }

@@ -35,6 +35,21 @@ void WriteJacobian(const Eigen::Matrix<double, kRows, 3>& rotation,
   }
 }
 
+// Those of a term with this Jacobian by t.
+template <int kRows>
+void WriteTranslationJacobians(
+    const Eigen::Matrix<double, kRows, 3>& from_translation,
+    const Eigen::Vector3d& translation, const AdjustedPose& pose2,
+    double** jacobians) {
+  const Eigen::Matrix<double, kRows, 3> from_center =
+      from_translation * pose2.rotation;
+  WriteJacobian<kRows>(Eigen::Matrix<double, kRows, 3>::Zero(), from_center,
+                       jacobians[0]);
+  WriteJacobian<kRows>(
+      -from_translation * Hat(translation) * pose2.left_jacobian, -from_center,
+      jacobians[1]);
+}
+
 }  // namespace
 
 Eigen::Vector2d DirectionError(const Eigen::Vector3d& vector,
@@ -77,6 +92,7 @@ PosePriorCost::PosePriorCost(const PosePriorEdge& edge, Term term,
       pose1_(pose1),
       pose2_(pose2),
       rotation_(edge.cam2_from_cam1.rotation),
+      translation_(edge.cam2_from_cam1.translation),
       length_(edge.cam2_from_cam1.translation.norm()) {
   if (length_ > kMinLength) {
     direction_ = edge.cam2_from_cam1.translation / length_;
@@ -90,6 +106,8 @@ PosePriorCost::PosePriorCost(const PosePriorEdge& edge, Term term,
   } else if (term == Term::kLength) {
     num_residuals = 1;
     sigma = edge.length_sigma_m;
+  } else if (term == Term::kTranslation) {
+    sigma = edge.translation_sigma_m;
   }
   inverse_sigma_ = 1.0 / sigma;
   set_num_residuals(num_residuals);
@@ -126,9 +144,9 @@ void PosePriorCost::EvaluateRotation(double* residuals,
   WriteJacobian<3>(from_turn2 * pose2_->left_jacobian, zero, jacobians[1]);
 }
 
+// t = R_2 (C_1 - C_2): dt = -Hat(t) Jl dw_2 + R_2 (dc_1 - dc_2).
 void PosePriorCost::EvaluateTranslation(double* residuals,
                                         double** jacobians) const {
-  // t = R_2 (C_1 - C_2): dt = -Hat(t) Jl dw_2 + R_2 (dc_1 - dc_2).
   const Eigen::Vector3d translation =
       pose2_->rotation * (pose1_->center - pose2_->center);
   const bool needs_jacobian =
@@ -136,34 +154,33 @@ void PosePriorCost::EvaluateTranslation(double* residuals,
   if (term_ == Term::kLength) {
     const double length = translation.norm();
     residuals[0] = inverse_sigma_ * (length - length_);
-    if (!needs_jacobian) return;
     Eigen::Matrix<double, 1, 3> from_translation =
         Eigen::Matrix<double, 1, 3>::Zero();
     if (length > kMinLength) {
       from_translation = inverse_sigma_ * translation.transpose() / length;
     }
-    const Eigen::Matrix<double, 1, 3> from_center =
-        from_translation * pose2_->rotation;
+    // A turn of camera 2 leaves the length as it is.
     const Eigen::Matrix<double, 1, 3> zero =
         Eigen::Matrix<double, 1, 3>::Zero();
+    const Eigen::Matrix<double, 1, 3> from_center =
+        from_translation * pose2_->rotation;
     WriteJacobian<1>(zero, from_center, jacobians[0]);
     WriteJacobian<1>(zero, -from_center, jacobians[1]);
-    return;
+  } else if (term_ == Term::kDirection) {
+    Eigen::Matrix<double, 2, 3> from_translation;
+    Eigen::Map<Eigen::Vector2d> residual(residuals);
+    residual = inverse_sigma_ *
+               DirectionError(translation, direction_, basis_,
+                              needs_jacobian ? &from_translation : nullptr);
+    if (!needs_jacobian) return;
+    WriteTranslationJacobians<2>(inverse_sigma_ * from_translation, translation,
+                                 *pose2_, jacobians);
+  } else {
+    Eigen::Map<Eigen::Vector3d> residual(residuals);
+    residual = inverse_sigma_ * (translation - translation_);
+    WriteTranslationJacobians<3>(inverse_sigma_ * Eigen::Matrix3d::Identity(),
+                                 translation, *pose2_, jacobians);
   }
-  Eigen::Matrix<double, 2, 3> from_translation;
-  Eigen::Map<Eigen::Vector2d> residual(residuals);
-  residual = inverse_sigma_ *
-             DirectionError(translation, direction_, basis_,
-                            needs_jacobian ? &from_translation : nullptr);
-  if (!needs_jacobian) return;
-  from_translation *= inverse_sigma_;
-  const Eigen::Matrix<double, 2, 3> from_center =
-      from_translation * pose2_->rotation;
-  const Eigen::Matrix<double, 2, 3> from_turn2 =
-      -from_translation * Hat(translation) * pose2_->left_jacobian;
-  const Eigen::Matrix<double, 2, 3> zero = Eigen::Matrix<double, 2, 3>::Zero();
-  WriteJacobian<2>(zero, from_center, jacobians[0]);
-  WriteJacobian<2>(from_turn2, -from_center, jacobians[1]);
 }
 
 }  // namespace adasfm

@@ -25,12 +25,13 @@ Eigen::Vector2d DirectionError(const Eigen::Vector3d& vector,
 //   kRotation:  Log(R R^^T) / sigma      3 residuals
 //   kDirection: DirectionError(t, t^) / sigma  2 residuals
 //   kLength:    (|t| - |t^|) / sigma     1 residual
+//   kTranslation: (t - t^) / sigma       3 residuals
 // Parameters: AdjustedPose::parameters of image 1 (6) and of image 2 (6). The
 // poses are read from the objects, which must be up to date. One cost per term,
 // so that the robust loss can drop a wrong term and keep the others.
 class PosePriorCost final : public ceres::CostFunction {
  public:
-  enum class Term { kRotation, kDirection, kLength };
+  enum class Term { kRotation, kDirection, kLength, kTranslation };
 
   PosePriorCost(const PosePriorEdge& edge, Term term, const AdjustedPose* pose1,
                 const AdjustedPose* pose2);
@@ -48,6 +49,7 @@ class PosePriorCost final : public ceres::CostFunction {
   Eigen::Quaterniond rotation_;
   Eigen::Vector3d direction_ = Eigen::Vector3d::UnitZ();
   Eigen::Matrix<double, 3, 2> basis_;
+  Eigen::Vector3d translation_;
   double length_ = 0.0;
   double inverse_sigma_ = 1.0;
 };

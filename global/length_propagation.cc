@@ -58,7 +58,7 @@ std::vector<LengthPropagation::Observation> LengthPropagation::ObserveEdge(
   constexpr double kSaturation = 0.05;
   const auto matches = correspondences.matches.find(edge.Pair());
   if (!edge.IsKept() || !edge.has_rotation || !edge.has_translation ||
-      edge.source == EdgeSource::kSensor ||
+      !edge.has_baseline || edge.source == EdgeSource::kSensor ||
       matches == correspondences.matches.end()) {
     return {};
   }

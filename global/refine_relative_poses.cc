@@ -9,6 +9,7 @@
 
 #include "core/parallel.h"
 #include "core/so3.h"
+#include "global/detect_baseline.h"
 #include "global/epipolar.h"
 #include "global/translation_direction.h"
 
@@ -175,6 +176,8 @@ void RefineEdge(const RelativePoseRefinementOptions& options,
     pose.translation = -pose.translation;
   }
   edge->cam2_from_cam1 = Rigid3d(pose.rotation, pose.translation);
+  edge->has_baseline = DetectBaseline(bearings, pose.rotation, pose.translation,
+                                      options.keypoint_sigma_px);
   SetSigmas(pose, variance, edge);
 }
 

@@ -42,6 +42,8 @@ struct RotationPrediction {
 // their sigmas follow from the normal matrix. An edge without a useful pose
 // (fewer than 8 matches) keeps what it had.
 //
+// Sets has_baseline too (DetectBaseline).
+//
 // Nearly planar scenes leave a valley, or a second optimum, degrees away.
 // predictions (none, or one per edge where there is one) decide there: they
 // enter as a quadratic term, unless the matches contradict them clearly.

@@ -9,6 +9,7 @@
 
 #include "core/parallel.h"
 #include "core/so3.h"
+#include "global/detect_baseline.h"
 #include "global/translation_direction.h"
 
 namespace adasfm {
@@ -94,7 +95,10 @@ void RefineEdge(const RelativeTranslationOptions& options,
   if (direction.norm() == 0.0) return;
   edge->cam2_from_cam1 = Rigid3d(problem.rotation, direction);
   edge->direction_sigma_rad = DirectionSigma(options, problem, direction);
+  edge->has_baseline = DetectBaseline(problem.bearings, problem.rotation,
+                                      direction, options.keypoint_sigma_px);
   edge->has_translation =
+      edge->has_baseline &&
       edge->direction_sigma_rad < DegToRad(options.max_direction_sigma_deg);
 }
 

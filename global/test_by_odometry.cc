@@ -25,6 +25,17 @@ double TestRotation(const LoopFilterOptions& options, const ChainMotion& motion,
   return std::sqrt(error.dot(covariance.ldlt().solve(error)));
 }
 
+// A pair whose centres are one against the chain.
+double TestCoincidence(const LoopFilterOptions& options,
+                       const ChainMotion& motion) {
+  const double floor_m = options.min_position_error_m / options.max_num_sigmas;
+  const Eigen::Matrix3d covariance =
+      motion.covariance.bottomRightCorner<3, 3>() +
+      floor_m * floor_m * Eigen::Matrix3d::Identity();
+  const Eigen::Vector3d& error = motion.cam2_from_cam1.translation;
+  return std::sqrt(error.dot(covariance.ldlt().solve(error)));
+}
+
 // The pair's metric translation against the chain's, in camera 2's frame. The
 // pair's own error: along its direction that of its length, across it that of
 // its direction.
@@ -78,7 +89,10 @@ OdometryTest TestByOdometry(const LoopFilterOptions& options,
   std::tie(test.begin, test.end) =
       std::minmax(chain.Index(edge.image_id1), chain.Index(edge.image_id2));
   test.rotation_sigmas = TestRotation(options, motion, edge);
-  if (motion.has_position && edge.has_translation && length.has_value()) {
+  if (motion.has_position && !edge.has_baseline) {
+    test.position_sigmas = TestCoincidence(options, motion);
+  } else if (motion.has_position && edge.has_translation &&
+             length.has_value()) {
     test.position_sigmas = TestPosition(options, motion, *length, edge);
   }
   test.verdict = Judge(options, test);

@@ -43,6 +43,9 @@ struct ViewGraphEdge {
   EdgeSource source = EdgeSource::kVisual;
   bool has_rotation = true;
   bool has_translation = true;
+  // False: both centres are one as far as vision can tell, and the direction
+  // says nothing.
+  bool has_baseline = true;
   // Distance of the camera centres in metres, from sensors.
   std::optional<double> length_m;
 

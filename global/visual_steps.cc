@@ -220,7 +220,8 @@ VisualSteps AddVisualSteps(const VisualStepOptions& options,
       length_options, SequenceGraph(graph, chain, options.max_num_steps),
       known_lengths_m, correspondences);
 
-  // 1. Steps that vision sees.
+  // 1. Steps that vision sees; a standstill's error is in terms of the others.
+  std::vector<RelativePosePrior*> standstills;
   std::map<ImagePair, double> known_lengths = known_lengths_m;
   for (RelativePosePrior& prior : steps.priors) {
     if (prior.HasRotation() && HasPosition(prior)) continue;
@@ -228,9 +229,19 @@ VisualSteps AddVisualSteps(const VisualStepOptions& options,
     const int e = FindVisualEdge(graph, pair);
     if (e < 0) continue;
     if (!prior.HasRotation()) FillRotation(options, graph.edges[e], &prior);
+    if (!graph.edges[e].has_baseline) {
+      standstills.push_back(&prior);
+      continue;
+    }
     if (!graph.edges[e].has_translation || !lengths.lengths[e]) continue;
     FillPosition(options, graph.edges[e], *lengths.lengths[e], &prior);
     known_lengths[pair] = lengths.lengths[e]->length;
+    ++steps.num_by_vision;
+  }
+  const double sigma = options.length_error_ratio * MedianLength(steps.priors);
+  for (RelativePosePrior* prior : standstills) {
+    SetTranslation(Eigen::Vector3d::Zero(),
+                   sigma * sigma * Eigen::Matrix3d::Identity(), prior);
     ++steps.num_by_vision;
   }
   // 2. Steps that nothing sees.

@@ -182,6 +182,61 @@ TEST(AdjustBundleTest, PriorsCarryImagesWithoutObservations) {
   EXPECT_LT(CenterError(world, reconstruction), 2e-3);
 }
 
+// The vehicle stops while the camera sees nothing: images 8 to 13 see nothing,
+// and 10 to 12 stand at one place, up to a millimetre.
+TEST(AdjustBundleTest, AStopInTheDarkKeepsTheChainTogether) {
+  const double sigma_m = 3e-3;
+  for (uint64_t seed = 1; seed <= 5; ++seed) {
+    BundleWorldOptions world;
+    world.seed = seed;
+    colmap::Reconstruction reconstruction = BuildBundleWorld(world);
+    Random random(seed);
+    std::map<image_t, Rigid3d> truth;
+    for (const image_t id : reconstruction.RegImageIds()) {
+      truth[id] = CamFromWorld(reconstruction.Image(id));
+      if (id < 8 || id > 13) continue;
+      for (size_t k = 0; k < reconstruction.Image(id).NumPoints2D(); ++k) {
+        if (reconstruction.Image(id).Point2D(k).HasPoint3D()) {
+          reconstruction.DeleteObservation(id, k);
+        }
+      }
+    }
+    for (const image_t id : {11, 12}) {
+      truth[id] = CamFromWorldWithCenter(
+          truth.at(10).rotation,
+          truth.at(10).TargetOriginInSource() + random.GaussianVector(1e-3));
+      SetCamFromWorld(truth.at(id), &reconstruction.Image(id));
+    }
+    PerturbBundleWorld(2e-3, 0.05, seed, &reconstruction);
+    PriorBundleAdjustmentProblem problem = ProblemOfAll(reconstruction);
+    for (const image_t id : reconstruction.RegImageIds()) {
+      if (truth.count(id + 1) == 0) continue;
+      RelativePosePrior prior;
+      prior.image_id1 = id;
+      prior.image_id2 = id + 1;
+      prior.cam2_from_cam1 =
+          ComputeCam2FromCam1(truth.at(id), truth.at(id + 1));
+      prior.cam2_from_cam1.translation += random.GaussianVector(sigma_m);
+      prior.covariance.setZero();
+      prior.covariance.diagonal() << Eigen::Vector3d::Constant(1e-8),
+          Eigen::Vector3d::Constant(sigma_m * sigma_m);
+      prior.flags = kPriorRotation | kPriorDirection | kPriorLength;
+      problem.priors.push_back(PosePriorEdgeFromPrior(prior));
+    }
+    ASSERT_TRUE(
+        AdjustBundle(PriorBundleAdjustmentOptions(), problem, &reconstruction)
+            .success);
+    for (const auto& [id, pose] : truth) {
+      // Six steps of three components, 5 sigmas.
+      EXPECT_LT((CamFromWorld(reconstruction.Image(id)).TargetOriginInSource() -
+                 pose.TargetOriginInSource())
+                    .norm(),
+                5.0 * std::sqrt(18.0) * sigma_m)
+          << "seed " << seed << ", image " << id;
+    }
+  }
+}
+
 TEST(AdjustBundleTest, PriorsAloneAreAPoseGraph) {
   BundleWorldOptions world;
   world.num_keypoints_per_image = 0;
@@ -357,6 +412,19 @@ TEST(PosePriorEdgeFromPriorTest, TakesWhatTheFlagsClaim) {
   EXPECT_NEAR(edge.rotation_sigma_rad, 0.01, 1e-12);
   EXPECT_NEAR(edge.direction_sigma_rad, 0.05, 1e-12);
   EXPECT_NEAR(edge.length_sigma_m, 0.05, 1e-12);
+
+  EXPECT_EQ(edge.translation_sigma_m, kInfinity);
+
+  // A standstill.
+  RelativePosePrior standstill = prior;
+  standstill.cam2_from_cam1.translation /= 20.0;
+  const PosePriorEdge short_edge = PosePriorEdgeFromPrior(standstill);
+  EXPECT_EQ(short_edge.direction_sigma_rad, kInfinity);
+  EXPECT_EQ(short_edge.length_sigma_m, kInfinity);
+  EXPECT_NEAR(short_edge.translation_sigma_m, std::sqrt(0.0225 / 3.0), 1e-12);
+  standstill.cam2_from_cam1.translation.setZero();
+  EXPECT_NEAR(PosePriorEdgeFromPrior(standstill).translation_sigma_m,
+              std::sqrt(0.0225 / 3.0), 1e-12);
 
   prior.flags = kPriorRotation;
   const PosePriorEdge rotation_only = PosePriorEdgeFromPrior(prior);

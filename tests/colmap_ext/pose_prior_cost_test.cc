@@ -66,6 +66,7 @@ PosePriorEdge RandomEdge(Random* random) {
   edge.rotation_sigma_rad = 0.5;
   edge.direction_sigma_rad = 0.7;
   edge.length_sigma_m = 2.0;
+  edge.translation_sigma_m = 3.0;
   return edge;
 }
 
@@ -109,7 +110,8 @@ TEST_P(PosePriorCostTest, IsZeroAtTheMeasurement) {
 INSTANTIATE_TEST_SUITE_P(Terms, PosePriorCostTest,
                          testing::Values(PosePriorCost::Term::kRotation,
                                          PosePriorCost::Term::kDirection,
-                                         PosePriorCost::Term::kLength));
+                                         PosePriorCost::Term::kLength,
+                                         PosePriorCost::Term::kTranslation));
 
 TEST(DirectionErrorTest, NormIsTheAngle) {
   Random random(1);

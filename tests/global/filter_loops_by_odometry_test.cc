@@ -154,5 +154,25 @@ TEST(FilterLoopsByOdometry, ALonePairIsNoEvidence) {
   EXPECT_TRUE(problem.graph.edges[lone].IsKept());
 }
 
+// A pair without a baseline says that both images are at one place, which the
+// chain can refute without any length.
+TEST(FilterLoopsByOdometry, PlacesThatCoincideMustBeNear) {
+  for (uint64_t seed = 1; seed <= 3; ++seed) {
+    LoopProblem problem = BuildProblem(seed, 1.0);
+    for (int k = 0; k < 3; ++k) {
+      AddEdge(10 + k, 80 + k, Rigid3d(), true, false, &problem);
+      problem.graph.edges.back().has_baseline = false;
+      AddEdge(5 + k, kLap + 5 + k, Rigid3d(), false, false, &problem);
+      problem.graph.edges.back().has_baseline = false;
+    }
+    FilterLoopsByOdometry(LoopFilterOptions(), problem.chain, problem.lengths,
+                          &problem.graph);
+    for (size_t e = 0; e < problem.graph.edges.size(); ++e) {
+      EXPECT_EQ(problem.graph.edges[e].IsKept(), !problem.is_alias[e])
+          << "seed " << seed << " edge " << e;
+    }
+  }
+}
+
 }  // namespace
 }  // namespace adasfm

@@ -91,6 +91,52 @@ TEST(RelativeTranslations, NearZeroBaselineSaysNothing) {
   EXPECT_TRUE(other.graph.edges[1].has_translation);
 }
 
+// Image 2 stands where image 1 stands, up to a rotation; a part of the matches
+// has gross noise, or lies on a car that passes. Those agree with one direction
+// very well, which says nothing of the camera.
+TEST(RefineRelativePoses, StandstillHasNoBaselineWhateverMovesBeforeIt) {
+  for (const bool is_car : {false, true}) {
+    for (uint64_t seed = 1; seed <= 5; ++seed) {
+      TestSceneOptions options;
+      options.noise_px = 0.5;
+      TestScene scene = BuildTestScene(options, seed);
+      Random random(seed);
+      const Eigen::Quaterniond turn = ExpSo3(random.GaussianVector(0.05));
+      auto& bearings = scene.correspondences.bearings;
+      bearings[2] = bearings.at(1);
+      for (size_t k = 0; k < bearings[2].size(); ++k) {
+        Bearing& bearing = bearings[2][k];
+        Eigen::Vector2d offset_px = random.GaussianVector(0.5).head<2>();
+        const bool is_other = k % 4 == 0;
+        if (is_other && is_car) offset_px.x() += 12.0;
+        if (is_other && !is_car) {
+          offset_px += random.GaussianVector(8.0).head<2>();
+        }
+        bearing.direction =
+            turn *
+            (bearing.direction + bearing.jacobian * offset_px).normalized();
+        bearing.jacobian = turn.toRotationMatrix() * bearing.jacobian;
+      }
+      ViewGraphEdge& still = scene.graph.edges.front();
+      ASSERT_EQ(still.Pair(), ImagePair(1, 2));
+      still.cam2_from_cam1 = Rigid3d(turn, random.UnitVector());
+      ViewGraph graph = scene.graph;
+      RefineRelativePoses(RelativePoseRefinementOptions(),
+                          scene.correspondences, {}, &graph);
+      EXPECT_FALSE(graph.edges.front().has_baseline) << "seed " << seed;
+      std::map<image_t, Eigen::Quaterniond> rotations = TrueRotations(scene);
+      rotations[2] = turn * rotations.at(1);
+      EstimateRelativeTranslations(RelativeTranslationOptions(), rotations,
+                                   scene.correspondences, &graph);
+      EXPECT_FALSE(graph.edges.front().has_translation) << "seed " << seed;
+      for (size_t e = 1; e < graph.edges.size(); ++e) {
+        if (graph.edges[e].image_id1 == 2) continue;
+        EXPECT_TRUE(graph.edges[e].has_baseline) << "seed " << seed;
+      }
+    }
+  }
+}
+
 TEST(RefineRelativePoses, ReachesTheTruthFromAFewDegreesOff) {
   for (const bool fisheye : {false, true}) {
     for (uint64_t seed = 1; seed <= 3; ++seed) {
