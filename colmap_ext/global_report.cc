@@ -13,6 +13,9 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
+// Fewer pairs between two parts are no news.
+constexpr int kMinNumReportedPairs = 3;
+
 Json JoinsJson(const SceneData& scene,
                const std::vector<UnverifiedJoin>& joins) {
   Json json = Json::array();
@@ -23,6 +26,32 @@ Json JoinsJson(const SceneData& scene,
                     {"images", join.num_images}});
   }
   return json;
+}
+
+Json JoinFilterJson(const SceneData& scene, const JoinFilterReport& joins) {
+  Json split = Json::array();
+  for (const SplitJoin& join : joins.split) {
+    split.push_back({{"name1", scene.images.at(join.image_id1).name},
+                     {"name2", scene.images.at(join.image_id2).name},
+                     {"pairs", join.num_pairs},
+                     {"images", join.num_images}});
+  }
+  return {{"parts", joins.num_parts},
+          {"confirmed", joins.num_confirmed},
+          {"pairs_removed", joins.num_removed_pairs},
+          {"not_made", split}};
+}
+
+std::string DescribeSplitJoin(const SceneData& scene, const SplitJoin& join) {
+  std::ostringstream text;
+  text << "a part of " << join.num_images << " images may join another where "
+       << join.num_pairs << " pairs like "
+       << scene.images.at(join.image_id1).name << " and "
+       << scene.images.at(join.image_id2).name
+       << " agree, but neither sensors nor a second place confirm it, and "
+          "look-alike places do the same: both stay apart "
+          "(--AdaSfmGlobal.split_unverified_joins 0 joins them)";
+  return text.str();
 }
 
 Json ModelJson(const SceneData& scene, const CoarseComponent& component,
@@ -153,6 +182,7 @@ std::string FormatGlobalReportJson(const SceneData& scene,
                               {"pairs", rates.num_pairs},
                               {"max_rate_rad_s", rates.max_rate_rad_s},
                               {"vision_offset_rad", rates.offset_rad.norm()}};
+  report["joins"] = JoinFilterJson(scene, result.poses.join_filter);
   for (size_t i = 0; i < result.models.size(); ++i) {
     report["models"].push_back(
         ModelJson(scene, result.poses.components[i], result.models[i]));
@@ -202,6 +232,11 @@ std::vector<std::string> ListGlobalWarnings(const SceneData& scene,
   AppendMountWarning(result.poses.camera_mount, &warnings);
   for (const CoarseModel& model : result.models) {
     AppendPriorWarnings(model, &warnings);
+  }
+  for (const SplitJoin& join : result.poses.join_filter.split) {
+    if (join.num_pairs >= kMinNumReportedPairs) {
+      warnings.push_back(DescribeSplitJoin(scene, join));
+    }
   }
   for (const CoarseComponent& component : result.poses.components) {
     if (!component.positions_converged) {

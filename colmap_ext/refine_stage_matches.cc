@@ -22,6 +22,7 @@ std::set<ImagePair> FindRefutedPairs(const ViewGraph& graph) {
       case EdgeRemoval::kOdometryRotation:
       case EdgeRemoval::kOdometryPosition:
       case EdgeRemoval::kFalseLoop:
+      case EdgeRemoval::kUnverifiedJoin:
       case EdgeRemoval::kRotation:
       case EdgeRemoval::kTranslation:
         refuted.insert(edge.Pair());

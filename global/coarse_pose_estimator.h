@@ -33,6 +33,8 @@ class CoarsePoseEstimator {
   std::vector<std::optional<RotationPrediction>> PredictRotations() const;
   void FilterLoops();
   VisualSteps CompleteSteps() const;
+  void SplitJoins(const std::vector<std::optional<EdgeLength>>& lengths);
+  int AddSensors();
   void EstimateRotations();
   void FilterByRotation();
   void RepeatRotations();

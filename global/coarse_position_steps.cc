@@ -44,6 +44,8 @@ void CoarsePoseEstimator::EstimatePositions() {
   const int num_removed = RemoveEdgesOffPositions();
   int num_joins = 0;
   for (CoarseComponent& component : result_.components) {
+    // Those that stand after the filter are confirmed.
+    if (result_.join_filter.num_parts > 0) break;
     std::vector<image_t> images;
     for (const auto& [image_id, pose] : component.cams_from_world) {
       images.push_back(image_id);
@@ -149,12 +151,19 @@ int CoarsePoseEstimator::RemoveEdgesOffPositions() {
       ++num_removed;
     }
   }
-  // Lengths have one unit only when they are metres.
-  return num_removed +
-         FilterEdgesByPosition(
-             options_.position_filter, rotations_, centers,
-             lengths_.metric ? lengths_.lengths : decltype(lengths_.lengths)(),
-             &graph_);
+  // Lengths and positions have one unit only when both are metres.
+  auto lengths = lengths_.lengths;
+  for (size_t e = 0; e < lengths.size(); ++e) {
+    const auto component = component_of.find(graph_.edges[e].image_id1);
+    const bool has_metres = lengths_.metric &&
+                            component != component_of.end() &&
+                            result_.components[component->second].metric &&
+                            !(lengths[e] && lengths[e]->is_by_depth);
+    if (!has_metres) lengths[e].reset();
+  }
+  return num_removed + FilterEdgesByPosition(options_.position_filter,
+                                             rotations_, centers, lengths,
+                                             &graph_);
 }
 
 // Metres of the priors that augment the graph, spread over shared points.
@@ -180,10 +189,19 @@ std::vector<std::optional<EdgeLength>> CoarsePoseEstimator::SelectLengths(
     const ViewGraph& subgraph) const {
   std::vector<std::optional<EdgeLength>> selected;
   if (lengths_.lengths.empty()) return selected;
+  const bool metric = std::any_of(
+      subgraph.edges.begin(), subgraph.edges.end(),
+      [](const ViewGraphEdge& edge) {
+        return edge.IsKept() && edge.has_translation && edge.length_m;
+      });
   size_t e = 0;
   for (const ViewGraphEdge& edge : subgraph.edges) {
     while (graph_.edges[e].Pair() < edge.Pair()) ++e;
     selected.push_back(lengths_.lengths[e]);
+    // Guesses do not count beside metres.
+    if (metric && selected.back() && selected.back()->is_by_depth) {
+      selected.back().reset();
+    }
   }
   return selected;
 }

@@ -125,6 +125,7 @@ void CoarsePoseEstimator::FilterLoops() {
   options.min_position_error_m *= steps.unit_m;
   const LoopFilterReport report = FilterLoopsByOdometry(
       options, chain, steps.priors.empty() ? lengths_ : steps.lengths, &graph_);
+  SplitJoins(steps.priors.empty() ? lengths_.lengths : steps.lengths.lengths);
   std::string summary =
       std::to_string(report.num_tested) + " pairs tested, " +
       std::to_string(report.num_contradicting) + " contradict the odometry, " +
@@ -136,7 +137,22 @@ void CoarsePoseEstimator::FilterLoops() {
                std::to_string(steps.num_coasting) +
                " are taken to go on as before";
   }
+  const JoinFilterReport& joins = result_.join_filter;
+  if (joins.num_parts > 1) {
+    summary += "; " + std::to_string(joins.num_parts) + " parts, " +
+               std::to_string(joins.num_confirmed) + " joins confirmed, " +
+               std::to_string(joins.split.size()) + " not made";
+  }
   EndStep("loop gating", summary);
+}
+
+void CoarsePoseEstimator::SplitJoins(
+    const std::vector<std::optional<EdgeLength>>& lengths) {
+  if (!options_.join_filter.enabled || priors_.empty()) return;
+  result_.join_filter =
+      FilterUnverifiedJoins(options_.join_filter, priors_, lengths, &graph_);
+  // What came through removed pairs is forgotten.
+  if (result_.join_filter.num_removed_pairs > 0) lengths_ = EdgeLengths();
 }
 
 // Empty where the sensors saw every step.
@@ -153,8 +169,23 @@ VisualSteps CoarsePoseEstimator::CompleteSteps() const {
                         correspondences_, KnownLengths(), priors_);
 }
 
-void CoarsePoseEstimator::EstimateRotations() {
+// Lengths found before keep to their edges.
+int CoarsePoseEstimator::AddSensors() {
+  std::map<ImagePair, std::optional<EdgeLength>> lengths;
+  for (size_t e = 0; e < lengths_.lengths.size(); ++e) {
+    lengths[graph_.edges[e].Pair()] = lengths_.lengths[e];
+  }
   const int num_added = AddSensorEdges(options_.augmentation, priors_, &graph_);
+  if (lengths.empty()) return num_added;
+  lengths_.lengths.clear();
+  for (const ViewGraphEdge& edge : graph_.edges) {
+    lengths_.lengths.push_back(lengths[edge.Pair()]);
+  }
+  return num_added;
+}
+
+void CoarsePoseEstimator::EstimateRotations() {
+  const int num_added = AddSensors();
   int num_converged = 0;
   int num_components = 0;
   for (const std::vector<image_t>& images : FindConnectedComponents(graph_)) {
@@ -183,7 +214,7 @@ void CoarsePoseEstimator::FilterByRotation() {
   int num_removed = FilterEdgesByRotation(options_.max_rotation_discrepancy_deg,
                                           rotations_, &graph_);
   // Consecutive images that lost their visual edge keep the sensors'.
-  const int num_added = AddSensorEdges(options_.augmentation, priors_, &graph_);
+  const int num_added = AddSensors();
   num_removed += FilterEdgesByRotation(options_.max_rotation_discrepancy_deg,
                                        rotations_, &graph_);
   EndStep("rotation filter", std::to_string(num_removed) + " removed, " +

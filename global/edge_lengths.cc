@@ -69,12 +69,21 @@ EdgeLengths EstimateEdgeLengths(
     }
   }
   propagation.Spread(options.num_shared_reliable);
-  if (!result.metric) SeedParts(options, graph, &propagation);
+  if (result.metric) propagation.Spread(options.min_num_shared);
+  std::vector<bool> is_by_depth(num_edges, false);
+  for (size_t e = 0; result.metric && e < num_edges; ++e) {
+    is_by_depth[e] = !propagation.IsKnown(e) || (e < start.lengths.size() &&
+                                                 start.lengths[e].has_value() &&
+                                                 start.lengths[e]->is_by_depth);
+  }
+  SeedParts(options, graph, &propagation);
   propagation.Spread(options.min_num_shared);
   for (int i = 0; i < options.num_sweeps; ++i) propagation.Sweep();
   result.lengths.resize(num_edges);
   for (size_t e = 0; e < num_edges; ++e) {
-    if (propagation.IsKnown(e)) result.lengths[e] = propagation.Get(e);
+    if (!propagation.IsKnown(e)) continue;
+    result.lengths[e] = propagation.Get(e);
+    result.lengths[e]->is_by_depth = is_by_depth[e];
   }
   return result;
 }

@@ -33,11 +33,14 @@ struct EdgeLengthOptions {
 };
 
 struct EdgeLength {
-  // Distance of the centres: metres when metric, else in the unit of its
-  // component.
+  // Distance of the centres: metres when metric, else in the unit of the
+  // scene's depth.
   double length = 0.0;
   // 1 sigma of log(length).
   double log_sigma = 0.0;
+  // No metres reach the edge, though there are some: the scene is taken to be
+  // as deep there as elsewhere, which is right within a factor of two or so.
+  bool is_by_depth = false;
 };
 
 struct EdgeLengths {

@@ -14,6 +14,7 @@
 #include "global/edge_lengths.h"
 #include "global/filter_edges_by_position.h"
 #include "global/filter_loops_by_odometry.h"
+#include "global/filter_unverified_joins.h"
 #include "global/find_unverified_joins.h"
 #include "global/odometry_chain.h"
 #include "global/refine_relative_poses.h"
@@ -34,6 +35,8 @@ struct CoarsePoseOptions {
   EdgeLengthOptions lengths;
   VisualStepOptions visual_steps;
   LoopFilterOptions loops;
+  // Its max_sequence_gap is that of joins.
+  JoinFilterOptions join_filter;
   RotationAveragingOptions rotations;
   // eps_R.
   double max_rotation_discrepancy_deg = 5.0;
@@ -102,6 +105,7 @@ struct CoarsePoses {
   std::vector<RelativePosePrior> priors;
   CameraMountReport camera_mount;
   RotationRateReport rotation_rates;
+  JoinFilterReport join_filter;
   std::vector<CoarseStep> steps;
 };
 
@@ -114,6 +118,7 @@ struct CoarsePoses {
 //     odometry's rotation rates               CorrectRotationRates
 //   2 odometry chain, lengths, loop gating    AddVisualSteps
 //                                             FilterLoopsByOdometry
+//     joins that nothing confirms           FilterUnverifiedJoins
 //   3 sensor edges, rotation averaging        EstimateGlobalRotations
 //   4 edges off the rotations                 FilterEdgesByRotation
 //   5 directions, sensor translations         EstimateRelativeTranslations

@@ -4,29 +4,14 @@
 #include <algorithm>
 #include <cstdint>
 #include <cstdlib>
-#include <numeric>
 #include <stdexcept>
 #include <tuple>
 #include <utility>
 
+#include "global/disjoint_sets.h"
+
 namespace adasfm {
 namespace {
-
-class DisjointSets {
- public:
-  explicit DisjointSets(size_t size) : parent_(size) {
-    std::iota(parent_.begin(), parent_.end(), 0);
-  }
-  int Find(int i) {
-    while (parent_[i] != i) i = parent_[i] = parent_[parent_[i]];
-    return i;
-  }
-  // The second one's root stays.
-  void Join(int a, int b) { parent_[Find(a)] = Find(b); }
-
- private:
-  std::vector<int> parent_;
-};
 
 // A pair between two pieces; the first image lies in the first one.
 struct Crossing {
@@ -45,11 +30,16 @@ struct Place {
   int max_num_inliers = -1;
 };
 
+// A gyroscope alone does not.
+bool TellsPlace(const ViewGraphEdge& edge) {
+  return edge.IsKept() && edge.has_translation;
+}
+
 std::vector<Crossing> CollectCrossings(const ViewGraph& graph, int max_gap,
                                        std::vector<int>* piece_of) {
   DisjointSets sets(graph.images.size());
   for (const ViewGraphEdge& edge : graph.edges) {
-    if (!edge.IsKept()) continue;
+    if (!TellsPlace(edge)) continue;
     if (edge.source == EdgeSource::kVisual &&
         graph.CaptureGap(edge) > max_gap) {
       continue;
@@ -61,7 +51,7 @@ std::vector<Crossing> CollectCrossings(const ViewGraph& graph, int max_gap,
   }
   std::vector<Crossing> crossings;
   for (const ViewGraphEdge& edge : graph.edges) {
-    if (!edge.IsKept()) continue;
+    if (!TellsPlace(edge)) continue;
     const int i = graph.IndexOf(edge.image_id1);
     const int j = graph.IndexOf(edge.image_id2);
     Crossing crossing{(*piece_of)[i], (*piece_of)[j], graph.CaptureRank(i),

@@ -152,7 +152,20 @@ void LengthPropagation::Seed(int edge) {
   for (size_t o = edge_begin_[edge]; o < edge_begin_[edge + 1]; o += 2) {
     log_depths.push_back({observations_[o].offset, 1.0});
   }
-  Fix(edge, -WeightedMedian(&log_depths), options_.max_log_sigma);
+  Fix(edge, SeedDepth() - WeightedMedian(&log_depths), options_.max_log_sigma);
+}
+
+double LengthPropagation::SeedDepth() {
+  if (!seed_log_depth_.has_value()) {
+    std::vector<WeightedValue> log_depths;
+    for (const Observation& observation : observations_) {
+      if (!is_known_[observation.edge]) continue;
+      log_depths.push_back(
+          {log_lengths_[observation.edge] + observation.offset, 1.0});
+    }
+    seed_log_depth_ = log_depths.empty() ? 0.0 : WeightedMedian(&log_depths);
+  }
+  return *seed_log_depth_;
 }
 
 bool LengthPropagation::TouchesKnown(int edge) const {

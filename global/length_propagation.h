@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <optional>
 #include <vector>
 
 #include "global/correspondences.h"
@@ -22,7 +23,7 @@ class LengthPropagation {
   // A length to start from.
   void Start(int edge, const EdgeLength& length);
   // Fixes a length at which the edge's points have the same median depth as
-  // those of all seeds.
+  // those of all seeds, and of the edges that were known before.
   void Seed(int edge);
   // Whether an edge of known length ends at one of its images.
   bool TouchesKnown(int edge) const;
@@ -58,6 +59,7 @@ class LengthPropagation {
       const GlobalCorrespondences& correspondences) const;
   void LinkKeypoints(int num_keypoints);
   void MarkKnown(int edge);
+  double SeedDepth();
   double StartingDepth(int keypoint);
   bool LearnFromStart(int edge);
   void PredictDepths(int keypoint);
@@ -79,6 +81,8 @@ class LengthPropagation {
   std::vector<char> is_known_;
   std::vector<char> is_fixed_;
   std::vector<char> has_known_;  // by image
+  // The logarithm of a seed's median depth; found with the first one.
+  std::optional<double> seed_log_depth_;
   // By keypoint: known edges, and the depth with the number it was found from.
   std::vector<int> num_known_;
   std::vector<int> num_known_at_depth_;

@@ -28,7 +28,7 @@ struct TranslationAveragingOptions {
   // own sigmas, with a Cauchy loss that takes over at this many sigmas.
   bool refine = true;
   double refine_loss_scale = 2.0;
-  int max_num_refine_iterations = 20;
+  int max_num_refine_iterations = 100;
   // Least relative sigma of lengths from shared points in the second stage:
   // neighbouring edges share points, so their errors are not independent.
   double min_soft_length_sigma = 0.05;

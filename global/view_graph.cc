@@ -22,6 +22,8 @@ const char* EdgeRemovalName(EdgeRemoval removal) {
       return "position contradicts odometry";
     case EdgeRemoval::kFalseLoop:
       return "part of a false loop";
+    case EdgeRemoval::kUnverifiedJoin:
+      return "alone joins two parts";
     case EdgeRemoval::kRotation:
       return "off the global rotations";
     case EdgeRemoval::kTranslation:

@@ -27,6 +27,7 @@ enum class EdgeRemoval {
   kOdometryRotation,  // turns farther from the odometry chain than it can err
   kOdometryPosition,  // its places are farther apart than it says
   kFalseLoop,         // belongs to a run of pairs that contradicts the chain
+  kUnverifiedJoin,    // alone joins two parts of a drive, and may be wrong
   kRotation,          // off the global rotations
   kTranslation,       // off the global positions
   kDisconnected,      // one of its images has no pose

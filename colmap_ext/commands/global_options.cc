@@ -13,6 +13,7 @@ class GlobalOptionAdder {
   void AddRotations();
   void AddMount();
   void AddLoops();
+  void AddJoins();
   void AddPositions();
   void AddStructure();
   void AddMatches();
@@ -96,6 +97,25 @@ void GlobalOptionAdder::AddLoops() {
       "odometry, as a ratio");
 }
 
+void GlobalOptionAdder::AddJoins() {
+  JoinFilterOptions* filter = &stage_->poses.join_filter;
+  Add("max_sequence_gap", &stage_->poses.joins.max_sequence_gap,
+      "image ids at most this far apart follow each other; parts of a drive "
+      "that hang together at one place only are not joined (without priors: "
+      "reported)");
+  Add("min_num_join_images", &stage_->poses.joins.min_num_images,
+      "smaller parts are not reported");
+  Add("join_min_turn_deg", &filter->min_turn_deg,
+      "places that confirm each other lie before and behind a turn [deg]");
+  Add("join_max_place_images", &filter->max_place_images,
+      "or so many images apart");
+  Add("join_min_num_pairs", &filter->min_num_pairs, "pairs that a place needs");
+  Add("join_max_rotation_error_deg", &filter->max_rotation_error_deg,
+      "the ways between them agree within this turn [deg]");
+  Add("join_max_position_error", &filter->max_position_error_ratio,
+      "and within this share of the way, as a ratio");
+}
+
 void GlobalOptionAdder::AddPositions() {
   Add("max_num_position_iterations",
       &stage_->poses.positions.max_num_iterations,
@@ -107,11 +127,6 @@ void GlobalOptionAdder::AddPositions() {
       "the same at the worst image");
   Add("max_agreeing_direction_deg", &stage_->poses.max_agreeing_direction_deg,
       "a direction fits within this angle [deg]");
-  Add("max_sequence_gap", &stage_->poses.joins.max_sequence_gap,
-      "image ids at most this far apart follow each other; parts of a drive "
-      "that hang together at one place only are reported");
-  Add("min_num_join_images", &stage_->poses.joins.min_num_images,
-      "smaller parts are not reported");
 }
 
 void GlobalOptionAdder::AddStructure() {
@@ -159,6 +174,9 @@ void GlobalOptionAdder::AddAblations() {
       "start the rotations from the SDP");
   Add("use_loop_gating", &stage_->poses.loops.enabled,
       "remove loops that the odometry excludes");
+  Add("split_unverified_joins", &stage_->poses.join_filter.enabled,
+      "with sensor priors: parts of a drive that only pairs at one place join "
+      "become models of their own");
   Add("use_visual_steps", &stage_->poses.visual_steps.enabled,
       "vision completes the odometry that gates loops, where sensors have no "
       "position (0 or 1)");
@@ -190,6 +208,7 @@ void AddGlobalOptions(GlobalStageOptions* stage, CommandOptions* command) {
   adder.AddRotations();
   adder.AddMount();
   adder.AddLoops();
+  adder.AddJoins();
   adder.AddPositions();
   adder.AddStructure();
   adder.AddMatches();

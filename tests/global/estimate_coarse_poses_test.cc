@@ -346,6 +346,40 @@ TEST(EstimateCoarsePoses, VisionCompletesInterruptedSensors) {
   }
 }
 
+// Behind a blackout without sensors only distant pairs could join the drive,
+// and look-alikes are among them: what stands on one side only is a model of
+// its own, and sound.
+TEST(EstimateCoarsePoses, JoinsNothingBehindABlackoutWithoutSensors) {
+  int num_split = 0;
+  for (uint64_t seed = 1; seed <= 3; ++seed) {
+    CoarseProblem wheels_end = BuildProblem(AliasedWorld(seed));
+    CoarseProblem all_end = wheels_end;
+    all_end.priors.resize(40);
+    for (size_t k = 40; k < wheels_end.priors.size(); ++k) {
+      DropPosition(&wheels_end.priors[k]);
+    }
+    for (const CoarseProblem& problem : {all_end, wheels_end}) {
+      const CoarsePoses result =
+          EstimateCoarsePoses(CoarsePoseOptions(), problem.graph,
+                              problem.correspondences, problem.priors);
+      EXPECT_EQ(CountKeptPairs(problem, result.graph).num_aliases, 0)
+          << "seed " << seed;
+      num_split += result.components.size() > 1;
+      for (const CoarseComponent& component : result.components) {
+        EXPECT_TRUE(component.positions_converged) << "seed " << seed;
+        EXPECT_TRUE(component.unverified_joins.empty());
+        // At most 240 m of road before any bundle adjustment: 0.5 %.
+        EXPECT_LT(ComputeAlignedErrors(component.cams_from_world, problem.truth,
+                                       AlignmentOptions())
+                      .rmse_m,
+                  1.2)
+            << "seed " << seed;
+      }
+    }
+  }
+  EXPECT_GT(num_split, 0);
+}
+
 TEST(EstimateCoarsePoses, SensorsJoinWhatVisionSplits) {
   SyntheticWorldOptions options;
   options.num_images = 70;
