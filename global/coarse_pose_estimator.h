@@ -33,7 +33,9 @@ class CoarsePoseEstimator {
   std::vector<std::optional<RotationPrediction>> PredictRotations() const;
   void FilterLoops();
   VisualSteps CompleteSteps() const;
-  void SplitJoins(const std::vector<std::optional<EdgeLength>>& lengths);
+  bool IsSequence(const OdometryChain& chain) const;
+  void SplitJoins(const OdometryChain& chain,
+                  const std::vector<std::optional<EdgeLength>>& lengths);
   int AddSensors();
   void EstimateRotations();
   void FilterByRotation();

@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <set>
 
 #include "core/so3.h"
 #include "global/coarse_pose_estimator.h"
@@ -125,7 +126,8 @@ void CoarsePoseEstimator::FilterLoops() {
   options.min_position_error_m *= steps.unit_m;
   const LoopFilterReport report = FilterLoopsByOdometry(
       options, chain, steps.priors.empty() ? lengths_ : steps.lengths, &graph_);
-  SplitJoins(steps.priors.empty() ? lengths_.lengths : steps.lengths.lengths);
+  SplitJoins(chain,
+             steps.priors.empty() ? lengths_.lengths : steps.lengths.lengths);
   std::string summary =
       std::to_string(report.num_tested) + " pairs tested, " +
       std::to_string(report.num_contradicting) + " contradict the odometry, " +
@@ -146,9 +148,28 @@ void CoarsePoseEstimator::FilterLoops() {
   EndStep("loop gating", summary);
 }
 
+// Whether the chain holds nearly all of the images that share a pair.
+bool CoarsePoseEstimator::IsSequence(const OdometryChain& chain) const {
+  std::set<image_t> images;
+  for (const ViewGraphEdge& edge : graph_.edges) {
+    if (!edge.IsKept()) continue;
+    images.insert(edge.image_id1);
+    images.insert(edge.image_id2);
+  }
+  const auto num_in_chain = std::count_if(
+      images.begin(), images.end(),
+      [&chain](image_t image_id) { return chain.Index(image_id) >= 0; });
+  return num_in_chain >= options_.min_sequence_ratio * images.size();
+}
+
+// Without priors only in a drive: photos in any order have no parts.
 void CoarsePoseEstimator::SplitJoins(
+    const OdometryChain& chain,
     const std::vector<std::optional<EdgeLength>>& lengths) {
-  if (!options_.join_filter.enabled || priors_.empty()) return;
+  if (!options_.join_filter.enabled ||
+      (priors_.empty() && !IsSequence(chain))) {
+    return;
+  }
   result_.join_filter =
       FilterUnverifiedJoins(options_.join_filter, priors_, lengths, &graph_);
   // What came through removed pairs is forgotten.

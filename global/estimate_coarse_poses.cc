@@ -55,6 +55,11 @@ bool CoarsePoseOptions::IsValid(std::string* error) const {
              " must be >= 0";
     return false;
   }
+  if (!(min_sequence_ratio >= 0.0 && min_sequence_ratio <= 1.0)) {
+    *error = "min_sequence_ratio = " + std::to_string(min_sequence_ratio) +
+             " must be in [0, 1]";
+    return false;
+  }
   if (!(min_known_length_m >= 0.0)) {
     *error = "min_known_length_m = " + std::to_string(min_known_length_m) +
              " must be >= 0";

@@ -37,6 +37,9 @@ struct CoarsePoseOptions {
   LoopFilterOptions loops;
   // Its max_sequence_gap is that of joins.
   JoinFilterOptions join_filter;
+  // Without priors it takes part only where the visual chain holds this share
+  // of the images that share a pair.
+  double min_sequence_ratio = 0.8;
   RotationAveragingOptions rotations;
   // eps_R.
   double max_rotation_discrepancy_deg = 5.0;

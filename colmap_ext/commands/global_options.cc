@@ -175,7 +175,8 @@ void GlobalOptionAdder::AddAblations() {
   Add("use_loop_gating", &stage_->poses.loops.enabled,
       "remove loops that the odometry excludes");
   Add("split_unverified_joins", &stage_->poses.join_filter.enabled,
-      "with sensor priors: parts of a drive that only pairs at one place join "
+      "parts of a drive (with sensor priors, or images in order) that only "
+      "pairs at one place join "
       "become models of their own");
   Add("use_visual_steps", &stage_->poses.visual_steps.enabled,
       "vision completes the odometry that gates loops, where sensors have no "

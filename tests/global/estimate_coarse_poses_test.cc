@@ -297,6 +297,30 @@ TEST(EstimateCoarsePoses, LookAlikesDoNotFoldSequencesWithoutSensors) {
   }
 }
 
+// Look-alike places do not join what a blackout separates: each part is a
+// model.
+TEST(EstimateCoarsePoses, BlackoutsSplitSequencesWithoutSensors) {
+  for (uint64_t seed = 1; seed <= 3; ++seed) {
+    const CoarseProblem problem = Shuffle(BuildProblem(AliasedWorld(seed)), 1);
+    const CoarsePoses result = EstimateCoarsePoses(
+        CoarsePoseOptions(), problem.graph, problem.correspondences, {});
+    size_t num_images = 0;
+    for (const CoarseComponent& component : result.components) {
+      num_images += component.cams_from_world.size();
+      EXPECT_TRUE(component.positions_converged) << "seed " << seed;
+      // 240 m of road before any bundle adjustment: 1.5 %.
+      EXPECT_LT(ComputeAlignedErrors(component.cams_from_world, problem.truth,
+                                     AlignmentOptions())
+                    .rmse_m,
+                3.6)
+          << "seed " << seed;
+    }
+    // The blackout of 12 images has no pairs.
+    EXPECT_GE(num_images, problem.graph.images.size() - 12);
+    EXPECT_EQ(CountKeptPairs(problem, result.graph).num_aliases, 0);
+  }
+}
+
 // Photos in any order lose nothing by it.
 TEST(EstimateCoarsePoses, UnorderedImagesAreNoSequence) {
   for (uint64_t seed = 1; seed <= 3; ++seed) {
