@@ -90,6 +90,9 @@ WORLDS = {
     'wheels end half-way, no blackout': world(
         {'num_blackouts': 0},
         spoil=lambda w: cut_logs(w, ('wheel.csv',), 0.5, 2)),
+    'all logs end half-way': world(spoil=lambda w: cut_logs(w, BOTH, 0.5, 2)),
+    'all logs begin half-way': world(
+        spoil=lambda w: cut_logs(w, BOTH, -1, 0.5)),
     'all logs end half-way, no blackout': world(
         {'num_blackouts': 0}, spoil=lambda w: cut_logs(w, BOTH, 0.5, 2)),
     'logs with a hole of 3 s': world(
@@ -134,7 +137,9 @@ def run_commands(row, folder, args, record):
        '--output_path', coarse] + row.get('global', []), log_path)
   record['warnings'] = read_warnings(log_path)
   with open(os.path.join(coarse, 'summary.json')) as file:
-    model = json.load(file)['models'][0]
+    summary = json.load(file)
+  model = summary['models'][0]
+  record['joins_not_made'] = len(summary['joins']['not_made'])
   record['converged'] = model['positions_converged']
   record['unverified_joins'] = len(model['unverified_joins'])
   record['coarse'] = measure(os.path.join(coarse, '0'), folder, args, log_path)
@@ -178,6 +183,8 @@ def describe(record):
     said.append('not converged')
   if record.get('unverified_joins'):
     said.append('unverified joins')
+  if record.get('joins_not_made'):
+    said.append('joins not made')
   for key, word in (('contradict each other', 'sensors against vision'),
                     ('agree with a focal', 'focal length'),
                     ('mount is', 'camera mount'),
