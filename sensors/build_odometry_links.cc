@@ -173,6 +173,12 @@ WheelNoise ComputeWheelNoise(const SensorCalibration& calibration,
   noise.yaw_rate = has_two_wheels
                        ? std::sqrt(2.0) * speed / calibration.track_width_m
                        : calibration.wheel_yaw_rate_noise * root_period;
+  if (calibration.wheel_type == WheelType::kTicks) {
+    // Each count is off by up to a tick, evenly: q^2 / 12 at both ends.
+    const double wheel = calibration.metres_per_tick / std::sqrt(6.0);
+    noise.distance_rounding = wheel / std::sqrt(2.0);
+    noise.yaw_rounding = std::sqrt(2.0) * wheel / calibration.track_width_m;
+  }
   noise.lateral = options.lateral_speed_noise;
   noise.vertical = options.vertical_speed_noise;
   return noise;

@@ -173,6 +173,12 @@ WheelMotion PreintegrateWheel(const std::vector<WheelSpeed>& speeds,
     rotation = next_rotation;
     last = next;
   }
+  const Eigen::Vector3d rounding =
+      noise.distance_rounding *
+      (rotation.slerp(0.5, Eigen::Quaterniond::Identity()) * imu_from_wheel *
+       Eigen::Vector3d::UnitX());
+  motion.covariance += rounding * rounding.transpose();
+  motion.yaw_variance += noise.yaw_rounding * noise.yaw_rounding;
   motion.profile_rotation = rotation;
   return motion;
 }

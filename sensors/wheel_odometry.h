@@ -24,6 +24,10 @@ struct WheelNoise {
   double lateral = 0.02;
   double vertical = 0.02;
   double yaw_rate = 0.01;
+  // 1 sigma of the distance (m) and the turn (rad) over any interval, however
+  // short: counters round at both ends.
+  double distance_rounding = 0.0;
+  double yaw_rounding = 0.0;
 };
 
 // Speeds from samples of any type but kOdometry. Ticks become speeds between

@@ -140,5 +140,50 @@ TEST(ComputeWheelSpeeds, TicksAreSpeedsBetweenCounts) {
   EXPECT_NEAR(speeds[0].yaw_rate, 0.2, 1e-9);
 }
 
+// Counters round at both ends of an interval, whatever lies in between: coarse
+// ticks are no noise of the speed. The errors of single intervals, between
+// counts too, stay within what the motion claims.
+TEST(PreintegrateWheel, CountersRoundOnceAtEachEnd) {
+  SensorCalibration calibration;
+  calibration.wheel_type = WheelType::kTicks;
+  calibration.track_width_m = 1.0;
+  calibration.metres_per_tick = 0.05;
+  WheelNoise noise;
+  noise.forward = noise.lateral = noise.vertical = noise.yaw_rate = 0.0;
+  noise.distance_rounding = calibration.metres_per_tick / std::sqrt(12.0);
+  noise.yaw_rounding = calibration.metres_per_tick / std::sqrt(3.0);
+  constexpr int kNumRuns = 1000;
+  for (const double seconds : {0.2, 1.5}) {
+    Random random(7);
+    double distance = 0.0, yaw = 0.0;
+    WheelMotion motion;
+    for (int run = 0; run < kNumRuns; ++run) {
+      const double speed = random.Uniform(1.0, 8.0);
+      const double phases[] = {random.Uniform(0.0, 1.0),
+                               random.Uniform(0.0, 1.0)};
+      std::vector<WheelSample> samples;
+      for (int k = 0; k <= 100; ++k) {
+        const double ticks = 0.02 * k * speed / calibration.metres_per_tick;
+        samples.push_back({k * timestamp_t(20'000'000),
+                           std::floor(ticks + phases[0]),
+                           std::floor(ticks + phases[1])});
+      }
+      const double begin = random.Uniform(0.1, 0.3);
+      const auto begin_ns = static_cast<timestamp_t>(1e9 * begin);
+      const auto end_ns = static_cast<timestamp_t>(1e9 * (begin + seconds));
+      motion =
+          PreintegrateWheel(ComputeWheelSpeeds(samples, calibration), begin_ns,
+                            end_ns, Eigen::Quaterniond::Identity(), noise, {});
+      distance += std::pow(motion.distance_m - seconds * speed, 2) / kNumRuns;
+      yaw += motion.yaw_rad * motion.yaw_rad / kNumRuns;
+    }
+    // Between counts the speed averages neighbouring ones: somewhat less.
+    EXPECT_LT(distance, 1.2 * motion.covariance(0, 0)) << seconds;
+    EXPECT_GT(distance, 0.2 * motion.covariance(0, 0)) << seconds;
+    EXPECT_LT(yaw, 1.2 * motion.yaw_variance) << seconds;
+    EXPECT_GT(yaw, 0.2 * motion.yaw_variance) << seconds;
+  }
+}
+
 }  // namespace
 }  // namespace adasfm
