@@ -62,6 +62,17 @@ double TestPosition(const LoopFilterOptions& options, const ChainMotion& motion,
   return std::sqrt(error.dot(covariance.ldlt().solve(error)));
 }
 
+// A pair of unknown length: the length that fits the chain best is taken. It
+// can refute the pair, which may lead elsewhere, but not confirm it.
+double TestDirection(const LoopFilterOptions& options,
+                     const ChainMotion& motion, const ViewGraphEdge& edge) {
+  constexpr double kUnknownLogSigma = 10.0;
+  const double length =
+      std::max(0.0, motion.cam2_from_cam1.translation.dot(
+                        edge.cam2_from_cam1.translation.normalized()));
+  return TestPosition(options, motion, {length, kUnknownLogSigma}, edge);
+}
+
 OdometryVerdict Judge(const LoopFilterOptions& options,
                       const OdometryTest& test) {
   const double sigmas = std::max(test.rotation_sigmas, test.position_sigmas);
@@ -94,6 +105,9 @@ OdometryTest TestByOdometry(const LoopFilterOptions& options,
   } else if (motion.has_position && edge.has_translation &&
              length.has_value()) {
     test.position_sigmas = TestPosition(options, motion, *length, edge);
+  } else if (motion.has_position && edge.has_translation) {
+    const double sigmas = TestDirection(options, motion, edge);
+    if (sigmas > options.max_num_sigmas) test.position_sigmas = sigmas;
   }
   test.verdict = Judge(options, test);
   return test;

@@ -154,6 +154,26 @@ TEST(FilterLoopsByOdometry, ALonePairIsNoEvidence) {
   EXPECT_TRUE(problem.graph.edges[lone].IsKept());
 }
 
+// Nothing is known of a pair's length, but it leads the wrong way: most of its
+// points are on a car ahead, or it looks alike.
+TEST(FilterLoopsByOdometry, PairsOfUnknownLengthMustLeadTheRightWay) {
+  for (uint64_t seed = 1; seed <= 3; ++seed) {
+    LoopProblem problem = BuildProblem(seed, 1.0);
+    for (int k = 200; k < 260; k += 5) {
+      const bool is_reversed = k % 2 == 0;
+      Rigid3d seen = ComputeCam2FromCam1(TruePose(k), TruePose(k + 6));
+      if (is_reversed) seen.translation = -seen.translation;
+      AddEdge(k, k + 6, seen, is_reversed, false, &problem);
+    }
+    FilterLoopsByOdometry(LoopFilterOptions(), problem.chain, problem.lengths,
+                          &problem.graph);
+    for (size_t e = 0; e < problem.graph.edges.size(); ++e) {
+      EXPECT_EQ(problem.graph.edges[e].IsKept(), !problem.is_alias[e])
+          << "seed " << seed << " edge " << e;
+    }
+  }
+}
+
 // A pair without a baseline says that both images are at one place, which the
 // chain can refute without any length.
 TEST(FilterLoopsByOdometry, PlacesThatCoincideMustBeNear) {
