@@ -99,8 +99,12 @@ WORLDS = {
         spoil=lambda w: cut_logs(w, BOTH, 0.5, 0.575)),
     'wheels with a hole of 5 s': world(
         spoil=lambda w: cut_logs(w, ('wheel.csv',), 0.4, 0.525)),
-    'images 0.5 s apart': world({'spacing': 3.7, 'num_neighbors': 6}),
-    'images 1 s apart': world({'spacing': 7, 'num_neighbors': 4}, images=150),
+    'images 3.7 m apart': world({'spacing': 3.7, 'num_neighbors': 6}),
+    'images 7 m apart': world({'spacing': 7, 'num_neighbors': 4}, images=150),
+    'images 0.5 m and 0.8 s apart': world(
+        {'spacing': 0.5, 'image_interval': 0.8}),
+    'images 3 m and 1 s apart': world(
+        {'spacing': 3, 'image_interval': 1, 'num_neighbors': 6}),
 }
 PLAIN = {'alias_ratio': 0.05, 'num_blackouts': 2, 'wheel_slips': 2}
 # A model that errs by more must come with a warning.

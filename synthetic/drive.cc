@@ -119,8 +119,10 @@ Drive::Drive(const SyntheticWorldOptions& options, const Route& route,
              const Rigid3d& imu_from_wheel)
     : imu_from_wheel_(imu_from_wheel),
       // 8 m/s, but between 2.5 and 20 images a second.
-      cruise_speed_(
-          std::clamp(8.0, options.spacing_m / 0.4, options.spacing_m / 0.05)),
+      cruise_speed_(options.image_interval_s > 0.0
+                        ? options.spacing_m / options.image_interval_s
+                        : std::clamp(8.0, options.spacing_m / 0.4,
+                                     options.spacing_m / 0.05)),
       standstill_s_(options.standstill_s) {
   BuildSegments(route);
   DrawWaves(options);

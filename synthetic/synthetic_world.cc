@@ -126,6 +126,7 @@ bool SyntheticWorldOptions::IsValid(std::string* error) const {
                  std::min(image_width, image_height), "at least 64 px",
                  error) &&
          positive(spacing_m, "spacing_m") &&
+         not_negative(image_interval_s, "image_interval_s") &&
          positive(num_keypoints_per_image, "num_keypoints_per_image") &&
          not_negative(pixel_noise_px, "pixel_noise_px") &&
          share(outlier_match_ratio, "outlier_match_ratio") &&

@@ -24,6 +24,8 @@ struct SyntheticWorldOptions {
   uint64_t seed = 1;
   // Mean distance between images along the path.
   double spacing_m = 1.5;
+  // Mean time between images under way; 0: that of 8 m/s, within 0.05 to 0.4 s.
+  double image_interval_s = 0.0;
   // kTown drives blocks with right-angle bends and returns to places seen
   // before; kStraight is one street.
   SyntheticTrajectory trajectory = SyntheticTrajectory::kTown;

@@ -35,6 +35,9 @@ void AddOptions(SynthesizerOptions* options, CommandOptions* command) {
   command->AddDefault("seed", &world->seed, "equal seeds give equal worlds");
   command->AddDefault("spacing", &world->spacing_m,
                       "mean distance between images [m]");
+  command->AddDefault("image_interval", &world->image_interval_s,
+                      "mean time between images under way; 0: that of 8 m/s, "
+                      "within 0.05 to 0.4 s [s]");
   command->AddDefault("trajectory", &options->trajectory,
                       "town (bends and revisits) or straight");
   command->AddDefault("camera_model", &options->camera_model,

@@ -303,6 +303,22 @@ TEST(BuildSyntheticWorld, EqualOptionsGiveEqualWorlds) {
   EXPECT_NE(a.images[0].keypoints, c.images[0].keypoints);
 }
 
+TEST(BuildSyntheticWorld, ImageIntervalSetsTheSpeed) {
+  for (const double interval_s : {0.1, 1.0}) {
+    SyntheticWorldOptions options;
+    options.num_images = 60;
+    options.spacing_m = 0.6;
+    options.trajectory = SyntheticTrajectory::kStraight;
+    options.image_interval_s = interval_s;
+    const SyntheticWorld world = BuildSyntheticWorld(options);
+    const size_t middle = world.images.size() / 2;
+    EXPECT_NEAR(SecondsFromNs(world.images.back().timestamp_ns -
+                              world.images[middle].timestamp_ns) /
+                    (world.images.size() - 1 - middle),
+                interval_s, 0.1 * interval_s);
+  }
+}
+
 TEST(BuildSyntheticWorld, RejectsImpossibleOptions) {
   SyntheticWorldOptions options;
   std::string error;
