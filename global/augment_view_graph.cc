@@ -5,6 +5,8 @@
 #include <cmath>
 #include <limits>
 
+#include "core/so3.h"
+
 namespace adasfm {
 namespace {
 
@@ -15,8 +17,7 @@ bool EdgeFromPrior(const AugmentationOptions& options,
                    ViewGraphEdge* edge) {
   if (prior.image_id1 == prior.image_id2 ||
       graph.IndexOf(prior.image_id1) < 0 ||
-      graph.IndexOf(prior.image_id2) < 0 ||
-      std::abs(SecondsFromNs(prior.dt_ns)) > options.max_prior_time_gap_s) {
+      graph.IndexOf(prior.image_id2) < 0 || !IsKnownMotion(options, prior)) {
     return false;
   }
   const Eigen::Matrix3d rotation_covariance =
@@ -65,6 +66,25 @@ bool AugmentationOptions::IsValid(std::string* error) const {
     return false;
   }
   return true;
+}
+
+bool IsKnownMotion(const AugmentationOptions& options,
+                   const RelativePosePrior& prior) {
+  constexpr double kMaxRotationSigmaDeg = 1.0;
+  constexpr double kMaxSigmaM = 0.05;
+  constexpr double kMaxSigmaRatio = 0.05;
+  if (std::abs(SecondsFromNs(prior.dt_ns)) <= options.max_prior_time_gap_s) {
+    return true;
+  }
+  const Eigen::Matrix<double, 6, 1> variances = prior.covariance.diagonal();
+  if (prior.HasRotation() && !(std::sqrt(variances.head<3>().maxCoeff()) <=
+                               DegToRad(kMaxRotationSigmaDeg))) {
+    return false;
+  }
+  const double max_sigma_m = std::max(
+      kMaxSigmaM, kMaxSigmaRatio * prior.cam2_from_cam1.translation.norm());
+  return !(prior.HasDirection() && prior.HasLength()) ||
+         std::sqrt(variances.tail<3>().maxCoeff()) <= max_sigma_m;
 }
 
 int AddSensorEdges(const AugmentationOptions& options,

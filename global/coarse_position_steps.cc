@@ -177,8 +177,7 @@ std::map<ImagePair, double> CoarsePoseEstimator::KnownLengths() const {
   for (const RelativePosePrior& prior : priors_) {
     const double length = prior.cam2_from_cam1.translation.norm();
     if (prior.HasLength() && length >= options_.min_known_length_m &&
-        std::abs(SecondsFromNs(prior.dt_ns)) <=
-            options_.augmentation.max_prior_time_gap_s) {
+        IsKnownMotion(options_.augmentation, prior)) {
       known_lengths_m[ImagePair(prior.image_id1, prior.image_id2)] = length;
     }
   }

@@ -32,7 +32,8 @@ class GlobalOptionAdder {
 // Those that the paper names.
 void GlobalOptionAdder::AddPaper() {
   Add("max_prior_time_gap_s", &stage_->poses.augmentation.max_prior_time_gap_s,
-      "sensor priors over longer times are no edges [s]");
+      "sensor priors over longer times are edges only if their covariance is "
+      "small [s]");
   Add("max_rotation_discrepancy_deg",
       &stage_->poses.max_rotation_discrepancy_deg,
       "pairs farther from the global rotations are removed [deg]");
