@@ -171,7 +171,7 @@ std::string FormatGlobalReportJson(const SceneData& scene,
   report["images"] = scene.images.size();
   report["pairs"] = scene.pairs.size();
   report["priors"] = scene.priors.size();
-  Json removals;
+  Json removals = Json::object();
   for (const auto& [removal, count] : CountRemovals(result.poses.graph)) {
     removals[EdgeRemovalName(removal)] = count;
   }
