@@ -92,6 +92,93 @@ TEST(EstimateCoarsePoses, AliasedWorldsWithBlackoutsAreSolvedInMetres) {
   }
 }
 
+// The car stops after an image: copies of it with other noise, a part of which
+// is gross, on the keypoints. They share what the image shares.
+void AddStop(image_t image_id, int num_copies, Random* random,
+             CoarseProblem* problem) {
+  auto& bearings = problem->correspondences.bearings;
+  const std::vector<ViewGraphEdge> edges = problem->graph.edges;
+  const auto onward =
+      std::find_if(problem->priors.begin(), problem->priors.end(),
+                   [&](const auto& p) { return p.image_id1 == image_id; });
+  std::vector<FeatureMatch> all;
+  for (size_t k = 0; k < bearings.at(image_id).size(); ++k) {
+    all.push_back({point2D_t(k), point2D_t(k)});
+  }
+  std::vector<image_t> standing = {image_id};
+  std::vector<RelativePosePrior> priors;
+  for (int i = 0; i < num_copies; ++i) {
+    const image_t copy = problem->graph.images.back() + 1;
+    problem->graph.images.push_back(copy);
+    problem->truth[copy] = problem->truth.at(image_id);
+    bearings[copy] = bearings.at(image_id);
+    for (Bearing& bearing : bearings[copy]) {
+      const double sigma_px = random->Uniform(0.0, 1.0) < 0.15 ? 5.0 : 0.5;
+      bearing.direction =
+          (bearing.direction +
+           bearing.jacobian * random->GaussianVector(sigma_px).head<2>())
+              .normalized();
+    }
+    for (const image_t other : standing) {
+      ViewGraphEdge edge = BuildEdge(
+          ImagePair(other, copy),
+          Rigid3d(Eigen::Quaterniond::Identity(), random->UnitVector()));
+      edge.num_inliers = all.size();
+      problem->graph.edges.push_back(edge);
+      problem->correspondences.matches[edge.Pair()] = all;
+    }
+    for (const ViewGraphEdge& edge : edges) {
+      if (edge.image_id1 != image_id && edge.image_id2 != image_id) continue;
+      ViewGraphEdge copied = edge;
+      std::vector<FeatureMatch> matches =
+          problem->correspondences.matches.at(edge.Pair());
+      (edge.image_id1 == image_id ? copied.image_id1 : copied.image_id2) = copy;
+      if (copied.image_id1 > copied.image_id2) {
+        std::swap(copied.image_id1, copied.image_id2);
+        copied.cam2_from_cam1 = copied.cam2_from_cam1.Inverse();
+        copied.cam2_from_cam1.translation.normalize();
+        for (FeatureMatch& match : matches) {
+          std::swap(match.point2D_idx1, match.point2D_idx2);
+        }
+      }
+      problem->graph.edges.push_back(copied);
+      problem->correspondences.matches[copied.Pair()] = matches;
+    }
+    priors.push_back(BuildPrior(standing.back(), copy, Rigid3d(),
+                                DegToRad(0.02), 1e-3, random));
+    standing.push_back(copy);
+  }
+  onward->image_id1 = standing.back();
+  problem->priors.insert(onward, priors.begin(), priors.end());
+  std::sort(problem->graph.edges.begin(), problem->graph.edges.end(),
+            [](const auto& a, const auto& b) { return a.Pair() < b.Pair(); });
+}
+
+TEST(EstimateCoarsePoses, AStopIsNoContradiction) {
+  for (uint64_t seed = 1; seed <= 3; ++seed) {
+    SyntheticWorldOptions options;
+    options.num_images = 60;
+    options.seed = seed;
+    CoarseProblem problem = BuildProblem(options);
+    Random random(seed);
+    AddStop(20, 8, &random, &problem);
+    AddStop(40, 8, &random, &problem);
+    const CoarsePoses result =
+        EstimateCoarsePoses(CoarsePoseOptions(), problem.graph,
+                            problem.correspondences, problem.priors);
+    ASSERT_EQ(result.components.size(), 1u);
+    EXPECT_EQ(result.components[0].cams_from_world.size(), 76u);
+    EXPECT_TRUE(result.components[0].positions_converged)
+        << "seed " << seed << ", least agreement "
+        << result.components[0].least_direction_agreement;
+    for (const ViewGraphEdge& edge : result.graph.edges) {
+      EXPECT_NE(edge.removal, EdgeRemoval::kOdometryPosition)
+          << "seed " << seed << ": " << edge.image_id1 << ", "
+          << edge.image_id2;
+    }
+  }
+}
+
 TEST(EstimateCoarsePoses, WorksWithoutSensorsOnCleanAndFisheyeWorlds) {
   for (const auto model :
        {SyntheticCameraModel::kPinhole, SyntheticCameraModel::kFisheye}) {
