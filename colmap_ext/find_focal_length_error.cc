@@ -12,9 +12,12 @@ namespace {
 
 // Calibrations of one camera differ by some tenths of a per cent.
 constexpr double kMinRatio = 0.003;
-constexpr double kMinNumSigmas = 5.0;
-// What the cost's change does not show: poses and priors share errors.
+// Priors share errors from step to step, which the cost's change does not
+// show: many sigmas, and never less than this.
+constexpr double kMinNumSigmas = 10.0;
 constexpr double kMinSigma = 0.001;
+// Straight on such errors pass for 8 % of focal length; turns tell.
+constexpr double kMinTurnDeg = 20.0;
 // One focal length needs no more, and the time stays bounded.
 constexpr size_t kMaxNumImages = 300;
 
@@ -46,6 +49,18 @@ PriorBundleAdjustmentProblem SelectImages(
   return selected;
 }
 
+// The farthest that the drive turns from its first direction.
+double LargestTurnRad(const std::vector<PosePriorEdge>& priors) {
+  Eigen::Quaterniond turned = Eigen::Quaterniond::Identity();
+  double largest = 0.0;
+  for (const PosePriorEdge& prior : priors) {
+    if (!std::isfinite(prior.rotation_sigma_rad)) continue;
+    turned = prior.cam2_from_cam1.rotation * turned;
+    largest = std::max(largest, LogSo3(turned).norm());
+  }
+  return largest;
+}
+
 // Of the camera that is farthest from 1.
 double FarthestRatio(const colmap::Reconstruction& before,
                      const colmap::Reconstruction& after) {
@@ -65,8 +80,10 @@ std::optional<FocalLengthError> FindFocalLengthError(
     const PriorBundleAdjustmentOptions& options,
     const PriorBundleAdjustmentProblem& whole_problem,
     const colmap::Reconstruction& reconstruction) {
-  if (whole_problem.priors.empty()) return std::nullopt;
   const PriorBundleAdjustmentProblem problem = SelectImages(whole_problem);
+  if (LargestTurnRad(problem.priors) < DegToRad(kMinTurnDeg)) {
+    return std::nullopt;
+  }
   colmap::Reconstruction given = reconstruction;
   const PriorBundleAdjustmentSummary with_given =
       AdjustBundle(options, problem, &given);

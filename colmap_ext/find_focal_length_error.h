@@ -20,11 +20,12 @@ struct FocalLengthError {
 // Whether the focal lengths of an adjusted model are wrong, as vision and the
 // priors together see it: at most 300 consecutive images, those that turn most,
 // are adjusted with given and with free focal lengths, keypoints at their plain
-// sigma. An error counts when it lowers the cost by 5 sigmas of the residuals
+// sigma. An error counts when it lowers the cost by 10 sigmas of the residuals
 // as they are, is beyond what calibrations repeat to, and leaves priors that
 // err no more than the balance allows: where they still do, keypoints share
 // errors of other kinds, and free focal lengths would take those up. None
-// without priors. The model is left as it is.
+// without priors, or where these turn by less than 20 deg in all. The model is
+// left as it is.
 std::optional<FocalLengthError> FindFocalLengthError(
     const PriorBalanceOptions& balance,
     const PriorBundleAdjustmentOptions& options,

@@ -108,6 +108,7 @@ Json MountJson(const CameraMountReport& mount) {
           {"angle_deg", RadToDeg(mount.turn_rad.norm())},
           {"sigma_deg", RadToDeg(mount.sigma_rad)},
           {"chi2", mount.chi2},
+          {"residual_variance", mount.residual_variance},
           {"turn_deg",
            {RadToDeg(mount.turn_rad.x()), RadToDeg(mount.turn_rad.y()),
             RadToDeg(mount.turn_rad.z())}},

@@ -18,90 +18,12 @@ namespace {
 using Unknowns = Eigen::Matrix<double, kNumMountUnknowns, 1>;
 using Information = Eigen::Matrix<double, kNumMountUnknowns, kNumMountUnknowns>;
 
-// Matches beyond these add little.
-constexpr size_t kMaxNumPairs = 2000;
-constexpr int kMaxNumMatches = 150;
-// Steps of the chain whose pairs share their errors.
-constexpr int kSpanSteps = 10;
+// Fewer spans of the drive do not tell how they vary.
 constexpr int kMinNumSpans = 5;
 // 1 sigma of the other unknowns: what may be left of a gyroscope's bias, and
 // what two-view geometry is wrong by (RotationRateOptions).
 constexpr double kRateSigmaRadS = 1e-3;
 constexpr double kOffsetSigmaRad = 2e-3;
-
-bool TellsTheMount(const CameraMountOptions& options,
-                   const OdometryChain& chain,
-                   const GlobalCorrespondences& correspondences,
-                   const ViewGraphEdge& edge) {
-  return edge.IsKept() && edge.has_rotation &&
-         edge.source != EdgeSource::kSensor &&
-         chain.IsConnected(edge.image_id1, edge.image_id2) &&
-         std::abs(chain.NumSteps(edge.image_id1, edge.image_id2)) <=
-             options.max_num_steps &&
-         chain.Motion(edge.image_id1, edge.image_id2).has_rotation &&
-         correspondences.matches.count(edge.Pair()) > 0;
-}
-
-// The sum of the steps' durations, by position in the chain; only differences
-// within a piece mean anything.
-std::map<int, double> SumSeconds(const OdometryChain& chain,
-                                 const std::vector<RelativePosePrior>& priors) {
-  std::map<int, double> seconds;
-  for (const RelativePosePrior& prior : priors) {
-    if (!chain.IsConnected(prior.image_id1, prior.image_id2)) continue;
-    if (chain.NumSteps(prior.image_id1, prior.image_id2) != 1) continue;
-    seconds.emplace(chain.Index(prior.image_id1), 0.0);
-    seconds[chain.Index(prior.image_id2)] = SecondsFromNs(prior.dt_ns);
-  }
-  double sum = 0.0;
-  for (auto& [index, value] : seconds) value = sum += value;
-  return seconds;
-}
-
-MountPair CreatePair(const OdometryChain& chain,
-                     const GlobalCorrespondences& correspondences,
-                     const ViewGraphEdge& edge) {
-  MountPair pair;
-  pair.first = edge.image_id1;
-  pair.last = edge.image_id2;
-  pair.last_from_first = edge.cam2_from_cam1.rotation;
-  pair.num_steps = chain.NumSteps(pair.first, pair.last);
-  pair.rotation_sigma_rad = edge.rotation_sigma_rad;
-  pair.bearings = SelectEdgeBearings(
-      correspondences.bearings.at(edge.image_id1),
-      correspondences.bearings.at(edge.image_id2),
-      correspondences.matches.at(edge.Pair()), kMaxNumMatches);
-  if (pair.num_steps < 0) {
-    pair.num_steps = -pair.num_steps;
-    std::swap(pair.first, pair.last);
-    std::swap(pair.bearings.bearings1, pair.bearings.bearings2);
-    pair.last_from_first = pair.last_from_first.conjugate();
-  }
-  pair.span = chain.Index(pair.first) / kSpanSteps;
-  return pair;
-}
-
-std::vector<MountPair> CollectPairs(
-    const CameraMountOptions& options, const OdometryChain& chain,
-    const ViewGraph& graph, const GlobalCorrespondences& correspondences,
-    const std::vector<RelativePosePrior>& priors) {
-  std::vector<const ViewGraphEdge*> edges;
-  for (const ViewGraphEdge& edge : graph.edges) {
-    if (TellsTheMount(options, chain, correspondences, edge)) {
-      edges.push_back(&edge);
-    }
-  }
-  const std::map<int, double> seconds = SumSeconds(chain, priors);
-  std::vector<MountPair> pairs;
-  const size_t count = std::min(kMaxNumPairs, edges.size());
-  for (size_t k = 0; k < count; ++k) {
-    pairs.push_back(
-        CreatePair(chain, correspondences, *edges[k * edges.size() / count]));
-    pairs.back().seconds = seconds.at(chain.Index(pairs.back().last)) -
-                           seconds.at(chain.Index(pairs.back().first));
-  }
-  return pairs;
-}
 
 std::vector<MountObservation> Observe(const CameraMountOptions& options,
                                       const OdometryChain& chain,
@@ -137,6 +59,7 @@ struct MountSolution {
   Unknowns unknowns = Unknowns::Zero();
   // Of the turn.
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
+  double residual_variance = 0.0;
   bool success = false;
 };
 
@@ -168,6 +91,21 @@ Eigen::Matrix3d SpreadOfSpans(const std::vector<MountObservation>& observations,
   return (covariance * spread * covariance).topLeftCorner<3, 3>();
 }
 
+// Squared residuals per degree of freedom, 1 when chain and matches are as
+// noisy as they say; single wrong pairs do not speak for all.
+double ResidualVariance(const std::vector<MountObservation>& observations,
+                        const MountSolution& solution) {
+  constexpr double kMaxTerm = 25.0;
+  double sum = 0.0;
+  for (const MountObservation& observation : observations) {
+    const double squared =
+        (observation.residual - observation.jacobian * solution.unknowns)
+            .squaredNorm();
+    sum += std::min(kMaxTerm, squared / observation.num_dof);
+  }
+  return sum / std::max<size_t>(1, observations.size());
+}
+
 MountSolution Solve(const CameraMountOptions& options,
                     const std::vector<MountObservation>& observations,
                     const Eigen::Vector3d& turn_rad) {
@@ -191,8 +129,10 @@ MountSolution Solve(const CameraMountOptions& options,
     solution.unknowns = information.ldlt().solve(right_side);
   }
   const Information covariance = information.inverse();
-  solution.covariance = covariance.topLeftCorner<3, 3>() +
-                        SpreadOfSpans(observations, solution, covariance);
+  solution.residual_variance = ResidualVariance(observations, solution);
+  solution.covariance = std::max(1.0, solution.residual_variance) *
+                        (covariance.topLeftCorner<3, 3>() +
+                         SpreadOfSpans(observations, solution, covariance));
   solution.success =
       solution.unknowns.allFinite() && solution.covariance.allFinite();
   return solution;
@@ -263,8 +203,8 @@ CameraMountReport CorrectCameraMount(
   constexpr int kNumRounds = 4;
   constexpr double kSmallTurnRad = 1e-4;
   CameraMountReport report;
-  const std::vector<MountPair> pairs =
-      CollectPairs(options, chain, graph, correspondences, *priors);
+  const std::vector<MountPair> pairs = CollectMountPairs(
+      options.max_num_steps, chain, graph, correspondences, *priors);
   report.num_pairs = pairs.size();
   if (!options.enabled || CountSpans(pairs) < kMinNumSpans) return report;
   Eigen::Quaterniond turn = Eigen::Quaterniond::Identity();
@@ -277,6 +217,7 @@ CameraMountReport CorrectCameraMount(
     if (solution.unknowns.head<3>().norm() < kSmallTurnRad) break;
   }
   report.turn_rad = LogSo3(turn);
+  report.residual_variance = solution.residual_variance;
   const double floor_rad = DegToRad(options.min_sigma_deg);
   const Eigen::Matrix3d covariance =
       solution.covariance + floor_rad * floor_rad * Eigen::Matrix3d::Identity();

@@ -40,6 +40,9 @@ struct CameraMountReport {
   double sigma_rad = 0.0;
   // Its squared size in sigmas.
   double chi2 = 0.0;
+  // Squared residuals of the pairs per degree of freedom; sigmas grow with what
+  // is above 1, as noise that the sensors do not declare does not average out.
+  double residual_variance = 0.0;
 };
 
 // Finds by what rotation E of the camera T_cam_imu is wrong, and takes it out

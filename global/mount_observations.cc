@@ -5,6 +5,8 @@
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
+#include <map>
+#include <utility>
 
 #include "core/so3.h"
 #include "global/translation_direction.h"
@@ -15,6 +17,11 @@ namespace {
 using Matrix5d = Eigen::Matrix<double, 5, 5>;
 using Jacobian = Eigen::Matrix<double, 3, kNumMountUnknowns>;
 
+// Matches beyond these add little.
+constexpr size_t kMaxNumPairs = 2000;
+constexpr int kMaxNumMatches = 150;
+// Steps of the chain whose pairs share their errors.
+constexpr int kSpanSteps = 10;
 constexpr double kLossScalePx = 1.5;
 constexpr double kKeypointSigmaPx = 0.5;
 // Least error granted to a rotation, of vision or sensors.
@@ -79,6 +86,7 @@ MountObservation Whiten(
   observation.jacobian.template topRows<kRows>() =
       root.matrixL().solve(jacobian);
   observation.residual.template head<kRows>() = root.matrixL().solve(residual);
+  observation.num_dof = kRows;
   observation.weight = 1.0 / pair.num_steps;
   observation.span = pair.span;
   return observation;
@@ -123,7 +131,80 @@ Matrix5d ComputeInformation(const TranslationProblem& problem,
                   sum_weighted_squares / std::max(1.0, sum_weights - 2.0));
 }
 
+bool TellsTheMount(int max_num_steps, const OdometryChain& chain,
+                   const GlobalCorrespondences& correspondences,
+                   const ViewGraphEdge& edge) {
+  return edge.IsKept() && edge.has_rotation &&
+         edge.source != EdgeSource::kSensor &&
+         chain.IsConnected(edge.image_id1, edge.image_id2) &&
+         std::abs(chain.NumSteps(edge.image_id1, edge.image_id2)) <=
+             max_num_steps &&
+         chain.Motion(edge.image_id1, edge.image_id2).has_rotation &&
+         correspondences.matches.count(edge.Pair()) > 0;
+}
+
+// The sum of the steps' durations, by position in the chain; only differences
+// within a piece mean anything.
+std::map<int, double> SumSeconds(const OdometryChain& chain,
+                                 const std::vector<RelativePosePrior>& priors) {
+  std::map<int, double> seconds;
+  for (const RelativePosePrior& prior : priors) {
+    if (!chain.IsConnected(prior.image_id1, prior.image_id2)) continue;
+    if (chain.NumSteps(prior.image_id1, prior.image_id2) != 1) continue;
+    seconds.emplace(chain.Index(prior.image_id1), 0.0);
+    seconds[chain.Index(prior.image_id2)] = SecondsFromNs(prior.dt_ns);
+  }
+  double sum = 0.0;
+  for (auto& [index, value] : seconds) value = sum += value;
+  return seconds;
+}
+
+MountPair CreatePair(const OdometryChain& chain,
+                     const GlobalCorrespondences& correspondences,
+                     const ViewGraphEdge& edge) {
+  MountPair pair;
+  pair.first = edge.image_id1;
+  pair.last = edge.image_id2;
+  pair.last_from_first = edge.cam2_from_cam1.rotation;
+  pair.num_steps = chain.NumSteps(pair.first, pair.last);
+  pair.rotation_sigma_rad = edge.rotation_sigma_rad;
+  pair.bearings = SelectEdgeBearings(
+      correspondences.bearings.at(edge.image_id1),
+      correspondences.bearings.at(edge.image_id2),
+      correspondences.matches.at(edge.Pair()), kMaxNumMatches);
+  if (pair.num_steps < 0) {
+    pair.num_steps = -pair.num_steps;
+    std::swap(pair.first, pair.last);
+    std::swap(pair.bearings.bearings1, pair.bearings.bearings2);
+    pair.last_from_first = pair.last_from_first.conjugate();
+  }
+  pair.span = chain.Index(pair.first) / kSpanSteps;
+  return pair;
+}
+
 }  // namespace
+
+std::vector<MountPair> CollectMountPairs(
+    int max_num_steps, const OdometryChain& chain, const ViewGraph& graph,
+    const GlobalCorrespondences& correspondences,
+    const std::vector<RelativePosePrior>& priors) {
+  std::vector<const ViewGraphEdge*> edges;
+  for (const ViewGraphEdge& edge : graph.edges) {
+    if (TellsTheMount(max_num_steps, chain, correspondences, edge)) {
+      edges.push_back(&edge);
+    }
+  }
+  const std::map<int, double> seconds = SumSeconds(chain, priors);
+  std::vector<MountPair> pairs;
+  const size_t count = std::min(kMaxNumPairs, edges.size());
+  for (size_t k = 0; k < count; ++k) {
+    pairs.push_back(
+        CreatePair(chain, correspondences, *edges[k * edges.size() / count]));
+    pairs.back().seconds = seconds.at(chain.Index(pairs.back().last)) -
+                           seconds.at(chain.Index(pairs.back().first));
+  }
+  return pairs;
+}
 
 std::vector<MountObservation> ObserveMount(const OdometryChain& chain,
                                            const Eigen::Quaterniond& turn,

@@ -4,6 +4,8 @@
 #include <Eigen/Geometry>
 #include <vector>
 
+#include "core/relative_pose_prior.h"
+#include "global/correspondences.h"
 #include "global/epipolar.h"
 #include "global/odometry_chain.h"
 #include "global/view_graph.h"
@@ -20,6 +22,7 @@ constexpr int kNumMountUnknowns = 9;
 struct MountObservation {
   Eigen::Matrix<double, 3, kNumMountUnknowns> jacobian;
   Eigen::Vector3d residual;
+  int num_dof = 3;
   // Pairs of many steps overlap with as many others.
   double weight = 1.0;
   // Those of one span of the drive share their errors.
@@ -37,6 +40,13 @@ struct MountPair {
   int span = 0;
   EdgeBearings bearings;
 };
+
+// The pairs that tell the mount: with matches, and at most so many steps of the
+// chain apart. Of very many an even subset.
+std::vector<MountPair> CollectMountPairs(
+    int max_num_steps, const OdometryChain& chain, const ViewGraph& graph,
+    const GlobalCorrespondences& correspondences,
+    const std::vector<RelativePosePrior>& priors);
 
 // What the pair says with its priors turned by `turn`: the rotation, and the
 // direction of motion where sensors have one. Empty where matches and sensors

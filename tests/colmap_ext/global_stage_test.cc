@@ -177,10 +177,16 @@ void ScaleFocalLength(double ratio, SceneData* scene) {
   }
 }
 
-// 90 m of road know the focal length to half a per cent.
+// 90 m of road that turns by 93 deg.
+SyntheticWorldOptions TurningWorld() {
+  SyntheticWorldOptions options = SmallWorld();
+  options.seed = 2;
+  return options;
+}
+
 TEST(RunGlobalStageTest, WarnsOfAWrongFocalLength) {
-  for (const double ratio : {0.9, 0.97, 1.0, 1.05}) {
-    const SyntheticWorld world = BuildSyntheticWorld(SmallWorld());
+  for (const double ratio : {0.9, 0.97, 1.0, 1.03}) {
+    const SyntheticWorld world = BuildSyntheticWorld(TurningWorld());
     SceneData scene = BuildSyntheticScene(world, SyntheticPriorOptions());
     ScaleFocalLength(ratio, &scene);
     scene.cameras.at(1).SetPriorFocalLength(true);
@@ -201,8 +207,18 @@ TEST(RunGlobalStageTest, WarnsOfAWrongFocalLength) {
   }
 }
 
+// Straight on, the errors that priors share pass for a focal length.
+TEST(RunGlobalStageTest, SaysNothingOfFocalLengthsOnStraightRoads) {
+  SyntheticWorldOptions options = SmallWorld();
+  options.trajectory = SyntheticTrajectory::kStraight;
+  const SyntheticWorld world = BuildSyntheticWorld(options);
+  SceneData scene = BuildSyntheticScene(world, SyntheticPriorOptions());
+  ScaleFocalLength(1.1, &scene);
+  EXPECT_FALSE(RunStage(scene).models[0].focal_length_error.has_value());
+}
+
 TEST(RunGlobalStageTest, RefinesAFocalLengthThatNobodyKnows) {
-  const SyntheticWorld world = BuildSyntheticWorld(SmallWorld());
+  const SyntheticWorld world = BuildSyntheticWorld(TurningWorld());
   SceneData scene = BuildSyntheticScene(world, SyntheticPriorOptions());
   const double focal_px = scene.cameras.at(1).MeanFocalLength();
   const GlobalStageResult right = RunStage(scene);
@@ -212,7 +228,7 @@ TEST(RunGlobalStageTest, RefinesAFocalLengthThatNobodyKnows) {
   EXPECT_TRUE(refined.models[0].cameras_refined);
   EXPECT_NEAR(
       refined.models[0].reconstruction.Camera(1).MeanFocalLength() / focal_px,
-      1.0, 0.003);
+      1.0, 0.01);  // 1 sigma is a few tenths of a per cent
   EXPECT_NEAR(refined.refinement.num_kept, right.refinement.num_kept,
               0.005 * right.refinement.num_kept);
   GlobalStageOptions options;
