@@ -119,7 +119,7 @@ class Checker:
         self.host_options = {}
         self.shown = []  # where, and why not run
         self.known = set(OTHER_OPTIONS)
-        for script in sorted((ROOT / 'scripts').glob('*.[ps][yh]')):
+        for script in sorted((ROOT / 'scripts').rglob('*.[ps][yh]')):
             self.known.update(re.findall(r'--([a-z][\w-]+)',
                                          script.read_text()))
         for command in self.commands.values():
