@@ -284,7 +284,8 @@ def report(records, args):
 
 def parse_arguments():
   parser = argparse.ArgumentParser(description=__doc__.split('\n')[0])
-  add_arguments(parser, 'global_results', 'adasfm-global-tables')
+  add_arguments(parser, __file__, 'global_results',
+                'adasfm-global-tables')
   parser.add_argument('--sizes', default='150,300', help='images of a world')
   parser.add_argument('--num_blackouts', type=int, default=1,
                       help='intervals without a keypoint')

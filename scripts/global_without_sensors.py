@@ -161,7 +161,8 @@ def parse_arguments():
   parser.add_argument('worlds', nargs='*', metavar='world',
                       help='any of: %s; all when none is named' %
                       ', '.join(WORLDS))
-  add_arguments(parser, 'global_without_sensors', 'adasfm-without-sensors')
+  add_arguments(parser, __file__, 'global_without_sensors',
+                'adasfm-without-sensors')
   parser.add_argument('--num_images', type=int, default=250)
   parser.add_argument('--seeds', default='1,2,3,4,5,6,7,8')
   parser.add_argument('--host_colmap', default='',

@@ -229,7 +229,8 @@ def parse_arguments():
   parser = argparse.ArgumentParser(description=__doc__.split('\n')[0])
   parser.add_argument('worlds', nargs='*',
                       help='rows of the table; all when none is named')
-  add_arguments(parser, 'global_worlds', 'adasfm-global-worlds')
+  add_arguments(parser, __file__, 'global_worlds',
+                'adasfm-global-worlds')
   parser.add_argument('--seeds', default='1,2')
   parser.add_argument('--run_mapper', type=int, default=1,
                       help='0: coarse models only')

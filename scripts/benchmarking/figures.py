@@ -6,18 +6,16 @@ import os
 
 from benchmarking.methods import evaluate
 
-ROOT = os.path.dirname(os.path.dirname(os.path.dirname(
-    os.path.abspath(__file__))))
 
-
-def add_arguments(parser, name, output_path):
+def add_arguments(parser, script, name, output_path):
+  root = os.path.dirname(os.path.dirname(os.path.abspath(script)))
   parser.add_argument('--output_path', default=output_path,
                       help='folder of worlds and runs')
   parser.add_argument('--keep', type=int, default=0,
                       help="1: keep the runs' models and databases")
-  parser.add_argument('--results_path', default=os.path.join(ROOT, 'docs', name),
+  parser.add_argument('--results_path', default=os.path.join(root, 'docs', name),
                       help='of the .md and .json files')
-  parser.add_argument('--colmap', default=os.path.join(ROOT, 'build', 'bin',
+  parser.add_argument('--colmap', default=os.path.join(root, 'build', 'bin',
                                                        'colmap'),
                       help='our launcher')
 

@@ -226,16 +226,18 @@ TEST(RunGlobalStageTest, RefinesAFocalLengthThatNobodyKnows) {
   scene.cameras.at(1).SetPriorFocalLength(false);
   const GlobalStageResult refined = RunStage(scene);
   EXPECT_TRUE(refined.models[0].cameras_refined);
-  EXPECT_NEAR(
-      refined.models[0].reconstruction.Camera(1).MeanFocalLength() / focal_px,
-      1.0, 0.01);  // 1 sigma is a few tenths of a per cent
   EXPECT_NEAR(refined.refinement.num_kept, right.refinement.num_kept,
               0.005 * right.refinement.num_kept);
   GlobalStageOptions options;
   options.structure.refine_unknown_focal_length = false;
   const GlobalStageResult left = RunStage(scene, options);
   EXPECT_FALSE(left.models[0].cameras_refined);
-  EXPECT_TRUE(left.models[0].focal_length_error.has_value());
+  ASSERT_TRUE(left.models[0].focal_length_error.has_value());
+  const double sigma = left.models[0].focal_length_error->sigma;
+  EXPECT_LT(sigma, 0.003);
+  EXPECT_NEAR(
+      refined.models[0].reconstruction.Camera(1).MeanFocalLength() / focal_px,
+      1.0, 3.0 * sigma);
   EXPECT_LT(ComparePoses(world, refined.models[0].reconstruction).rmse_m,
             ComparePoses(world, left.models[0].reconstruction).rmse_m);
 }
