@@ -109,15 +109,18 @@ void CoarsePoseEstimator::FilterLoops() {
   }
   lengths_ = EstimateLengths();
   VisualSteps steps = CompleteSteps();
+  OdometryChainOptions chain_options = options_.chain;
+  if (priors_.empty()) {
+    chain_options.scale_drift_ratio = options_.visual_steps.scale_drift_ratio;
+  }
   const int num_dropped =
-      steps.priors.empty()
-          ? 0
-          : DropContradictedSteps(options_.visual_steps, options_.loops,
-                                  options_.chain, graph_, priors_.size(),
-                                  &steps);
+      steps.priors.empty() ? 0
+                           : DropContradictedSteps(
+                                 options_.visual_steps, options_.loops,
+                                 chain_options, graph_, priors_.size(), &steps);
   const OdometryChain chain = steps.priors.empty()
                                   ? chain_
-                                  : OdometryChain(steps.priors, options_.chain);
+                                  : OdometryChain(steps.priors, chain_options);
   if (chain.empty()) {
     EndStep("loop gating", "skipped: no odometry, and no sequence of images");
     return;

@@ -87,6 +87,11 @@ bool OdometryChainOptions::IsValid(std::string* error) const {
              std::to_string(persistent_translation_ratio) + " must be >= 0";
     return false;
   }
+  if (!(scale_drift_ratio >= 0.0)) {
+    *error = "scale_drift_ratio = " + std::to_string(scale_drift_ratio) +
+             " must be >= 0";
+    return false;
+  }
   return true;
 }
 
@@ -128,6 +133,10 @@ void OdometryChain::AppendPiece(image_t first,
        it = next.find(node.image_id)) {
     const RelativePosePrior& prior = priors[it->second];
     const Rigid3d motion = ObservedMotion(prior);
+    const Eigen::Vector3d place = node.cam_from_start.TargetOriginInSource();
+    node.num_places += 1.0;
+    node.place_sum += place;
+    node.place_square_sum += place * place.transpose();
     node.image_id = prior.image_id2;
     node.cam_from_start = motion * node.cam_from_start;
     node.num_without_rotation += !prior.HasRotation();
@@ -177,6 +186,18 @@ Rigid3d OdometryChain::CamFromStart(image_t image_id) const {
   return nodes_.at(index_.at(image_id)).cam_from_start;
 }
 
+// A change e of the scale at a place moves the later end by e times the way
+// from that place to it: the sum of the ways' outer products, over the places.
+Eigen::Matrix3d OdometryChain::SumOfScaleChanges(const Node& earlier,
+                                                 const Node& later) {
+  const Eigen::Vector3d end = later.cam_from_start.TargetOriginInSource();
+  const Eigen::Matrix3d mixed =
+      end * (later.place_sum - earlier.place_sum).transpose();
+  return (later.num_places - earlier.num_places) * end * end.transpose() -
+         mixed - mixed.transpose() + later.place_square_sum -
+         earlier.place_square_sum;
+}
+
 ChainMotion OdometryChain::Motion(image_t image_id1, image_t image_id2) const {
   const int num_steps = NumSteps(image_id1, image_id2);
   const Node& node1 = nodes_[Index(image_id1)];
@@ -207,6 +228,11 @@ ChainMotion OdometryChain::Motion(image_t image_id1, image_t image_id2) const {
       Adjoint(node2.cam_from_start);
   motion.covariance =
       error_from_start * covariance_in_start * error_from_start.transpose();
+  const Eigen::Matrix3d rotation =
+      node2.cam_from_start.rotation.toRotationMatrix();
+  motion.covariance.bottomRightCorner<3, 3>() +=
+      std::pow(options_.scale_drift_ratio, 2) * rotation *
+      SumOfScaleChanges(earlier, later) * rotation.transpose();
   return motion;
 }
 

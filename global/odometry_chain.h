@@ -22,6 +22,9 @@ struct OdometryChainOptions {
   // this many sigmas of their translations persist from step to step, besides
   // the part that changes.
   double persistent_translation_ratio = 1.0;
+  // 1 sigma, per step, of the change of scale from there on, as a ratio. Where
+  // vision alone makes the steps, nothing holds their scale.
+  double scale_drift_ratio = 0.0;
 
   bool IsValid(std::string* error) const;
 };
@@ -76,9 +79,16 @@ class OdometryChain {
     // Prefix sums over the piece's steps up to this node.
     Matrix6d covariance = Matrix6d::Zero();
     Systematic systematic = Systematic::Zero();
+    // Of the places where the scale may change: their number, sum and sum of
+    // outer products.
+    double num_places = 0.0;
+    Eigen::Vector3d place_sum = Eigen::Vector3d::Zero();
+    Eigen::Matrix3d place_square_sum = Eigen::Matrix3d::Zero();
     int num_without_rotation = 0;
     int num_without_position = 0;
   };
+  static Eigen::Matrix3d SumOfScaleChanges(const Node& earlier,
+                                           const Node& later);
   void AppendPiece(image_t first, const std::map<image_t, int>& next,
                    const std::vector<RelativePosePrior>& priors);
 

@@ -191,11 +191,13 @@ bool VisualStepOptions::IsValid(std::string* error) const {
   }
   if (!(length_error_ratio > 0.0) || !(direction_error_deg > 0.0) ||
       !(rotation_error_deg > 0.0) || !(coasting_error_ratio > 0.0) ||
-      !(max_coasting_s >= 0.0)) {
+      !(max_coasting_s >= 0.0) || !(scale_drift_ratio >= 0.0)) {
     *error =
         "length_error_ratio, direction_error_deg, rotation_error_deg and "
         "coasting_error_ratio must be > 0, max_coasting_s = " +
-        std::to_string(max_coasting_s) + " >= 0";
+        std::to_string(max_coasting_s) +
+        " and scale_drift_ratio = " + std::to_string(scale_drift_ratio) +
+        " >= 0";
     return false;
   }
   if (!(max_contradicting_ratio >= 0.0 && max_contradicting_ratio <= 1.0)) {

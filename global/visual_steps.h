@@ -24,6 +24,9 @@ struct VisualStepOptions {
   double direction_error_deg = 1.0;
   // 1 sigma, per axis, of the rotation of a visual step.
   double rotation_error_deg = 0.3;
+  // 1 sigma of the change of scale at each step where there are no priors to
+  // hold it (OdometryChainOptions::scale_drift_ratio).
+  double scale_drift_ratio = 0.01;
   // Without vision a drive goes on as before, up to this share of the way, per
   // axis, 1 sigma; and for so long only.
   double coasting_error_ratio = 0.3;
