@@ -104,7 +104,7 @@ def ratio_to_mapper(records):
             if r.get('final') and r.get('mapper')]
   if not ratios:
     return '-'
-  return '%.2f (%.2f to %.2f)' % (statistics.median(ratios), min(ratios),
+  return '%.3f (%.3f to %.3f)' % (statistics.median(ratios), min(ratios),
                                   max(ratios))
 
 

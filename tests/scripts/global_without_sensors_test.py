@@ -36,7 +36,7 @@ class GlobalWithoutSensorsTest(unittest.TestCase):
     self.assertEqual(tables.summarise(records, 'coarse'),
                      ['10/10', '0.200', '0.300'])
     self.assertEqual(tables.summarise(records, 'final')[0], '7/10')
-    self.assertEqual(tables.ratio_to_mapper(records), '1.12 (0.25 to 2.00)')
+    self.assertEqual(tables.ratio_to_mapper(records), '1.125 (0.250 to 2.000)')
     self.assertEqual(tables.summarise([{}], 'mapper'), ['-', '-', '-'])
 
   def test_report_has_equal_columns_in_each_table(self):
