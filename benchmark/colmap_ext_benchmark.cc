@@ -2,8 +2,8 @@
 #include <benchmark/benchmark.h>
 #include <optim/bundle_adjustment.h>
 
-#include "colmap_ext/bundle_adjustment.h"
-#include "tests/colmap_ext/bundle_world.h"
+#include "colmap_ext/bundle_adjustment/bundle_adjustment.h"
+#include "tests/testing/colmap_ext/bundle_world.h"
 
 // Bundle adjustment of a street of state.range(0) images with 300 keypoints
 // each: wall time per solver iteration, ours and COLMAP's (same poses, points

@@ -3,12 +3,12 @@
 
 #include "core/parallel.h"
 #include "global/estimate_coarse_poses.h"
-#include "global/match_refinement.h"
-#include "global/refine_relative_poses.h"
-#include "global/rotation_averaging.h"
-#include "global/tracks.h"
-#include "global/translation_averaging.h"
-#include "global/triangulate_tracks.h"
+#include "global/rotation_averaging/rotation_averaging.h"
+#include "global/structure/match_refinement.h"
+#include "global/structure/tracks.h"
+#include "global/structure/triangulate_tracks.h"
+#include "global/translation_averaging/translation_averaging.h"
+#include "global/two_view/refine_relative_poses.h"
 #include "synthetic/synthetic_world.h"
 
 namespace adasfm {

@@ -8,12 +8,12 @@
 #include <sstream>
 #include <utility>
 
-#include "colmap_ext/global_report.h"
+#include "colmap_ext/coarse/global_report.h"
+#include "colmap_ext/database/two_view_geometry_backup.h"
 #include "colmap_ext/host/model.h"
+#include "colmap_ext/host/model_folder.h"
 #include "colmap_ext/host/pose_conversion.h"
-#include "colmap_ext/model_folder.h"
-#include "colmap_ext/output_files.h"
-#include "colmap_ext/two_view_geometry_backup.h"
+#include "colmap_ext/io/output_files.h"
 #include "core/check_options.h"
 #include "core/so3.h"
 

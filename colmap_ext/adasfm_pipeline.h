@@ -4,9 +4,9 @@
 #include <string>
 #include <vector>
 
-#include "colmap_ext/global_stage.h"
-#include "colmap_ext/mapper_stage.h"
-#include "colmap_ext/prior_importer.h"
+#include "colmap_ext/coarse/global_stage.h"
+#include "colmap_ext/mapper_stage/mapper_stage.h"
+#include "colmap_ext/priors/prior_importer.h"
 #include "core/progress.h"
 #include "core/status.h"
 
@@ -33,10 +33,10 @@ namespace adasfm {
 //        3.1 cut into overlapping parts     3.3 align to the coarse frame
 //        3.2 incremental SfM per part       3.4 merge and refine the whole
 //
-// The equations stand in docs/math.md, the files in docs/formats.md.
-// Around them adasfm_pair_generator chooses the pairs to match, and
-// adasfm_automatic_reconstructor runs everything from a folder of photos
-// (automatic_reconstruction.h).
+// The equations stand in docs/reference/math.md, the files in
+// docs/reference/formats.md. Around them adasfm_pair_generator chooses the
+// pairs to match, and adasfm_automatic_reconstructor runs everything from a
+// folder of photos (automatic_reconstruction.h).
 
 // Stage 1. Writes the summary to summary_path, then the priors to the database
 // at paths.database_path; on error the database is as it was.

@@ -6,9 +6,9 @@
 
 #include "core/so3.h"
 #include "global/coarse_pose_estimator.h"
-#include "global/drop_contradicted_steps.h"
-#include "global/filter_edges_by_rotation.h"
-#include "global/visual_steps.h"
+#include "global/loop_closures/drop_contradicted_steps.h"
+#include "global/odometry/visual_steps.h"
+#include "global/rotation_averaging/filter_edges_by_rotation.h"
 
 namespace adasfm {
 namespace {

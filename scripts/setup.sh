@@ -135,7 +135,7 @@ build_host() {
 }
 
 main() {
-  [ -r /etc/debian_version ] || die 'this script knows Debian 12 only; see docs/install.md for other systems'
+  [ -r /etc/debian_version ] || die 'this script knows Debian 12 only; see docs/guide/install.md for other systems'
   mkdir -p "$cache" && [ -w "$cache" ] ||
     die "cannot write to the cache folder $cache; set ADASFM_CACHE to another one"
   local host_only=0 configure_only=0 argument cmake_arguments=()

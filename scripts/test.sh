@@ -12,8 +12,8 @@ cd "$(dirname "${BASH_SOURCE[0]}")/.."
 jobs=$(nproc)
 scripts/setup.sh --for-tests
 printf '\n== Checking format and layers\n'
-scripts/check_format.sh
-scripts/check_layers.sh
+scripts/checks/check_format.sh
+scripts/checks/check_layers.sh
 
 if [ "${1:-}" != --no-sanitizers ]; then
   printf '\n== Building the pure layers with sanitizers (about 4 minutes the first time)\n'

@@ -6,12 +6,12 @@
 #include <stdexcept>
 
 #include "core/so3.h"
-#include "sensors/build_odometry_links.h"
-#include "sensors/check_against_vision.h"
-#include "sensors/compose_prior.h"
-#include "sensors/format_figures.h"
-#include "sensors/initial_odometry.h"
+#include "sensors/calibration_check/check_against_vision.h"
+#include "sensors/io/format_figures.h"
 #include "sensors/select_images.h"
+#include "sensors/smoother/build_odometry_links.h"
+#include "sensors/smoother/compose_prior.h"
+#include "sensors/smoother/initial_odometry.h"
 #include "sensors/visual_links.h"
 
 namespace adasfm {

@@ -9,9 +9,9 @@
 #include "core/relative_pose_prior.h"
 #include "core/sensor_log.h"
 #include "core/status.h"
-#include "sensors/calibration.h"
-#include "sensors/odometry_fusion.h"
+#include "sensors/io/calibration.h"
 #include "sensors/sensor_summary.h"
+#include "sensors/smoother/odometry_fusion.h"
 
 namespace adasfm {
 
@@ -55,13 +55,14 @@ struct PriorEstimationOptions {
   // rad/s.
   double visual_bias_sigma = 0.002;
   // Whether vision and gyroscope are compared before anything is believed
-  // (sensors/check_against_vision.h); a contradiction is an error.
+  // (sensors/calibration_check/check_against_vision.h); a contradiction is an
+  // error.
   bool check_against_vision = true;
   // Whether the time shift that vision and gyroscope agree on is added to the
   // calibration's.
   bool estimate_time_shift = false;
   // Whether a low-pass filter in the gyroscope's log that vision clearly shows
-  // (sensors/gyroscope_filter.h) is undone.
+  // (sensors/calibration_check/gyroscope_filter.h) is undone.
   bool undo_gyroscope_filter = true;
   OdometryFusionOptions fusion;
 

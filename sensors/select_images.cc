@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <tuple>
 
-#include "sensors/format_figures.h"
+#include "sensors/io/format_figures.h"
 
 namespace adasfm {
 

@@ -5,7 +5,7 @@
 #include <cmath>
 
 #include "core/so3.h"
-#include "sensors/log_checks.h"
+#include "sensors/io/log_checks.h"
 
 namespace adasfm {
 namespace {

@@ -5,8 +5,8 @@
 #include <string>
 #include <vector>
 
-#include "sensors/build_odometry_links.h"
-#include "sensors/odometry_fusion.h"
+#include "sensors/smoother/build_odometry_links.h"
+#include "sensors/smoother/odometry_fusion.h"
 
 namespace adasfm {
 

@@ -4,10 +4,10 @@
 #include <map>
 #include <vector>
 
-#include "sensors/build_odometry_links.h"
-#include "sensors/check_against_vision.h"
+#include "sensors/calibration_check/check_against_vision.h"
 #include "sensors/estimate_priors.h"
-#include "sensors/odometry_fusion.h"
+#include "sensors/smoother/build_odometry_links.h"
+#include "sensors/smoother/odometry_fusion.h"
 
 namespace adasfm {
 

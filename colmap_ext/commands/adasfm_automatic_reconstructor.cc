@@ -3,10 +3,10 @@
 #include <iostream>
 #include <string>
 
-#include "colmap_ext/automatic_reconstruction.h"
 #include "colmap_ext/commands/log_options.h"
 #include "colmap_ext/commands/progress_display.h"
 #include "colmap_ext/commands/registry.h"
+#include "colmap_ext/workspace/automatic_reconstruction.h"
 #include "core/check_options.h"
 
 namespace adasfm {

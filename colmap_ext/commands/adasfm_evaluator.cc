@@ -7,10 +7,10 @@
 #include <vector>
 
 #include "colmap_ext/commands/registry.h"
-#include "colmap_ext/evaluate_pairs.h"
-#include "colmap_ext/evaluation.h"
+#include "colmap_ext/evaluation/evaluate_pairs.h"
+#include "colmap_ext/evaluation/evaluation.h"
 #include "colmap_ext/host/model.h"
-#include "colmap_ext/output_files.h"
+#include "colmap_ext/io/output_files.h"
 #include "core/check_options.h"
 
 namespace adasfm {

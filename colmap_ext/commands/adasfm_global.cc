@@ -3,10 +3,10 @@
 #include <string>
 
 #include "colmap_ext/adasfm_pipeline.h"
+#include "colmap_ext/coarse/global_report.h"
 #include "colmap_ext/commands/global_options.h"
 #include "colmap_ext/commands/progress_display.h"
 #include "colmap_ext/commands/registry.h"
-#include "colmap_ext/global_report.h"
 
 namespace adasfm {
 namespace {

@@ -6,8 +6,8 @@
 #include "colmap_ext/commands/progress_display.h"
 #include "colmap_ext/commands/registry.h"
 #include "colmap_ext/host/database.h"
-#include "colmap_ext/output_files.h"
-#include "colmap_ext/select_pairs.h"
+#include "colmap_ext/io/output_files.h"
+#include "colmap_ext/pairs/select_pairs.h"
 #include "core/check_options.h"
 
 namespace adasfm {

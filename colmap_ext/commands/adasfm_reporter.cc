@@ -3,8 +3,8 @@
 #include <string>
 
 #include "colmap_ext/commands/registry.h"
-#include "colmap_ext/output_files.h"
-#include "colmap_ext/report.h"
+#include "colmap_ext/io/output_files.h"
+#include "colmap_ext/report/report.h"
 #include "core/check_options.h"
 
 namespace adasfm {

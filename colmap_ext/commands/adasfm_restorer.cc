@@ -3,7 +3,7 @@
 #include <string>
 
 #include "colmap_ext/commands/registry.h"
-#include "colmap_ext/two_view_geometry_backup.h"
+#include "colmap_ext/database/two_view_geometry_backup.h"
 
 namespace adasfm {
 

@@ -9,8 +9,8 @@
 #include "colmap_ext/commands/command.h"
 #include "colmap_ext/commands/progress_display.h"
 #include "colmap_ext/commands/registry.h"
-#include "colmap_ext/output_files.h"
-#include "colmap_ext/write_synthetic_world.h"
+#include "colmap_ext/datasets/write_synthetic_world.h"
+#include "colmap_ext/io/output_files.h"
 #include "core/check_options.h"
 #include "synthetic/render_world.h"
 

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include "colmap_ext/coarse/global_stage.h"
 #include "colmap_ext/commands/command.h"
-#include "colmap_ext/global_stage.h"
 
 namespace adasfm {
 

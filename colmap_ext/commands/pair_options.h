@@ -2,7 +2,7 @@
 #pragma once
 
 #include "colmap_ext/commands/command.h"
-#include "colmap_ext/select_pairs.h"
+#include "colmap_ext/pairs/select_pairs.h"
 
 namespace adasfm {
 

@@ -11,7 +11,7 @@
 #include <string>
 #include <vector>
 
-#include "colmap_ext/sqlite.h"
+#include "colmap_ext/io/sqlite.h"
 #include "core/rigid3d.h"
 #include "core/status.h"
 #include "core/types.h"

@@ -11,7 +11,7 @@
 #include <thread>
 #include <utility>
 
-#include "colmap_ext/capture_output.h"
+#include "colmap_ext/io/capture_output.h"
 #include "core/parallel.h"
 
 #ifdef ADASFM_HOST_HAS_CUDA

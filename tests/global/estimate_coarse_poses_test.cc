@@ -8,7 +8,7 @@
 #include <set>
 
 #include "core/so3.h"
-#include "tests/global/test_scene.h"
+#include "tests/testing/global/test_scene.h"
 #include "tests/testing/matchers.h"
 
 namespace adasfm {

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Tests of scripts/benchmark.py. ADASFM_LAUNCHER names our `colmap`."""
+"""Tests of scripts/benchmark/benchmark.py. ADASFM_LAUNCHER names our `colmap`."""
 
 import json
 import math
@@ -10,7 +10,7 @@ import tempfile
 import unittest
 
 SCRIPTS = os.path.join(os.path.dirname(os.path.abspath(__file__)), '..', '..',
-                       'scripts')
+                       'scripts', 'benchmark')
 sys.path.insert(0, SCRIPTS)
 
 from benchmarking import sets, tables  # noqa: E402

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Tests of scripts/global_tables.py."""
+"""Tests of scripts/benchmark/global_tables.py."""
 
 import argparse
 import os
@@ -7,7 +7,7 @@ import sys
 import unittest
 
 SCRIPTS = os.path.join(os.path.dirname(os.path.abspath(__file__)), '..', '..',
-                       'scripts')
+                       'scripts', 'benchmark')
 sys.path.insert(0, SCRIPTS)
 
 import global_tables  # noqa: E402
@@ -56,7 +56,7 @@ class GlobalTablesTest(unittest.TestCase):
     args = argparse.Namespace(variants=['as it is', 'no loop gating'],
                               mapper_variants=['as it is'], sizes=[150],
                               seeds=[1], num_blackouts=1,
-                              results_path='/folder/figures')
+                              figures_path='/folder/figures.json')
     text = global_tables.report(records, args)
     table = []
     for line in text.split('\n') + ['']:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Tests of scripts/global_without_sensors.py."""
+"""Tests of scripts/benchmark/global_without_sensors.py."""
 
 import argparse
 import os
@@ -7,7 +7,7 @@ import sys
 import unittest
 
 SCRIPTS = os.path.join(os.path.dirname(os.path.abspath(__file__)), '..', '..',
-                       'scripts')
+                       'scripts', 'benchmark')
 sys.path.insert(0, SCRIPTS)
 
 import global_without_sensors as tables  # noqa: E402
@@ -41,7 +41,7 @@ class GlobalWithoutSensorsTest(unittest.TestCase):
 
   def test_report_has_equal_columns_in_each_table(self):
     args = argparse.Namespace(worlds=['clean', 'fisheye'], num_images=10,
-                              seeds=[1], results_path='/folder/figures')
+                              seeds=[1], figures_path='/folder/figures.json')
     text = tables.report([record([0.1], [False], 0.1, 0.1)], args)
     self.assertNotIn('/folder', text)
     for table in text.split('\n\n')[2:]:

@@ -18,7 +18,7 @@ for file in bin/colmap-adasfm lib/adasfm/bin/colmap \
   share/man/man1/colmap-adasfm.1.gz include/adasfm/core/rigid3d.h \
   include/adasfm/colmap_ext/adasfm_pipeline.h lib/libadasfm_core.a \
   lib/cmake/adasfm/adasfm-config.cmake share/doc/colmap-adasfm/README.md \
-  share/doc/colmap-adasfm/docs/math.md share/doc/colmap-adasfm/copyright \
+  share/doc/colmap-adasfm/docs/reference/math.md share/doc/colmap-adasfm/copyright \
   share/bash-completion/completions/colmap-adasfm; do
   [ -e "$work/root/$file" ] || fail "$file is not installed"
 done

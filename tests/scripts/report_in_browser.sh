@@ -26,7 +26,7 @@ done
 "$colmap" adasfm_global --database_path "$work/database.db" \
   --output_path "$work/global" > /dev/null
 # Reports on several parts, checks them, and takes the documentation's pictures.
-COLMAP=$colmap "$root/scripts/screenshots.sh" "$work" "$work/pictures"
+COLMAP=$colmap "$root/scripts/report/screenshots.sh" "$work" "$work/pictures"
 for picture in "$root"/docs/images/report_*; do
   [ -s "$work/pictures/$(basename "$picture")" ] ||
     { echo "screenshots.sh does not make $picture"; exit 1; }

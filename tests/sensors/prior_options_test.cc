@@ -3,7 +3,7 @@
 
 #include <algorithm>
 
-#include "synthetic_dataset.h"
+#include "tests/testing/sensors/synthetic_dataset.h"
 
 namespace adasfm {
 namespace {

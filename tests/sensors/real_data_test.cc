@@ -6,7 +6,7 @@
 
 #include "core/random.h"
 #include "core/so3.h"
-#include "dataset.h"
+#include "tests/testing/sensors/dataset.h"
 
 namespace adasfm {
 namespace {
@@ -108,7 +108,7 @@ INSTANTIATE_TEST_SUITE_P(Kitti, RealData,
                                          "kitti06-51"));
 
 // The direction of driving stays 1.6 deg uncertain without vision
-// (docs/sensors.md), so only length and heading are held to 1 %.
+// (docs/reference/sensors.md), so only length and heading are held to 1 %.
 TEST(RealRoad, PhoneAndWheelsKeepTheirHeadingAndLength) {
   Dataset data;
   if (!ReadDataset("comma2k19-ex1", &data)) GTEST_SKIP() << "no shared data";

@@ -6,7 +6,7 @@
 
 #include "core/random.h"
 #include "core/so3.h"
-#include "synthetic_dataset.h"
+#include "tests/testing/sensors/synthetic_dataset.h"
 
 namespace adasfm {
 namespace {
@@ -51,7 +51,7 @@ TEST(SyntheticPriors, LongerDrivesTellTheWheelScale) {
 }
 
 // A factor of noisy readings would come out too small; one of what is estimated
-// does not (sensors/odometry_factors.h).
+// does not (sensors/smoother/odometry_factors.h).
 TEST(SyntheticPriors, NoisyWheelsDoNotShrinkTheScale) {
   constexpr int kNumSeeds = 8;
   double error = 0.0, variance = 0.0;

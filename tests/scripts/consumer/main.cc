@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Something of the pure layers and something of the plugin. COLMAP's headers
 // come first, as they must: they specialise std::vector for Eigen's types.
-#include "colmap_ext/evaluation.h"
+#include "colmap_ext/evaluation/evaluation.h"
 // The rest.
-#include <colmap_ext/report_html.h>
+#include <colmap_ext/report/report_html.h>
 #include <core/so3.h>
 #include <synthetic/synthetic_world.h>
 

@@ -2,7 +2,7 @@
 #include <cmath>
 
 #include "memory_file.h"
-#include "sensors/calibration.h"
+#include "sensors/io/calibration.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   using namespace adasfm;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "memory_file.h"
-#include "sensors/read_image_times.h"
+#include "sensors/io/read_image_times.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   using namespace adasfm;

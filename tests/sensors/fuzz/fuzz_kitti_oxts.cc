@@ -4,7 +4,7 @@
 #include <fstream>
 
 #include "memory_file.h"
-#include "sensors/read_imu.h"
+#include "sensors/io/read_imu.h"
 
 namespace {
 

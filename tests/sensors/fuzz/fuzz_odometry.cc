@@ -2,7 +2,7 @@
 #include <cmath>
 
 #include "memory_file.h"
-#include "sensors/read_wheel.h"
+#include "sensors/io/read_wheel.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   using namespace adasfm;

@@ -4,7 +4,7 @@
 #include <cstring>
 
 #include "memory_file.h"
-#include "sensors/ros_messages.h"
+#include "sensors/io/ros_messages.h"
 
 namespace {
 

@@ -2,8 +2,8 @@
 #include <cmath>
 
 #include "memory_file.h"
-#include "sensors/read_wheel.h"
-#include "sensors/wheel_odometry.h"
+#include "sensors/io/read_wheel.h"
+#include "sensors/preintegration/wheel_odometry.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   using namespace adasfm;

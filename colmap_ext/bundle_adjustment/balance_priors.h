@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <base/reconstruction.h>
+
+#include <string>
+#include <vector>
+
+#include "colmap_ext/bundle_adjustment/bundle_adjustment.h"
+
+namespace adasfm {
+
+// Keypoints share errors that no single one shows (calibration, moving cars,
+// forward motion), so thousands of them may outvote honest priors. The priors
+// tell: when an adjustment leaves them further off than their covariance
+// allows, vision was believed too much. Its sigma is then raised until both
+// agree (variance component estimation for two groups of observations, of which
+// one is trusted; docs/reference/mapper.md).
+struct PriorBalanceOptions {
+  bool enabled = true;
+  // Squared whitened residuals per degree of freedom that priors may have;
+  // honest ones have 1 or less.
+  double max_chi2_per_dof = 1.5;
+  // The keypoint sigma is raised by at most this factor, so that priors of a
+  // wrong calibration do not take over.
+  double max_sigma_factor = 8.0;
+
+  bool IsValid(std::string* error) const;
+};
+
+// The squared whitened residual per degree of freedom, at the reconstruction's
+// poses, of the priors between images that points hold too: the largest of the
+// means over rotation, direction and length terms. Each term counts at most 25,
+// so that a slipping wheel does not speak for all. 0 without priors.
+double ComputePriorChi2PerDof(const std::vector<PosePriorEdge>& priors,
+                              const colmap::Reconstruction& reconstruction);
+
+// The priors of which a term is more than ten sigmas off: a model that folds
+// two look-alike places together tears a few of them and leaves all others
+// alone.
+int CountTornPriors(const std::vector<PosePriorEdge>& priors,
+                    const colmap::Reconstruction& reconstruction);
+
+// AdjustBundle, with the keypoint sigma balanced against the problem's priors.
+// keypoint_sigma_factor (>= 1) multiplies options.keypoint_sigma_px; it is
+// where the search begins and holds what was found.
+PriorBundleAdjustmentSummary AdjustBundleInBalance(
+    const PriorBalanceOptions& balance,
+    const PriorBundleAdjustmentOptions& options,
+    const PriorBundleAdjustmentProblem& problem,
+    colmap::Reconstruction* reconstruction, double* keypoint_sigma_factor);
+
+}  // namespace adasfm

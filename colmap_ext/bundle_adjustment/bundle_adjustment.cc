@@ -1,0 +1,180 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "colmap_ext/bundle_adjustment/bundle_adjustment.h"
+
+#include <algorithm>
+#include <cmath>
+#include <sstream>
+#include <stdexcept>
+
+#include "colmap_ext/bundle_adjustment/bundle_problem.h"
+#include "core/parallel.h"
+
+namespace adasfm {
+namespace {
+
+// The length of a scale that nothing measures is held to this share of itself;
+// no residual pulls against it, so the value is not a weight.
+constexpr double kGaugeLengthRatio = 1e-3;
+// The chain's length and bends are soft: the damping that Ceres begins with
+// (radius 1e4) would let them go a little at each of many steps.
+constexpr double kInitialTrustRegionRadius = 1e7;
+// Of priors: beyond, a direction is nearly any; below, there is no motion.
+constexpr double kMaxDirectionSigmaRad = 0.5;
+constexpr double kMinLengthM = 1e-9;
+// Problems with fewer residuals are solved faster by one thread.
+constexpr int kMinNumResidualsForThreads = 20000;
+
+bool CheckPositive(const char* name, double value, std::string* error) {
+  if (std::isfinite(value) && value > 0.0) return true;
+  std::ostringstream message;
+  message << name << " is " << value << ", but must be positive";
+  *error = message.str();
+  return false;
+}
+
+bool HasLengths(const std::vector<PosePriorEdge>& priors) {
+  return std::any_of(priors.begin(), priors.end(), [](const auto& edge) {
+    return std::isfinite(edge.length_sigma_m);
+  });
+}
+
+// Holds the degrees of freedom that the data leave open (see AdjustBundle).
+void FixGauge(bool has_lengths, BundleProblem* problem) {
+  const std::vector<image_t> constant_images = problem->ConstantImages();
+  if (constant_images.empty()) problem->FixFirstPose();
+  if (has_lengths || constant_images.size() >= 2) return;
+  problem->FixDistanceToFarthestPose(kGaugeLengthRatio);
+}
+
+ceres::Solver::Options SolverOptions(
+    const PriorBundleAdjustmentOptions& options, BundleProblem* problem) {
+  ceres::Solver::Options solver;
+  solver.max_num_iterations = options.max_num_iterations;
+  solver.function_tolerance = options.function_tolerance;
+  solver.initial_trust_region_radius = kInitialTrustRegionRadius;
+  // The cost alone decides: gradients and steps have no common unit here.
+  solver.gradient_tolerance = 1e-12;
+  solver.parameter_tolerance = 1e-12;
+  solver.logging_type = ceres::SILENT;
+  solver.num_threads = problem->NumResiduals() < kMinNumResidualsForThreads
+                           ? 1
+                           : EffectiveNumThreads(options.num_threads);
+  solver.max_linear_solver_iterations = 200;
+  solver.max_num_consecutive_invalid_steps = 10;
+  const int num_images = problem->NumImages();
+  const bool has_points = problem->NumPoints() > 0;
+  if (num_images <= options.max_num_images_dense && has_points) {
+    solver.linear_solver_type = ceres::DENSE_SCHUR;
+  } else if (!has_points) {
+    solver.linear_solver_type = ceres::SPARSE_NORMAL_CHOLESKY;
+  } else if (num_images <= options.max_num_images_sparse) {
+    solver.linear_solver_type = ceres::SPARSE_SCHUR;
+  } else {
+    solver.linear_solver_type = ceres::ITERATIVE_SCHUR;
+    solver.preconditioner_type = ceres::SCHUR_JACOBI;
+  }
+  if (has_points) solver.linear_solver_ordering = problem->Ordering();
+  return solver;
+}
+
+}  // namespace
+
+PosePriorEdge PosePriorEdgeFromPrior(const RelativePosePrior& prior) {
+  PosePriorEdge edge;
+  edge.image_id1 = prior.image_id1;
+  edge.image_id2 = prior.image_id2;
+  edge.cam2_from_cam1 = prior.cam2_from_cam1;
+  const auto sigma_or_infinity = [](double variance) {
+    return std::isfinite(variance) && variance > 0.0
+               ? std::sqrt(variance)
+               : std::numeric_limits<double>::infinity();
+  };
+  if (prior.HasRotation()) {
+    edge.rotation_sigma_rad =
+        sigma_or_infinity(prior.covariance.topLeftCorner<3, 3>().trace() / 3.0);
+  }
+  const Eigen::Vector3d& translation = prior.cam2_from_cam1.translation;
+  const double length = std::max(kMinLengthM, translation.norm());
+  if (!std::isfinite(length)) return edge;
+  const Eigen::Matrix3d covariance = prior.covariance.bottomRightCorner<3, 3>();
+  const Eigen::Vector3d direction = translation / length;
+  const double variance_along = direction.dot(covariance * direction);
+  const double variance_across = (covariance.trace() - variance_along) / 2.0;
+  if (prior.HasLength())
+    edge.length_sigma_m = sigma_or_infinity(variance_along);
+  if (prior.HasDirection()) {
+    edge.direction_sigma_rad = sigma_or_infinity(variance_across) / length;
+  }
+  // A motion that drowns in its own noise has no direction.
+  if (edge.direction_sigma_rad > kMaxDirectionSigmaRad) {
+    edge.direction_sigma_rad = std::numeric_limits<double>::infinity();
+    if (prior.HasDirection() && prior.HasLength()) {
+      edge.translation_sigma_m = sigma_or_infinity(covariance.trace() / 3.0);
+      edge.length_sigma_m = std::numeric_limits<double>::infinity();
+    }
+  }
+  return edge;
+}
+
+bool PriorBundleAdjustmentOptions::IsValid(std::string* error) const {
+  if (!CheckPositive("keypoint_sigma_px", keypoint_sigma_px, error) ||
+      !CheckPositive("prior_loss_scale", prior_loss_scale, error)) {
+    return false;
+  }
+  if (!std::isfinite(reproj_loss_scale_px)) {
+    *error = "reproj_loss_scale_px must be finite";
+    return false;
+  }
+  if (max_num_iterations < 1) {
+    *error = "max_num_iterations is " + std::to_string(max_num_iterations) +
+             ", but must be at least 1";
+    return false;
+  }
+  if (!(function_tolerance >= 0.0)) {
+    *error = "function_tolerance must not be negative";
+    return false;
+  }
+  if (max_num_images_sparse < max_num_images_dense) {
+    *error = "max_num_images_sparse is " +
+             std::to_string(max_num_images_sparse) +
+             ", but must not be less than max_num_images_dense";
+    return false;
+  }
+  return true;
+}
+
+PriorBundleAdjustmentSummary AdjustBundle(
+    const PriorBundleAdjustmentOptions& options,
+    const PriorBundleAdjustmentProblem& problem,
+    colmap::Reconstruction* reconstruction) {
+  std::string error;
+  if (!options.IsValid(&error)) throw std::invalid_argument(error);
+
+  PriorBundleAdjustmentSummary summary;
+  BundleProblem bundle(options, problem, *reconstruction);
+  summary.num_images = bundle.NumImages();
+  summary.num_points = bundle.NumPoints();
+  summary.num_residuals = bundle.NumResiduals();
+  if (bundle.NumImages() == 0 || bundle.NumResiduals() == 0) {
+    summary.message = "nothing to adjust";
+    return summary;
+  }
+  FixGauge(HasLengths(problem.priors), &bundle);
+
+  ceres::Solver::Summary solver_summary;
+  ceres::Solve(SolverOptions(options, &bundle), bundle.CeresProblem(),
+               &solver_summary);
+  summary.num_iterations = solver_summary.num_successful_steps +
+                           solver_summary.num_unsuccessful_steps;
+  summary.initial_cost = solver_summary.initial_cost;
+  summary.final_cost = solver_summary.final_cost;
+  summary.seconds = solver_summary.total_time_in_seconds;
+  summary.message = solver_summary.message;
+  summary.success = solver_summary.IsSolutionUsable() &&
+                    std::isfinite(solver_summary.final_cost) &&
+                    bundle.IsFinite();
+  if (summary.success) bundle.WriteTo(reconstruction);
+  return summary;
+}
+
+}  // namespace adasfm

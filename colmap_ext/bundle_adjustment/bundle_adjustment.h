@@ -1,0 +1,113 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <base/reconstruction.h>
+
+#include <limits>
+#include <map>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "core/relative_pose_prior.h"
+#include "core/rigid3d.h"
+#include "core/types.h"
+
+namespace adasfm {
+
+// A relative-pose term of the adjustment for one edge of the augmented graph
+// (paper, eq. 8; docs/reference/math.md). With P = P_j P_i^-1 of the current
+// poses:
+//   rotation   Log(R R^^T) / rotation_sigma_rad            3 residuals
+//   direction  angle between t and t^ / direction_sigma_rad 2 residuals
+//   length     (|t| - |t^|) / length_sigma_m                1 residual
+//   translation  (t - t^) / translation_sigma_m             3 residuals
+// A term with an infinite sigma is left out.
+struct PosePriorEdge {
+  image_t image_id1 = kInvalidImageId;
+  image_t image_id2 = kInvalidImageId;
+  Rigid3d cam2_from_cam1;
+  double rotation_sigma_rad = std::numeric_limits<double>::infinity();
+  double direction_sigma_rad = std::numeric_limits<double>::infinity();
+  double length_sigma_m = std::numeric_limits<double>::infinity();
+  // In place of direction and length where the motion is too short to have a
+  // direction: with its length alone, every position around it would fit.
+  double translation_sigma_m = std::numeric_limits<double>::infinity();
+  // Whether keypoints hold both images too. An edge that bridges a gap by
+  // itself keeps its full weight, as dropping it would open the gap, and says
+  // nothing of the balance between keypoints and priors.
+  bool is_held_by_points = true;
+};
+
+// The edge of a sensor prior with the sigmas of its covariance; what its flags
+// do not claim stays infinite.
+PosePriorEdge PosePriorEdgeFromPrior(const RelativePosePrior& prior);
+
+struct PriorBundleAdjustmentOptions {
+  // 1 sigma of a keypoint's position; the unit in which priors and keypoints
+  // are compared. Half a pixel is the noise of one keypoint. More, to be safe,
+  // bends long drives: the errors of priors persist, which the adjustment does
+  // not know, while balance_priors.h finds what keypoints have in common.
+  double keypoint_sigma_px = 0.5;
+  // Where the robust loss on reprojection errors (soft L1) takes over, in px;
+  // <= 0: plain squares.
+  double reproj_loss_scale_px = 2.0;
+  // Where the robust loss (Cauchy) on whitened prior terms takes over, in
+  // sigmas. It drops single wrong priors; many that vision contradicts together
+  // are what balance_priors.h is for.
+  double prior_loss_scale = 3.0;
+
+  bool refine_focal_length = false;
+  bool refine_principal_point = false;
+  bool refine_extra_params = false;
+
+  int max_num_iterations = 50;
+  // Relative change of the cost at which the adjustment has converged.
+  double function_tolerance = 1e-5;
+  // Several threads of the solver add in changing order: results then agree up
+  // to rounding only. One thread repeats them bit by bit. -1: all.
+  int num_threads = 1;
+  // Up to this many images the reduced camera system is solved densely, up to
+  // the second number by sparse Cholesky, beyond that iteratively.
+  int max_num_images_dense = 50;
+  int max_num_images_sparse = 4000;
+
+  bool RefinesCameras() const {
+    return refine_focal_length || refine_principal_point || refine_extra_params;
+  }
+  bool IsValid(std::string* error) const;
+};
+
+// Which images take part. Points are those that the images observe; points seen
+// by other registered images too keep those observations only when the other
+// image takes part.
+struct PriorBundleAdjustmentProblem {
+  // Registered images whose poses are adjusted.
+  std::set<image_t> images;
+  // Registered images that take part with fixed poses.
+  std::set<image_t> constant_images;
+  std::vector<PosePriorEdge> priors;
+};
+
+struct PriorBundleAdjustmentSummary {
+  bool success = false;
+  int num_residuals = 0;
+  int num_images = 0;
+  int num_points = 0;
+  int num_iterations = 0;
+  double initial_cost = 0.0;
+  double final_cost = 0.0;
+  double seconds = 0.0;
+  std::string message;
+};
+
+// Adjusts poses, points and, on request, intrinsics of the reconstruction with
+// the priors. Metres are kept when the priors have lengths; otherwise seven
+// degrees of freedom are held by the first image and the distance to the image
+// farthest from it. On failure the reconstruction is left as it was.
+PriorBundleAdjustmentSummary AdjustBundle(
+    const PriorBundleAdjustmentOptions& options,
+    const PriorBundleAdjustmentProblem& problem,
+    colmap::Reconstruction* reconstruction);
+
+}  // namespace adasfm

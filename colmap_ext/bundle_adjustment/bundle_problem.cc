@@ -1,0 +1,253 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "colmap_ext/bundle_adjustment/bundle_problem.h"
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+
+#include "colmap_ext/bundle_adjustment/create_reprojection_cost.h"
+#include "colmap_ext/host/pose_conversion.h"
+
+namespace adasfm {
+
+BundleProblem::BundleProblem(const PriorBundleAdjustmentOptions& options,
+                             const PriorBundleAdjustmentProblem& problem,
+                             const colmap::Reconstruction& reconstruction)
+    : options_(options),
+      prior_loss_(
+          std::make_unique<ceres::CauchyLoss>(options.prior_loss_scale)) {
+  if (options.reproj_loss_scale_px > 0.0) {
+    reprojection_loss_ = std::make_unique<ceres::SoftLOneLoss>(
+        options.reproj_loss_scale_px / options.keypoint_sigma_px);
+  }
+  ceres::Problem::Options problem_options;
+  problem_options.cost_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
+  problem_options.loss_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
+  problem_options.disable_all_safety_checks = true;
+  problem_options.evaluation_callback = this;
+  problem_ = std::make_unique<ceres::Problem>(problem_options);
+  AddImages(problem, reconstruction);
+  AddPoints(reconstruction);
+  AddPriors(problem.priors);
+  SetConstantBlocks(reconstruction);
+}
+
+void BundleProblem::PrepareForEvaluation(bool, bool new_evaluation_point) {
+  if (!new_evaluation_point) return;
+  for (auto& [image_id, block] : images_) block.pose->Update();
+}
+
+void BundleProblem::AddImages(const PriorBundleAdjustmentProblem& problem,
+                              const colmap::Reconstruction& reconstruction) {
+  const auto add = [&](image_t image_id, bool is_constant) {
+    if (!reconstruction.ExistsImage(image_id)) return;
+    const colmap::Image& image = reconstruction.Image(image_id);
+    if (!image.IsRegistered()) return;
+    ImageBlock& block = images_[image_id];
+    block.is_constant = is_constant;
+    const colmap::Camera& camera = reconstruction.Camera(image.CameraId());
+    cameras_[image.CameraId()].params = camera.Params();
+  };
+  for (const image_t image_id : problem.images) add(image_id, false);
+  for (const image_t image_id : problem.constant_images) add(image_id, true);
+  poses_.reserve(images_.size());
+  for (auto& [image_id, block] : images_) {
+    poses_.emplace_back(CamFromWorld(reconstruction.Image(image_id)));
+    block.pose = &poses_.back();
+  }
+}
+
+std::vector<BundleProblem::Observation> BundleProblem::FindObservations(
+    const colmap::Reconstruction& reconstruction,
+    const colmap::Point3D& point) const {
+  std::vector<Observation> observations;
+  bool is_adjusted = false;
+  for (const colmap::TrackElement& element : point.Track().Elements()) {
+    const auto block = images_.find(element.image_id);
+    if (block == images_.end()) continue;
+    const AdjustedPose& pose = *block->second.pose;
+    const double depth = pose.rotation.row(2).dot(point.XYZ() - pose.center);
+    if (!(depth > kMinProjectionDepth)) continue;
+    const colmap::Image& image = reconstruction.Image(element.image_id);
+    Observation observation;
+    observation.image_id = element.image_id;
+    observation.xy = image.Point2D(element.point2D_idx).XY();
+    if (!NormalizeKeypoint(reconstruction.Camera(image.CameraId()),
+                           observation.xy, options_.keypoint_sigma_px,
+                           &observation.keypoint)) {
+      continue;
+    }
+    observations.push_back(observation);
+    is_adjusted = is_adjusted || !block->second.is_constant;
+  }
+  if (observations.size() < 2 || !is_adjusted) return {};
+  std::stable_sort(observations.begin(), observations.end(),
+                   [](const Observation& a, const Observation& b) {
+                     return a.image_id < b.image_id;
+                   });
+  return observations;
+}
+
+void BundleProblem::AddPoints(const colmap::Reconstruction& reconstruction) {
+  std::vector<colmap::point3D_t> point_ids;
+  for (const auto& [image_id, block] : images_) {
+    if (block.is_constant) continue;
+    for (const auto& point2D : reconstruction.Image(image_id).Points2D()) {
+      if (point2D.HasPoint3D()) point_ids.push_back(point2D.Point3DId());
+    }
+  }
+  std::sort(point_ids.begin(), point_ids.end());
+  point_ids.erase(std::unique(point_ids.begin(), point_ids.end()),
+                  point_ids.end());
+  points_.reserve(point_ids.size());
+  for (const colmap::point3D_t point_id : point_ids) {
+    const colmap::Point3D& point = reconstruction.Point3D(point_id);
+    if (!point.XYZ().allFinite()) continue;
+    const std::vector<Observation> observations =
+        FindObservations(reconstruction, point);
+    if (observations.empty()) continue;
+    points_.push_back({point_id, point.XYZ()});
+    for (const Observation& observation : observations) {
+      AddObservation(reconstruction, observation, &points_.back());
+    }
+  }
+}
+
+void BundleProblem::AddObservation(const colmap::Reconstruction& reconstruction,
+                                   const Observation& observation,
+                                   PointBlock* point) {
+  ImageBlock& block = images_.at(observation.image_id);
+  block.num_observations += 1;
+  if (!options_.RefinesCameras()) {
+    reprojection_costs_.emplace_back(observation.keypoint, block.pose);
+    problem_->AddResidualBlock(&reprojection_costs_.back(),
+                               reprojection_loss_.get(), block.pose->parameters,
+                               point->xyz.data());
+    return;
+  }
+  const camera_t camera_id =
+      reconstruction.Image(observation.image_id).CameraId();
+  CameraBlock& camera = cameras_.at(camera_id);
+  camera.is_used = true;
+  other_costs_.push_back(
+      CreateCameraCost(reconstruction.Camera(camera_id), observation.xy,
+                       options_.keypoint_sigma_px, block.pose));
+  problem_->AddResidualBlock(other_costs_.back().get(),
+                             reprojection_loss_.get(), block.pose->parameters,
+                             point->xyz.data(), camera.params.data());
+}
+
+void BundleProblem::AddPriors(const std::vector<PosePriorEdge>& edges) {
+  using Term = PosePriorCost::Term;
+  for (const PosePriorEdge& edge : edges) {
+    const auto image1 = images_.find(edge.image_id1);
+    const auto image2 = images_.find(edge.image_id2);
+    if (image1 == images_.end() || image2 == images_.end() ||
+        image1 == image2 ||
+        (image1->second.is_constant && image2->second.is_constant)) {
+      continue;
+    }
+    const auto add = [&](Term term, double sigma) {
+      if (!std::isfinite(sigma) || !(sigma > 0.0)) return;
+      AddPrior(edge, term, &image1->second, &image2->second,
+               edge.is_held_by_points ? prior_loss_.get() : nullptr);
+    };
+    add(Term::kRotation, edge.rotation_sigma_rad);
+    add(Term::kDirection, edge.direction_sigma_rad);
+    add(Term::kLength, edge.length_sigma_m);
+    add(Term::kTranslation, edge.translation_sigma_m);
+  }
+}
+
+void BundleProblem::AddPrior(const PosePriorEdge& edge,
+                             PosePriorCost::Term term, ImageBlock* image1,
+                             ImageBlock* image2, ceres::LossFunction* loss) {
+  other_costs_.push_back(
+      std::make_unique<PosePriorCost>(edge, term, image1->pose, image2->pose));
+  problem_->AddResidualBlock(other_costs_.back().get(), loss,
+                             image1->pose->parameters,
+                             image2->pose->parameters);
+  image1->num_priors += 1;
+  image2->num_priors += 1;
+}
+
+void BundleProblem::SetConstantBlocks(
+    const colmap::Reconstruction& reconstruction) {
+  for (auto& [image_id, block] : images_) {
+    if (!block.IsUsed()) continue;
+    if (block.is_constant) {
+      problem_->SetParameterBlockConstant(block.pose->parameters);
+    } else {
+      num_adjusted_images_ += 1;
+    }
+  }
+  for (auto& [camera_id, block] : cameras_) {
+    if (!block.is_used) continue;
+    const colmap::Camera& camera = reconstruction.Camera(camera_id);
+    std::vector<int> constant;
+    const auto hold = [&](bool refine, const std::vector<size_t>& indices) {
+      if (!refine)
+        constant.insert(constant.end(), indices.begin(), indices.end());
+    };
+    hold(options_.refine_focal_length, camera.FocalLengthIdxs());
+    hold(options_.refine_principal_point, camera.PrincipalPointIdxs());
+    hold(options_.refine_extra_params, camera.ExtraParamsIdxs());
+    if (constant.size() == block.params.size()) {
+      problem_->SetParameterBlockConstant(block.params.data());
+    } else if (!constant.empty()) {
+      problem_->SetManifold(
+          block.params.data(),
+          new ceres::SubsetManifold(block.params.size(), constant));
+    }
+  }
+}
+
+std::shared_ptr<ceres::ParameterBlockOrdering> BundleProblem::Ordering() {
+  auto ordering = std::make_shared<ceres::ParameterBlockOrdering>();
+  for (PointBlock& point : points_) {
+    ordering->AddElementToGroup(point.xyz.data(), 0);
+  }
+  for (auto& [image_id, block] : images_) {
+    if (block.IsUsed()) ordering->AddElementToGroup(block.pose->parameters, 1);
+  }
+  for (auto& [camera_id, block] : cameras_) {
+    if (block.is_used) ordering->AddElementToGroup(block.params.data(), 1);
+  }
+  return ordering;
+}
+
+bool BundleProblem::IsFinite() const {
+  const auto all_finite = [](const double* values, size_t size) {
+    return std::all_of(values, values + size,
+                       [](double value) { return std::isfinite(value); });
+  };
+  for (const auto& [image_id, block] : images_) {
+    if (!all_finite(block.pose->parameters, 6)) return false;
+  }
+  for (const PointBlock& point : points_) {
+    if (!point.xyz.allFinite()) return false;
+  }
+  for (const auto& [camera_id, block] : cameras_) {
+    if (!all_finite(block.params.data(), block.params.size())) return false;
+  }
+  return true;
+}
+
+void BundleProblem::WriteTo(colmap::Reconstruction* reconstruction) const {
+  for (const auto& [image_id, block] : images_) {
+    if (block.is_constant || !block.IsUsed()) continue;
+    AdjustedPose pose = *block.pose;
+    pose.Update();
+    SetCamFromWorld(pose.CamFromWorld(), &reconstruction->Image(image_id));
+  }
+  for (const PointBlock& point : points_) {
+    reconstruction->Point3D(point.id).SetXYZ(point.xyz);
+  }
+  for (const auto& [camera_id, block] : cameras_) {
+    if (block.is_used) {
+      reconstruction->Camera(camera_id).SetParams(block.params);
+    }
+  }
+}
+
+}  // namespace adasfm

@@ -1,0 +1,104 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <ceres/ceres.h>
+
+#include <deque>
+#include <map>
+#include <memory>
+#include <vector>
+
+#include "colmap_ext/bundle_adjustment/adjusted_pose.h"
+#include "colmap_ext/bundle_adjustment/bundle_adjustment.h"
+#include "colmap_ext/bundle_adjustment/pose_prior_cost.h"
+#include "colmap_ext/bundle_adjustment/reprojection_cost.h"
+
+namespace adasfm {
+
+// The adjustment as a Ceres problem on copies of the poses, points and
+// intrinsics that take part. Blocks are added in the order of ids.
+class BundleProblem final : private ceres::EvaluationCallback {
+ public:
+  // The options are valid. Images without a residual do not take part, nor do
+  // points behind all but one of their cameras.
+  BundleProblem(const PriorBundleAdjustmentOptions& options,
+                const PriorBundleAdjustmentProblem& problem,
+                const colmap::Reconstruction& reconstruction);
+  BundleProblem(const BundleProblem&) = delete;
+  BundleProblem& operator=(const BundleProblem&) = delete;
+
+  // Images whose poses are adjusted.
+  int NumImages() const { return num_adjusted_images_; }
+  int NumPoints() const { return static_cast<int>(points_.size()); }
+  int NumResiduals() const { return problem_->NumResiduals(); }
+  // Those that take part in a residual.
+  std::vector<image_t> ConstantImages() const;
+
+  // Makes the pose of the first image that has observations (else of the first
+  // image) constant.
+  void FixFirstPose();
+  // Holds the distance from the first constant pose to the pose farthest from
+  // it, to this share of the distance.
+  void FixDistanceToFarthestPose(double sigma_ratio);
+
+  // Points are eliminated first.
+  std::shared_ptr<ceres::ParameterBlockOrdering> Ordering();
+  ceres::Problem* CeresProblem() { return problem_.get(); }
+  bool IsFinite() const;
+  void WriteTo(colmap::Reconstruction* reconstruction) const;
+
+ private:
+  struct ImageBlock {
+    AdjustedPose* pose = nullptr;  // in poses_
+    bool is_constant = false;
+    int num_observations = 0;
+    int num_priors = 0;
+    bool IsUsed() const { return num_observations > 0 || num_priors > 0; }
+  };
+  struct PointBlock {
+    colmap::point3D_t id = 0;
+    Eigen::Vector3d xyz;
+  };
+  struct CameraBlock {
+    std::vector<double> params;
+    bool is_used = false;
+  };
+  struct Observation {
+    image_t image_id = kInvalidImageId;
+    Eigen::Vector2d xy;
+    NormalizedKeypoint keypoint;
+  };
+
+  void PrepareForEvaluation(bool evaluate_jacobians,
+                            bool new_evaluation_point) override;
+  void AddImages(const PriorBundleAdjustmentProblem& problem,
+                 const colmap::Reconstruction& reconstruction);
+  void AddPoints(const colmap::Reconstruction& reconstruction);
+  // The usable observations of a point, in order of image ids.
+  std::vector<Observation> FindObservations(
+      const colmap::Reconstruction& reconstruction,
+      const colmap::Point3D& point) const;
+  void AddObservation(const colmap::Reconstruction& reconstruction,
+                      const Observation& observation, PointBlock* point);
+  void AddPriors(const std::vector<PosePriorEdge>& edges);
+  void AddPrior(const PosePriorEdge& edge, PosePriorCost::Term term,
+                ImageBlock* image1, ImageBlock* image2,
+                ceres::LossFunction* loss);
+  void SetConstantBlocks(const colmap::Reconstruction& reconstruction);
+
+  const PriorBundleAdjustmentOptions options_;
+  std::map<image_t, ImageBlock> images_;
+  std::map<camera_t, CameraBlock> cameras_;
+  // Ceres orders the blocks of a group by address: contiguous and in the order
+  // of ids, so that every run adds in the same order.
+  std::vector<AdjustedPose> poses_;
+  std::vector<PointBlock> points_;
+  std::deque<ReprojectionCost> reprojection_costs_;
+  std::vector<std::unique_ptr<ceres::CostFunction>> other_costs_;
+  std::unique_ptr<ceres::LossFunction> reprojection_loss_;
+  std::unique_ptr<ceres::LossFunction> prior_loss_;
+  std::unique_ptr<ceres::Problem> problem_;
+  int num_adjusted_images_ = 0;
+};
+
+}  // namespace adasfm

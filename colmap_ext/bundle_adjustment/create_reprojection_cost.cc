@@ -1,0 +1,49 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "colmap_ext/bundle_adjustment/create_reprojection_cost.h"
+
+#include <base/camera_models.h>
+
+namespace adasfm {
+
+// A keypoint whose undistortion does not lead back to it, in px.
+static constexpr double kMaxUndistortionErrorPx = 0.5;
+
+bool NormalizeKeypoint(const colmap::Camera& camera, const Eigen::Vector2d& xy,
+                       double sigma_px, NormalizedKeypoint* keypoint) {
+  // Half a step to either side: exact for pinholes, error of third order else.
+  const double step = 0.5 / camera.MeanFocalLength();
+  const Eigen::Vector2d normalized = camera.ImageToWorld(xy);
+  const Eigen::Vector2d dx(step, 0.0), dy(0.0, step);
+  Eigen::Matrix2d jacobian;
+  jacobian.col(0) = (camera.WorldToImage(normalized + dx) -
+                     camera.WorldToImage(normalized - dx)) /
+                    (2.0 * step);
+  jacobian.col(1) = (camera.WorldToImage(normalized + dy) -
+                     camera.WorldToImage(normalized - dy)) /
+                    (2.0 * step);
+  const Eigen::Vector2d error = camera.WorldToImage(normalized) - xy;
+  if (!jacobian.allFinite() || !(error.norm() < kMaxUndistortionErrorPx)) {
+    return false;
+  }
+  keypoint->normalized = normalized;
+  keypoint->whitened_from_normalized = jacobian / sigma_px;
+  return true;
+}
+
+std::unique_ptr<ceres::CostFunction> CreateCameraCost(
+    const colmap::Camera& camera, const Eigen::Vector2d& xy, double sigma_px,
+    const AdjustedPose* pose) {
+  switch (camera.ModelId()) {
+#define CAMERA_MODEL_CASE(Model)                         \
+  case colmap::Model::kModelId:                          \
+    return std::make_unique<ceres::AutoDiffCostFunction< \
+        CameraReprojectionCost<colmap::Model>, 2, 6, 3,  \
+        static_cast<int>(colmap::Model::kNumParams)>>(   \
+        new CameraReprojectionCost<colmap::Model>(xy, sigma_px, pose));
+    CAMERA_MODEL_CASES
+#undef CAMERA_MODEL_CASE
+  }
+  return nullptr;
+}
+
+}  // namespace adasfm

@@ -1,0 +1,114 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "colmap_ext/bundle_adjustment/find_focal_length_error.h"
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include "core/so3.h"
+
+namespace adasfm {
+namespace {
+
+// Calibrations of one camera differ by some tenths of a per cent.
+constexpr double kMinRatio = 0.003;
+// Priors share errors from step to step, which the cost's change does not
+// show: many sigmas, and never less than this.
+constexpr double kMinNumSigmas = 10.0;
+constexpr double kMinSigma = 0.001;
+// Straight on such errors pass for 8 % of focal length; turns tell.
+constexpr double kMinTurnDeg = 20.0;
+// One focal length needs no more, and the time stays bounded.
+constexpr size_t kMaxNumImages = 300;
+
+// The consecutive images, by their priors, that turn most: a straight drive
+// says nothing of focal lengths.
+PriorBundleAdjustmentProblem SelectImages(
+    const PriorBundleAdjustmentProblem& problem) {
+  const std::vector<PosePriorEdge>& priors = problem.priors;
+  if (problem.images.size() <= kMaxNumImages || priors.size() < kMaxNumImages) {
+    return problem;
+  }
+  std::vector<double> turn = {0.0};
+  for (const PosePriorEdge& prior : priors) {
+    const double angle = std::isfinite(prior.rotation_sigma_rad)
+                             ? LogSo3(prior.cam2_from_cam1.rotation).norm()
+                             : 0.0;
+    turn.push_back(turn.back() + angle);
+  }
+  const size_t length = kMaxNumImages - 1;
+  size_t best = 0;
+  for (size_t k = 0; k + length < turn.size(); ++k) {
+    if (turn[k + length] - turn[k] > turn[best + length] - turn[best]) best = k;
+  }
+  PriorBundleAdjustmentProblem selected;
+  selected.priors.assign(priors.begin() + best, priors.begin() + best + length);
+  for (const PosePriorEdge& prior : selected.priors) {
+    selected.images.insert({prior.image_id1, prior.image_id2});
+  }
+  return selected;
+}
+
+// The farthest that the drive turns from its first direction.
+double LargestTurnRad(const std::vector<PosePriorEdge>& priors) {
+  Eigen::Quaterniond turned = Eigen::Quaterniond::Identity();
+  double largest = 0.0;
+  for (const PosePriorEdge& prior : priors) {
+    if (!std::isfinite(prior.rotation_sigma_rad)) continue;
+    turned = prior.cam2_from_cam1.rotation * turned;
+    largest = std::max(largest, LogSo3(turned).norm());
+  }
+  return largest;
+}
+
+// Of the camera that is farthest from 1.
+double FarthestRatio(const colmap::Reconstruction& before,
+                     const colmap::Reconstruction& after) {
+  double farthest = 1.0;
+  for (const auto& [camera_id, camera] : before.Cameras()) {
+    const double ratio =
+        after.Camera(camera_id).MeanFocalLength() / camera.MeanFocalLength();
+    if (std::abs(ratio - 1.0) > std::abs(farthest - 1.0)) farthest = ratio;
+  }
+  return farthest;
+}
+
+}  // namespace
+
+std::optional<FocalLengthError> FindFocalLengthError(
+    const PriorBalanceOptions& balance,
+    const PriorBundleAdjustmentOptions& options,
+    const PriorBundleAdjustmentProblem& whole_problem,
+    const colmap::Reconstruction& reconstruction) {
+  const PriorBundleAdjustmentProblem problem = SelectImages(whole_problem);
+  if (LargestTurnRad(problem.priors) < DegToRad(kMinTurnDeg)) {
+    return std::nullopt;
+  }
+  colmap::Reconstruction given = reconstruction;
+  const PriorBundleAdjustmentSummary with_given =
+      AdjustBundle(options, problem, &given);
+  PriorBundleAdjustmentOptions free_options = options;
+  free_options.refine_focal_length = true;
+  colmap::Reconstruction free = given;
+  const PriorBundleAdjustmentSummary with_free =
+      AdjustBundle(free_options, problem, &free);
+  if (!with_given.success || !with_free.success ||
+      ComputePriorChi2PerDof(problem.priors, free) > balance.max_chi2_per_dof) {
+    return std::nullopt;
+  }
+  // Half the squares of the residuals are the cost.
+  const double variance =
+      std::max(1.0, 2.0 * with_free.final_cost / with_free.num_residuals);
+  const double num_sigmas = std::sqrt(
+      2.0 * std::max(0.0, with_given.final_cost - with_free.final_cost) /
+      variance);
+  FocalLengthError error;
+  error.ratio = FarthestRatio(reconstruction, free);
+  if (std::abs(error.ratio - 1.0) < kMinRatio || num_sigmas < kMinNumSigmas) {
+    return std::nullopt;
+  }
+  error.sigma = std::hypot(std::abs(error.ratio - 1.0) / num_sigmas, kMinSigma);
+  return error;
+}
+
+}  // namespace adasfm

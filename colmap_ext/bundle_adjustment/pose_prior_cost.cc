@@ -1,0 +1,186 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "colmap_ext/bundle_adjustment/pose_prior_cost.h"
+
+#include <cmath>
+
+#include "core/so3.h"
+
+namespace adasfm {
+namespace {
+
+// Translations shorter than this have no direction.
+constexpr double kMinLength = 1e-12;
+// Within this of the opposite direction an error has no direction either.
+constexpr double kMinSineOpposite = 0.02;
+
+Eigen::Matrix<double, 3, 2> OrthonormalComplement(const Eigen::Vector3d& unit) {
+  Eigen::Matrix<double, 3, 2> basis;
+  basis.col(0) = unit.unitOrthogonal();
+  basis.col(1) = unit.cross(basis.col(0));
+  return basis;
+}
+
+// Writes the 3-column Jacobians of both poses as Ceres wants them: row-major
+// num_residuals x 6 (rotation, centre).
+template <int kRows>
+void WriteJacobian(const Eigen::Matrix<double, kRows, 3>& rotation,
+                   const Eigen::Matrix<double, kRows, 3>& center,
+                   double* target) {
+  if (target == nullptr) return;
+  for (int row = 0; row < kRows; ++row) {
+    for (int col = 0; col < 3; ++col) {
+      target[6 * row + col] = rotation(row, col);
+      target[6 * row + 3 + col] = center(row, col);
+    }
+  }
+}
+
+// Those of a term with this Jacobian by t.
+template <int kRows>
+void WriteTranslationJacobians(
+    const Eigen::Matrix<double, kRows, 3>& from_translation,
+    const Eigen::Vector3d& translation, const AdjustedPose& pose2,
+    double** jacobians) {
+  const Eigen::Matrix<double, kRows, 3> from_center =
+      from_translation * pose2.rotation;
+  WriteJacobian<kRows>(Eigen::Matrix<double, kRows, 3>::Zero(), from_center,
+                       jacobians[0]);
+  WriteJacobian<kRows>(
+      -from_translation * Hat(translation) * pose2.left_jacobian, -from_center,
+      jacobians[1]);
+}
+
+}  // namespace
+
+Eigen::Vector2d DirectionError(const Eigen::Vector3d& vector,
+                               const Eigen::Vector3d& unit_reference,
+                               const Eigen::Matrix<double, 3, 2>& basis,
+                               Eigen::Matrix<double, 2, 3>* jacobian) {
+  if (jacobian != nullptr) jacobian->setZero();
+  const double length = vector.norm();
+  if (!(length > kMinLength)) return Eigen::Vector2d::Zero();
+  const Eigen::Vector3d unit = vector / length;
+  const Eigen::Vector2d in_plane = basis.transpose() * unit;
+  const double sine = in_plane.norm();
+  const double cosine = unit.dot(unit_reference);
+  const double angle = std::atan2(sine, cosine);
+  // Nearly opposite: every way back is equally long.
+  if (cosine < 0.0 && sine < kMinSineOpposite) {
+    return Eigen::Vector2d(kPi, 0.0);
+  }
+  const bool is_near = cosine > 0.0 && sine < 1e-4;
+  // angle / sin(angle) and its change, by their series near zero.
+  const double ratio = is_near ? 1.0 + sine * sine / 6.0 : angle / sine;
+  if (jacobian != nullptr) {
+    const double slope =
+        is_near ? -2.0 / 3.0 : (cosine - ratio) / (sine * sine);
+    const Eigen::Matrix<double, 2, 3> in_plane_from_unit = basis.transpose();
+    const Eigen::Matrix<double, 2, 3> error_from_unit =
+        ratio * in_plane_from_unit +
+        in_plane * (slope * in_plane.transpose() * in_plane_from_unit -
+                    unit_reference.transpose());
+    *jacobian =
+        (error_from_unit - error_from_unit * unit * unit.transpose()) / length;
+  }
+  return in_plane * ratio;
+}
+
+PosePriorCost::PosePriorCost(const PosePriorEdge& edge, Term term,
+                             const AdjustedPose* pose1,
+                             const AdjustedPose* pose2)
+    : term_(term),
+      pose1_(pose1),
+      pose2_(pose2),
+      rotation_(edge.cam2_from_cam1.rotation),
+      translation_(edge.cam2_from_cam1.translation),
+      length_(edge.cam2_from_cam1.translation.norm()) {
+  if (length_ > kMinLength) {
+    direction_ = edge.cam2_from_cam1.translation / length_;
+  }
+  basis_ = OrthonormalComplement(direction_);
+  int num_residuals = 3;
+  double sigma = edge.rotation_sigma_rad;
+  if (term == Term::kDirection) {
+    num_residuals = 2;
+    sigma = edge.direction_sigma_rad;
+  } else if (term == Term::kLength) {
+    num_residuals = 1;
+    sigma = edge.length_sigma_m;
+  } else if (term == Term::kTranslation) {
+    sigma = edge.translation_sigma_m;
+  }
+  inverse_sigma_ = 1.0 / sigma;
+  set_num_residuals(num_residuals);
+  *mutable_parameter_block_sizes() = {6, 6};
+}
+
+bool PosePriorCost::Evaluate(double const* const*, double* residuals,
+                             double** jacobians) const {
+  double* no_jacobians[2] = {nullptr, nullptr};
+  if (jacobians == nullptr) jacobians = no_jacobians;
+  if (term_ == Term::kRotation) {
+    EvaluateRotation(residuals, jacobians);
+  } else {
+    EvaluateTranslation(residuals, jacobians);
+  }
+  return true;
+}
+
+void PosePriorCost::EvaluateRotation(double* residuals,
+                                     double** jacobians) const {
+  const Eigen::Matrix3d cam2_from_cam1 =
+      pose2_->rotation * pose1_->rotation.transpose();
+  const Eigen::Vector3d error =
+      LogSo3(Eigen::Quaterniond(cam2_from_cam1) * rotation_.conjugate());
+  Eigen::Map<Eigen::Vector3d> residual(residuals);
+  residual = inverse_sigma_ * error;
+  if (jacobians[0] == nullptr && jacobians[1] == nullptr) return;
+  // Exp(b) R Exp(-a) = Exp(b) Exp(-R a) R: the error moves by Jl^-1 (b - R a).
+  const Eigen::Matrix3d from_turn2 =
+      inverse_sigma_ * RightJacobianInverseSo3(-error);
+  const Eigen::Matrix3d zero = Eigen::Matrix3d::Zero();
+  WriteJacobian<3>(-from_turn2 * cam2_from_cam1 * pose1_->left_jacobian, zero,
+                   jacobians[0]);
+  WriteJacobian<3>(from_turn2 * pose2_->left_jacobian, zero, jacobians[1]);
+}
+
+// t = R_2 (C_1 - C_2): dt = -Hat(t) Jl dw_2 + R_2 (dc_1 - dc_2).
+void PosePriorCost::EvaluateTranslation(double* residuals,
+                                        double** jacobians) const {
+  const Eigen::Vector3d translation =
+      pose2_->rotation * (pose1_->center - pose2_->center);
+  const bool needs_jacobian =
+      jacobians[0] != nullptr || jacobians[1] != nullptr;
+  if (term_ == Term::kLength) {
+    const double length = translation.norm();
+    residuals[0] = inverse_sigma_ * (length - length_);
+    Eigen::Matrix<double, 1, 3> from_translation =
+        Eigen::Matrix<double, 1, 3>::Zero();
+    if (length > kMinLength) {
+      from_translation = inverse_sigma_ * translation.transpose() / length;
+    }
+    // A turn of camera 2 leaves the length as it is.
+    const Eigen::Matrix<double, 1, 3> zero =
+        Eigen::Matrix<double, 1, 3>::Zero();
+    const Eigen::Matrix<double, 1, 3> from_center =
+        from_translation * pose2_->rotation;
+    WriteJacobian<1>(zero, from_center, jacobians[0]);
+    WriteJacobian<1>(zero, -from_center, jacobians[1]);
+  } else if (term_ == Term::kDirection) {
+    Eigen::Matrix<double, 2, 3> from_translation;
+    Eigen::Map<Eigen::Vector2d> residual(residuals);
+    residual = inverse_sigma_ *
+               DirectionError(translation, direction_, basis_,
+                              needs_jacobian ? &from_translation : nullptr);
+    if (!needs_jacobian) return;
+    WriteTranslationJacobians<2>(inverse_sigma_ * from_translation, translation,
+                                 *pose2_, jacobians);
+  } else {
+    Eigen::Map<Eigen::Vector3d> residual(residuals);
+    residual = inverse_sigma_ * (translation - translation_);
+    WriteTranslationJacobians<3>(inverse_sigma_ * Eigen::Matrix3d::Identity(),
+                                 translation, *pose2_, jacobians);
+  }
+}
+
+}  // namespace adasfm

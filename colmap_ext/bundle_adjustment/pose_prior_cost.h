@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <ceres/cost_function.h>
+
+#include <Eigen/Core>
+
+#include "colmap_ext/bundle_adjustment/adjusted_pose.h"
+#include "colmap_ext/bundle_adjustment/bundle_adjustment.h"
+
+namespace adasfm {
+
+// The 2-vector in the tangent plane of unit_reference that leads from it
+// towards `vector`; its norm is the angle between the two. Zero, with a zero
+// Jacobian, when the vector has no direction; the Jacobian is zero too when the
+// two are opposite. basis: 3x2, orthonormal to unit_reference; jacobian
+// (optional): d result / d vector.
+Eigen::Vector2d DirectionError(const Eigen::Vector3d& vector,
+                               const Eigen::Vector3d& unit_reference,
+                               const Eigen::Matrix<double, 3, 2>& basis,
+                               Eigen::Matrix<double, 2, 3>* jacobian);
+
+// One whitened term of a PosePriorEdge (see there). With R = R_2 R_1^T and
+// t = R_2 (C_1 - C_2) of the current poses:
+//   kRotation:  Log(R R^^T) / sigma      3 residuals
+//   kDirection: DirectionError(t, t^) / sigma  2 residuals
+//   kLength:    (|t| - |t^|) / sigma     1 residual
+//   kTranslation: (t - t^) / sigma       3 residuals
+// Parameters: AdjustedPose::parameters of image 1 (6) and of image 2 (6). The
+// poses are read from the objects, which must be up to date. One cost per term,
+// so that the robust loss can drop a wrong term and keep the others.
+class PosePriorCost final : public ceres::CostFunction {
+ public:
+  enum class Term { kRotation, kDirection, kLength, kTranslation };
+
+  PosePriorCost(const PosePriorEdge& edge, Term term, const AdjustedPose* pose1,
+                const AdjustedPose* pose2);
+
+  bool Evaluate(double const* const* parameters, double* residuals,
+                double** jacobians) const final;
+
+ private:
+  void EvaluateRotation(double* residuals, double** jacobians) const;
+  void EvaluateTranslation(double* residuals, double** jacobians) const;
+
+  Term term_;
+  const AdjustedPose* pose1_;
+  const AdjustedPose* pose2_;
+  Eigen::Quaterniond rotation_;
+  Eigen::Vector3d direction_ = Eigen::Vector3d::UnitZ();
+  Eigen::Matrix<double, 3, 2> basis_;
+  Eigen::Vector3d translation_;
+  double length_ = 0.0;
+  double inverse_sigma_ = 1.0;
+};
+
+}  // namespace adasfm

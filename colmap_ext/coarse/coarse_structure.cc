@@ -1,0 +1,288 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "colmap_ext/coarse/coarse_structure.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "colmap_ext/coarse/select_coarse_points.h"
+#include "colmap_ext/host/pose_conversion.h"
+#include "colmap_ext/scene/align_to_gravity.h"
+#include "colmap_ext/scene/scene_bearings.h"
+
+namespace adasfm {
+namespace {
+
+// Cameras are those of the model before, as far as it has adjusted them.
+colmap::Reconstruction CreateReconstruction(
+    const SceneData& scene, const std::map<image_t, Rigid3d>& cams_from_world,
+    const colmap::Reconstruction& before) {
+  colmap::Reconstruction reconstruction;
+  for (const auto& [image_id, pose] : cams_from_world) {
+    const SceneImage& scene_image = scene.images.at(image_id);
+    if (!reconstruction.ExistsCamera(scene_image.camera_id)) {
+      reconstruction.AddCamera(before.ExistsCamera(scene_image.camera_id)
+                                   ? before.Camera(scene_image.camera_id)
+                                   : scene.cameras.at(scene_image.camera_id));
+    }
+    colmap::Image image;
+    image.SetImageId(image_id);
+    image.SetName(scene_image.name);
+    image.SetCameraId(scene_image.camera_id);
+    image.SetPoints2D(scene_image.keypoints);
+    SetCamFromWorld(pose, &image);
+    reconstruction.AddImage(image);
+    reconstruction.RegisterImage(image_id);
+  }
+  return reconstruction;
+}
+
+void AddPoints(const std::vector<TriangulatedTrack>& points,
+               colmap::Reconstruction* reconstruction) {
+  for (const TriangulatedTrack& point : points) {
+    colmap::Track track;
+    track.Reserve(point.track.size());
+    for (const TrackElement& element : point.track) {
+      track.AddElement(element.image_id, element.point2D_idx);
+    }
+    reconstruction->AddPoint3D(point.point_in_world, track);
+  }
+}
+
+PriorBundleAdjustmentProblem CreateProblem(
+    const CoarseStructureOptions& options, const CoarseModelInput& input) {
+  PriorBundleAdjustmentProblem problem;
+  for (const auto& [image_id, pose] : input.cams_from_world) {
+    problem.images.insert(image_id);
+  }
+  if (!options.use_priors) return problem;
+  for (const RelativePosePrior& prior : input.priors) {
+    if (problem.images.count(prior.image_id1) == 0 ||
+        problem.images.count(prior.image_id2) == 0) {
+      continue;
+    }
+    PosePriorEdge edge = PosePriorEdgeFromPrior(prior);
+    if (!input.metric) {
+      edge.length_sigma_m = std::numeric_limits<double>::infinity();
+      edge.translation_sigma_m = std::numeric_limits<double>::infinity();
+    }
+    problem.priors.push_back(edge);
+  }
+  return problem;
+}
+
+void FillFigures(const CoarseStructureOptions& options,
+                 const PriorBundleAdjustmentProblem& problem,
+                 CoarseModel* model) {
+  const colmap::Reconstruction& reconstruction = model->reconstruction;
+  model->num_points = reconstruction.NumPoints3D();
+  model->num_observations = reconstruction.ComputeNumObservations();
+  model->mean_reproj_error_px =
+      model->num_points == 0 ? 0.0
+                             : reconstruction.ComputeMeanReprojectionError();
+  for (const image_t image_id : reconstruction.RegImageIds()) {
+    const int num_points = reconstruction.Image(image_id).NumPoints3D();
+    model->num_images_without_points += num_points == 0;
+    model->num_images_with_few_points +=
+        num_points < options.min_num_points_per_image;
+  }
+  model->prior_chi2_per_dof =
+      ComputePriorChi2PerDof(problem.priors, reconstruction);
+  model->priors_agree =
+      model->prior_chi2_per_dof <= options.balance.max_chi2_per_dof;
+}
+
+// The threshold falls from round to round, geometrically.
+TrackTriangulationOptions TriangulationOptions(
+    const CoarseStructureOptions& options, int round) {
+  TrackTriangulationOptions triangulation = options.triangulation;
+  triangulation.min_triangulation_angle_deg =
+      std::min(options.min_angle_floor_deg,
+               options.triangulation.min_triangulation_angle_deg);
+  const double ratio = options.final_max_reproj_error_px /
+                       options.triangulation.max_reproj_error_px;
+  const double progress = options.num_rounds > 1 ? static_cast<double>(round) /
+                                                       (options.num_rounds - 1)
+                                                 : 1.0;
+  triangulation.max_reproj_error_px *= std::pow(ratio, progress);
+  return triangulation;
+}
+
+struct RoundTracks {
+  std::vector<Track> all;
+  // Of the rounds before the last, unless all images are keyframes.
+  std::vector<Track> within_keyframes;
+  bool has_keyframes = false;
+  size_t num_keyframes = 0;
+
+  const std::vector<Track>& Of(bool is_last_round) const {
+    return has_keyframes && !is_last_round ? within_keyframes : all;
+  }
+};
+
+RoundTracks BuildRoundTracks(const CoarseStructureOptions& options,
+                             const CoarseModelInput& input,
+                             const std::set<image_t>& images) {
+  std::vector<Track> joined = JoinMatches(options.tracks, input.matches);
+  const bool has_metres = input.metric && options.use_priors;
+  const std::set<image_t> keyframes =
+      has_metres
+          ? SelectKeyframes(options.keyframes, images, joined, input.priors)
+          : images;
+  RoundTracks tracks;
+  tracks.num_keyframes = keyframes.size();
+  tracks.has_keyframes = keyframes.size() < images.size();
+  if (tracks.has_keyframes) {
+    tracks.within_keyframes = SelectTracks(
+        options.tracks, RestrictTracks(options.tracks, joined, keyframes));
+  }
+  tracks.all = SelectTracks(options.tracks, std::move(joined));
+  return tracks;
+}
+
+// The model of a round before its adjustment: the poses (and cameras) so far,
+// and points triangulated afresh from them.
+void BuildRound(const CoarseStructureOptions& options, const SceneData& scene,
+                const std::map<image_t, std::vector<Bearing>>& bearings,
+                const CoarseModelInput& input, const RoundTracks& tracks,
+                int round, CoarseModel* model) {
+  const bool is_first = round == 0;
+  const std::map<image_t, Rigid3d> cams_from_world =
+      is_first ? input.cams_from_world : CamsFromWorld(model->reconstruction);
+  std::map<image_t, std::vector<Bearing>> refined;
+  if (!is_first && options.bundle.RefinesCameras()) {
+    refined = ComputeModelBearings(model->reconstruction,
+                                   options.triangulation.num_threads);
+  }
+  std::vector<TriangulatedTrack> points =
+      TriangulateTracks(TriangulationOptions(options, round), cams_from_world,
+                        refined.empty() ? bearings : refined,
+                        tracks.Of(round + 1 == options.num_rounds));
+  model->reconstruction =
+      CreateReconstruction(scene, cams_from_world, model->reconstruction);
+  AddPoints(
+      SelectCoarsePoints(options, std::move(points), &model->min_angle_deg),
+      &model->reconstruction);
+}
+
+// The balance of vision and priors means something at the optimum only, so the
+// last round finds it.
+PriorBundleAdjustmentSummary AdjustRound(
+    const CoarseStructureOptions& options,
+    const PriorBundleAdjustmentProblem& problem, int round,
+    colmap::Reconstruction* reconstruction, double* keypoint_sigma_factor) {
+  PriorBundleAdjustmentOptions bundle = options.bundle;
+  PriorBalanceOptions balance = options.balance;
+  if (round + 1 < options.num_rounds) {
+    bundle.function_tolerance =
+        std::max(bundle.function_tolerance, options.early_function_tolerance);
+    balance.enabled = false;
+  }
+  return AdjustBundleInBalance(balance, bundle, problem, reconstruction,
+                               keypoint_sigma_factor);
+}
+
+bool KnowsFocalLengths(const colmap::Reconstruction& reconstruction) {
+  return std::all_of(
+      reconstruction.Cameras().begin(), reconstruction.Cameras().end(),
+      [](const auto& entry) { return entry.second.HasPriorFocalLength(); });
+}
+
+// The last round once more, after an adjustment that has found the focal
+// length.
+void RepeatWithFreeFocalLength(
+    CoarseStructureOptions options, const SceneData& scene,
+    const std::map<image_t, std::vector<Bearing>>& bearings,
+    const CoarseModelInput& input, const RoundTracks& tracks,
+    const PriorBundleAdjustmentProblem& problem, double* keypoint_sigma_factor,
+    CoarseModel* model) {
+  const int last = options.num_rounds - 1;
+  options.bundle.refine_focal_length = true;
+  *keypoint_sigma_factor = 1.0;
+  model->cameras_refined = true;
+  model->rounds.push_back(AdjustRound(
+      options, problem, last, &model->reconstruction, keypoint_sigma_factor));
+  BuildRound(options, scene, bearings, input, tracks, last, model);
+  model->rounds.push_back(AdjustRound(
+      options, problem, last, &model->reconstruction, keypoint_sigma_factor));
+}
+
+}  // namespace
+
+bool CoarseStructureOptions::IsValid(std::string* error) const {
+  if (!tracks.IsValid(error) || !triangulation.IsValid(error) ||
+      !bundle.IsValid(error) || !balance.IsValid(error) ||
+      !keyframes.IsValid(error)) {
+    return false;
+  }
+  if (num_rounds < 1) {
+    *error = "num_rounds is " + std::to_string(num_rounds) +
+             ", but must be at least 1";
+    return false;
+  }
+  if (!(min_angle_floor_deg > 0.0)) {
+    *error = "min_angle_floor_deg is " + std::to_string(min_angle_floor_deg) +
+             ", but must be positive";
+    return false;
+  }
+  if (!(early_function_tolerance >= 0.0)) {
+    *error = "early_function_tolerance is " +
+             std::to_string(early_function_tolerance) +
+             ", but must not be negative";
+    return false;
+  }
+  if (min_num_points_per_image < 0) {
+    *error = "min_num_points_per_image must not be negative";
+    return false;
+  }
+  if (!(final_max_reproj_error_px > 0.0)) {
+    *error = "final_max_reproj_error_px is " +
+             std::to_string(final_max_reproj_error_px) +
+             ", but must be positive";
+    return false;
+  }
+  return true;
+}
+
+CoarseModel BuildCoarseModel(
+    const CoarseStructureOptions& options, const SceneData& scene,
+    const std::map<image_t, std::vector<Bearing>>& bearings,
+    const CoarseModelInput& input) {
+  CoarseModel model;
+  model.metric = input.metric;
+  model.max_track_bytes = EstimateTrackBytes(input.matches);
+  const PriorBundleAdjustmentProblem problem = CreateProblem(options, input);
+  const RoundTracks tracks = BuildRoundTracks(options, input, problem.images);
+  model.num_tracks = tracks.all.size();
+  model.num_keyframes = tracks.num_keyframes;
+
+  double keypoint_sigma_factor = 1.0;
+  for (int round = 0; round < options.num_rounds; ++round) {
+    BuildRound(options, scene, bearings, input, tracks, round, &model);
+    model.rounds.push_back(AdjustRound(options, problem, round,
+                                       &model.reconstruction,
+                                       &keypoint_sigma_factor));
+    if (!model.rounds.back().success) break;
+  }
+  model.cameras_refined = options.bundle.RefinesCameras();
+  if (model.rounds.back().success && !model.cameras_refined) {
+    model.focal_length_error = FindFocalLengthError(
+        options.balance, options.bundle, problem, model.reconstruction);
+  }
+  if (model.focal_length_error && options.refine_unknown_focal_length &&
+      !KnowsFocalLengths(model.reconstruction)) {
+    RepeatWithFreeFocalLength(options, scene, bearings, input, tracks, problem,
+                              &keypoint_sigma_factor, &model);
+  }
+  model.reconstruction.FilterAllPoints3D(
+      options.final_max_reproj_error_px,
+      std::min(options.min_angle_floor_deg,
+               options.triangulation.min_triangulation_angle_deg));
+  model.gravity_aligned =
+      AlignToGravity(scene, &model.reconstruction, input.camera_mount);
+  model.keypoint_sigma_px =
+      options.bundle.keypoint_sigma_px * keypoint_sigma_factor;
+  FillFigures(options, problem, &model);
+  return model;
+}
+
+}  // namespace adasfm

@@ -1,0 +1,279 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "colmap_ext/coarse/global_report.h"
+
+#include <cmath>
+#include <iomanip>
+#include <nlohmann/json.hpp>
+#include <sstream>
+
+#include "core/so3.h"
+
+namespace adasfm {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+// Fewer pairs between two parts are no news.
+constexpr int kMinNumReportedPairs = 3;
+
+Json JoinsJson(const SceneData& scene,
+               const std::vector<UnverifiedJoin>& joins) {
+  Json json = Json::array();
+  for (const UnverifiedJoin& join : joins) {
+    json.push_back({{"name1", scene.images.at(join.image_id1).name},
+                    {"name2", scene.images.at(join.image_id2).name},
+                    {"pairs", join.num_pairs},
+                    {"images", join.num_images}});
+  }
+  return json;
+}
+
+Json JoinFilterJson(const SceneData& scene, const JoinFilterReport& joins) {
+  Json split = Json::array();
+  for (const SplitJoin& join : joins.split) {
+    split.push_back({{"name1", scene.images.at(join.image_id1).name},
+                     {"name2", scene.images.at(join.image_id2).name},
+                     {"pairs", join.num_pairs},
+                     {"images", join.num_images}});
+  }
+  return {{"parts", joins.num_parts},
+          {"confirmed", joins.num_confirmed},
+          {"pairs_removed", joins.num_removed_pairs},
+          {"not_made", split}};
+}
+
+std::string DescribeSplitJoin(const SceneData& scene, const SplitJoin& join) {
+  std::ostringstream text;
+  text << "a part of " << join.num_images << " images may join another where "
+       << join.num_pairs << " pairs like "
+       << scene.images.at(join.image_id1).name << " and "
+       << scene.images.at(join.image_id2).name
+       << " agree, but neither sensors nor a second place confirm it, and "
+          "look-alike places do the same: both stay apart "
+          "(--AdaSfmGlobal.split_unverified_joins 0 joins them)";
+  return text.str();
+}
+
+Json ModelJson(const SceneData& scene, const CoarseComponent& component,
+               const CoarseModel& model) {
+  const FocalLengthError focal =
+      model.focal_length_error.value_or(FocalLengthError());
+  Json rounds = Json::array();
+  for (const PriorBundleAdjustmentSummary& round : model.rounds) {
+    rounds.push_back({{"success", round.success},
+                      {"images", round.num_images},
+                      {"points", round.num_points},
+                      {"residuals", round.num_residuals},
+                      {"iterations", round.num_iterations},
+                      {"initial_cost", round.initial_cost},
+                      {"final_cost", round.final_cost},
+                      {"seconds", round.seconds},
+                      {"message", round.message}});
+  }
+  return {{"images", model.reconstruction.NumRegImages()},
+          {"images_without_points", model.num_images_without_points},
+          {"images_with_few_points", model.num_images_with_few_points},
+          {"tracks", model.num_tracks},
+          {"keyframes", model.num_keyframes},
+          {"max_track_bytes", model.max_track_bytes},
+          {"points", model.num_points},
+          {"observations", model.num_observations},
+          {"mean_reproj_error_px", model.mean_reproj_error_px},
+          {"min_triangulation_angle_deg", model.min_angle_deg},
+          {"keypoint_sigma_px", model.keypoint_sigma_px},
+          {"prior_chi2_per_dof", model.prior_chi2_per_dof},
+          {"priors_agree", model.priors_agree},
+          {"focal_length_ratio", focal.ratio},
+          {"focal_length_ratio_sigma", focal.sigma},
+          {"cameras_refined", model.cameras_refined},
+          {"metric", model.metric},
+          {"gravity_aligned", model.gravity_aligned},
+          {"rotations_converged", component.rotations_converged},
+          {"positions_converged", component.positions_converged},
+          {"direction_agreement", component.direction_agreement},
+          {"least_direction_agreement", component.least_direction_agreement},
+          {"rotation_optimality", component.sdp_optimality},
+          {"unverified_joins", JoinsJson(scene, component.unverified_joins)},
+          {"adjustments", rounds}};
+}
+
+Json MountJson(const CameraMountReport& mount) {
+  const Eigen::Matrix3d turn = ExpSo3(mount.turn_rad).toRotationMatrix();
+  Json rows = Json::array();
+  for (int row = 0; row < 3; ++row) {
+    rows.push_back({turn(row, 0), turn(row, 1), turn(row, 2)});
+  }
+  return {{"corrected", mount.corrected},
+          {"pairs", mount.num_pairs},
+          {"angle_deg", RadToDeg(mount.turn_rad.norm())},
+          {"sigma_deg", RadToDeg(mount.sigma_rad)},
+          {"chi2", mount.chi2},
+          {"residual_variance", mount.residual_variance},
+          {"turn_deg",
+           {RadToDeg(mount.turn_rad.x()), RadToDeg(mount.turn_rad.y()),
+            RadToDeg(mount.turn_rad.z())}},
+          {"true_from_stated", rows}};
+}
+
+void AppendMountWarning(const CameraMountReport& mount,
+                        std::vector<std::string>* warnings) {
+  if (!mount.corrected) return;
+  std::ostringstream text;
+  text << std::fixed << std::setprecision(2) << "the camera's mount is "
+       << RadToDeg(mount.turn_rad.norm()) << " +- " << RadToDeg(mount.sigma_rad)
+       << " deg off what T_cam_imu says (turned by "
+       << RadToDeg(mount.turn_rad.x()) << ", " << RadToDeg(mount.turn_rad.y())
+       << ", " << RadToDeg(mount.turn_rad.z())
+       << " deg about the camera's x, y, z); priors were corrected. Put "
+          "true_from_stated of summary.json, times T_cam_imu, into "
+          "--sensors_path";
+  warnings->push_back(text.str());
+}
+
+void AppendPriorWarnings(const CoarseModel& model,
+                         std::vector<std::string>* warnings) {
+  std::ostringstream text;
+  text << std::fixed << std::setprecision(1);
+  if (model.focal_length_error) {
+    const FocalLengthError& error = *model.focal_length_error;
+    text << std::setprecision(2)
+         << "vision and sensors agree with a focal length that is "
+         << 100.0 * std::abs(error.ratio - 1.0) << " +- " << 100.0 * error.sigma
+         << " % " << (error.ratio > 1.0 ? "longer" : "shorter")
+         << " than the database says";
+    if (model.cameras_refined) {
+      text << "; it was refined, as it is not marked as known";
+    } else {
+      text << ": check the intrinsics, or have them refined "
+              "(--AdaSfmGlobal.ba_refine_focal_length 1 and "
+              "--AdaSfmMapper.refine_focal_length 1)";
+    }
+  } else if (!model.priors_agree) {
+    text << "vision and sensors contradict each other (squared errors of the "
+            "sensors are "
+         << model.prior_chi2_per_dof
+         << " times what their noise allows, though keypoints were taken for "
+         << model.keypoint_sigma_px
+         << " px): check the intrinsics, T_cam_imu, timeshift_cam_imu and the "
+            "noise figures of the sensors";
+  } else {
+    return;
+  }
+  warnings->push_back(text.str());
+}
+
+}  // namespace
+
+std::string FormatGlobalReportJson(const SceneData& scene,
+                                   const GlobalStageResult& result,
+                                   double total_seconds) {
+  Json report;
+  report["seconds"] = total_seconds;
+  report["images"] = scene.images.size();
+  report["pairs"] = scene.pairs.size();
+  report["priors"] = scene.priors.size();
+  Json removals = Json::object();
+  for (const auto& [removal, count] : CountRemovals(result.poses.graph)) {
+    removals[EdgeRemovalName(removal)] = count;
+  }
+  report["edges"] = removals;
+  report["camera_mount"] = MountJson(result.poses.camera_mount);
+  const RotationRateReport& rates = result.poses.rotation_rates;
+  report["rotation_rates"] = {{"corrected", rates.corrected},
+                              {"pairs", rates.num_pairs},
+                              {"max_rate_rad_s", rates.max_rate_rad_s},
+                              {"vision_offset_rad", rates.offset_rad.norm()}};
+  report["joins"] = JoinFilterJson(scene, result.poses.join_filter);
+  for (size_t i = 0; i < result.models.size(); ++i) {
+    report["models"].push_back(
+        ModelJson(scene, result.poses.components[i], result.models[i]));
+  }
+  report["matches"] = {{"candidates", result.refinement.num_candidates},
+                       {"kept", result.refinement.num_kept},
+                       {"pairs_written", result.geometries.size()},
+                       {"pairs_removed", result.removed_pairs.size()},
+                       {"pairs_skipped", result.refinement.num_skipped_pairs}};
+  report["warnings"] = ListGlobalWarnings(scene, result);
+  for (const StepReport& step : result.steps) {
+    report["steps"].push_back({{"name", step.name},
+                               {"seconds", step.seconds},
+                               {"summary", step.summary}});
+  }
+  return report.dump(2) + "\n";
+}
+
+std::string FormatGlobalReportText(const GlobalStageResult& result,
+                                   double total_seconds) {
+  std::ostringstream text;
+  text << std::fixed << std::setprecision(2);
+  for (const StepReport& step : result.steps) {
+    text << std::setw(8) << step.seconds << " s  " << step.name << ": "
+         << step.summary << "\n";
+  }
+  for (size_t i = 0; i < result.models.size(); ++i) {
+    const CoarseModel& model = result.models[i];
+    text << "Model " << i << ": " << model.reconstruction.NumRegImages()
+         << " images, " << model.num_points << " points, "
+         << (model.metric ? "in metres" : "scale unknown") << ", "
+         << (model.gravity_aligned ? "z up" : "gravity unknown");
+    const CoarseComponent& component = result.poses.components[i];
+    if (!component.rotations_converged) text << ", rotations not converged";
+    if (!component.positions_converged) text << ", positions not converged";
+    text << "; directions agree to " << 100.0 * component.direction_agreement
+         << " %, at the worst image "
+         << 100.0 * component.least_direction_agreement << " %\n";
+  }
+  text << "Total: " << total_seconds << " s\n";
+  return text.str();
+}
+
+std::vector<std::string> ListGlobalWarnings(const SceneData& scene,
+                                            const GlobalStageResult& result) {
+  std::vector<std::string> warnings;
+  AppendMountWarning(result.poses.camera_mount, &warnings);
+  for (const CoarseModel& model : result.models) {
+    AppendPriorWarnings(model, &warnings);
+  }
+  for (const SplitJoin& join : result.poses.join_filter.split) {
+    if (join.num_pairs >= kMinNumReportedPairs) {
+      warnings.push_back(DescribeSplitJoin(scene, join));
+    }
+  }
+  for (const CoarseComponent& component : result.poses.components) {
+    if (!component.positions_converged) {
+      std::ostringstream text;
+      text << std::fixed << std::setprecision(0)
+           << "coarse positions did not converge: "
+           << 100.0 * component.direction_agreement
+           << " % of the directions agree with them, at the worst image "
+           << 100.0 * component.least_direction_agreement
+           << " %; wrong pairs outvote right ones, or the overlap is small: "
+              "look at the report, add sensors or match more pairs";
+      warnings.push_back(text.str());
+    }
+    for (const UnverifiedJoin& join : component.unverified_joins) {
+      std::ostringstream text;
+      text << "a part of " << join.num_images
+           << " images is joined to the rest at one place only ("
+           << join.num_pairs << " pairs like "
+           << scene.images.at(join.image_id1).name << " and "
+           << scene.images.at(join.image_id2).name
+           << "); if the two places merely look alike the model is folded: "
+              "sensors (adasfm_prior_importer) or more overlap would tell";
+      warnings.push_back(text.str());
+    }
+  }
+  return warnings;
+}
+
+std::string FormatRemovedPairs(const SceneData& scene,
+                               const std::vector<ImagePair>& pairs) {
+  std::ostringstream text;
+  for (const ImagePair& pair : pairs) {
+    text << scene.images.at(pair.image_id1).name << " "
+         << scene.images.at(pair.image_id2).name << "\n";
+  }
+  return text.str();
+}
+
+}  // namespace adasfm

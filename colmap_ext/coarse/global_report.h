@@ -1,0 +1,29 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <string>
+
+#include "colmap_ext/coarse/global_stage.h"
+
+namespace adasfm {
+
+// The summary.json of adasfm_global: seconds and counts of every step, each
+// model with its convergence, what was removed and why.
+std::string FormatGlobalReportJson(const SceneData& scene,
+                                   const GlobalStageResult& result,
+                                   double total_seconds);
+
+// The same for the screen, a few lines.
+std::string FormatGlobalReportText(const GlobalStageResult& result,
+                                   double total_seconds);
+
+// Warnings for the user: positions that did not converge, parts of a model that
+// hang on one place.
+std::vector<std::string> ListGlobalWarnings(const SceneData& scene,
+                                            const GlobalStageResult& result);
+
+// One line `name1 name2` per removed pair.
+std::string FormatRemovedPairs(const SceneData& scene,
+                               const std::vector<ImagePair>& pairs);
+
+}  // namespace adasfm

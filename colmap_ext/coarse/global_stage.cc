@@ -1,0 +1,183 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "colmap_ext/coarse/global_stage.h"
+
+#include <chrono>
+#include <sstream>
+#include <stdexcept>
+
+#include "colmap_ext/coarse/refine_stage_matches.h"
+#include "colmap_ext/scene/scene_bearings.h"
+#include "core/so3.h"
+
+namespace adasfm {
+namespace {
+
+class Stopwatch {
+ public:
+  double Seconds() const {
+    return std::chrono::duration<double>(Clock::now() - start_).count();
+  }
+
+ private:
+  using Clock = std::chrono::steady_clock;
+  Clock::time_point start_ = Clock::now();
+};
+
+// One number of threads for all steps but the adjustment, whose own option says
+// why.
+GlobalStageOptions WithThreads(GlobalStageOptions options) {
+  options.two_view.num_threads = options.num_threads;
+  options.poses.num_threads = options.num_threads;
+  options.structure.triangulation.num_threads = options.num_threads;
+  options.refinement.num_threads = options.num_threads;
+  return options;
+}
+
+GlobalCorrespondences FindCorrespondences(const SceneData& scene,
+                                          int num_threads) {
+  GlobalCorrespondences correspondences;
+  correspondences.bearings = ComputeSceneBearings(scene, num_threads);
+  for (const ScenePair& pair : scene.pairs) {
+    correspondences.matches[ImagePair(pair.image_id1, pair.image_id2)] =
+        pair.inlier_matches;
+  }
+  return correspondences;
+}
+
+std::string DescribeViewGraph(const InitialViewGraph& initial) {
+  std::ostringstream text;
+  text << initial.graph.images.size() << " images, "
+       << initial.graph.edges.size() << " pairs: " << initial.num_stored_poses
+       << " poses stored, " << initial.num_decomposed << " decomposed, "
+       << initial.num_reestimated << " estimated anew, "
+       << initial.num_without_pose << " without";
+  return text.str();
+}
+
+void AppendSteps(const std::vector<CoarseStep>& coarse,
+                 std::vector<StepReport>* steps) {
+  for (const CoarseStep& step : coarse) {
+    steps->push_back({step.name, step.seconds, step.summary});
+  }
+}
+
+Status NothingHoldsTogether() {
+  return Status::Error(
+      "no two images hold together: the database has no verified pairs with "
+      "a relative pose and no usable priors; match the images first");
+}
+
+// The matches of the edges that hold the component together.
+CoarseModelInput CreateModelInput(const CoarseComponent& component,
+                                  const CoarsePoses& poses,
+                                  const GlobalCorrespondences& matches) {
+  CoarseModelInput input;
+  input.priors = poses.priors;
+  if (poses.camera_mount.corrected) {
+    input.camera_mount = ExpSo3(poses.camera_mount.turn_rad);
+  }
+  input.cams_from_world = component.cams_from_world;
+  input.metric = component.metric;
+  for (const ViewGraphEdge& edge : poses.graph.edges) {
+    if (!edge.IsKept() || edge.source == EdgeSource::kSensor) continue;
+    if (component.cams_from_world.count(edge.image_id1) == 0 ||
+        component.cams_from_world.count(edge.image_id2) == 0) {
+      continue;
+    }
+    const auto it = matches.matches.find(edge.Pair());
+    if (it != matches.matches.end()) input.matches.insert(*it);
+  }
+  return input;
+}
+
+// Before it is used.
+std::string DescribeTrackMemory(const CoarseModelInput& input) {
+  std::ostringstream text;
+  text << "structure, tracks take at most "
+       << (EstimateTrackBytes(input.matches) >> 20) + 1 << " MiB";
+  return text.str();
+}
+
+std::string DescribeModel(const CoarseModel& model) {
+  std::ostringstream text;
+  text.precision(3);
+  text << model.reconstruction.NumRegImages() << " images, " << model.num_points
+       << " points, " << model.num_observations << " observations, "
+       << model.mean_reproj_error_px << " px, angles >= " << model.min_angle_deg
+       << " deg";
+  if (model.num_images_without_points > 0) {
+    text << ", " << model.num_images_without_points << " images without points";
+  }
+  for (const PriorBundleAdjustmentSummary& round : model.rounds) {
+    if (!round.success) text << ", adjustment failed: " << round.message;
+  }
+  return text.str();
+}
+
+std::string DescribeMatches(const GlobalStageResult& result) {
+  std::ostringstream text;
+  text << result.refinement.num_kept << " of "
+       << result.refinement.num_candidates << " matches in "
+       << result.geometries.size() << " pairs, " << result.removed_pairs.size()
+       << " pairs removed, " << result.refinement.num_skipped_pairs
+       << " left as they were";
+  return text.str();
+}
+
+}  // namespace
+
+bool GlobalStageOptions::IsValid(std::string* error) const {
+  return two_view.IsValid(error) && poses.IsValid(error) &&
+         structure.IsValid(error) && refinement.IsValid(error);
+}
+
+StatusOr<GlobalStageResult> RunGlobalStage(
+    const GlobalStageOptions& requested_options, const SceneData& scene,
+    const StageProgress& progress) {
+  std::string error;
+  if (!requested_options.IsValid(&error)) throw std::invalid_argument(error);
+  const GlobalStageOptions options = WithThreads(requested_options);
+  const auto begin = [&](const std::string& name, double share_done) {
+    if (progress) progress(name, share_done);
+    return Stopwatch();
+  };
+  GlobalStageResult result;
+
+  // 1. View graph.
+  Stopwatch watch = begin("view graph", 0.0);
+  const GlobalCorrespondences correspondences =
+      FindCorrespondences(scene, options.num_threads);
+  const InitialViewGraph initial =
+      BuildInitialViewGraph(options.two_view, scene, correspondences.bearings);
+  result.steps.push_back(
+      {"view graph", watch.Seconds(), DescribeViewGraph(initial)});
+
+  // 2-6. Coarse poses.
+  begin("coarse poses", 0.1);
+  result.poses = EstimateCoarsePoses(options.poses, initial.graph,
+                                     correspondences, scene.priors);
+  AppendSteps(result.poses.steps, &result.steps);
+  if (result.poses.components.empty()) return NothingHoldsTogether();
+
+  // 7. Structure and adjustment.
+  for (const CoarseComponent& component : result.poses.components) {
+    const CoarseModelInput input =
+        CreateModelInput(component, result.poses, correspondences);
+    watch = begin(DescribeTrackMemory(input), 0.5);
+    result.models.push_back(BuildCoarseModel(options.structure, scene,
+                                             correspondences.bearings, input));
+    result.steps.push_back(
+        {"structure", watch.Seconds(), DescribeModel(result.models.back())});
+  }
+
+  // 8. Match refinement.
+  if (options.refinement.enabled) {
+    watch = begin("match refinement", 0.9);
+    RefineStageMatches(options, scene, correspondences.bearings, &result);
+    result.steps.push_back(
+        {"match refinement", watch.Seconds(), DescribeMatches(result)});
+  }
+  return result;
+}
+
+}  // namespace adasfm

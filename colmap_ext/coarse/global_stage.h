@@ -1,0 +1,68 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "colmap_ext/coarse/coarse_structure.h"
+#include "colmap_ext/host/database.h"
+#include "colmap_ext/scene/scene_data.h"
+#include "colmap_ext/scene/two_view_poses.h"
+#include "core/status.h"
+#include "global/estimate_coarse_poses.h"
+#include "global/structure/match_refinement.h"
+
+namespace adasfm {
+
+// Nested by step, in order of their use (design 7.2).
+struct GlobalStageOptions {
+  TwoViewPoseOptions two_view;
+  CoarsePoseOptions poses;
+  CoarseStructureOptions structure;
+  MatchRefinementOptions refinement;
+  // Of all steps but structure.bundle; -1: all of the machine's.
+  int num_threads = -1;
+
+  bool IsValid(std::string* error) const;
+};
+
+struct StepReport {
+  std::string name;
+  double seconds = 0.0;
+  // What it did, in one line.
+  std::string summary;
+};
+
+struct GlobalStageResult {
+  // One per component of the view graph, largest first.
+  std::vector<CoarseModel> models;
+  // What EstimateCoarsePoses says of each component, in the same order, and its
+  // view graph with the reasons of removal.
+  CoarsePoses poses;
+  MatchRefinementReport refinement;
+  // The new two-view geometries, and the pairs that have none any more: they
+  // lost their matches, or the view graph refuted them. Pairs of images without
+  // pose are in neither. Both empty without match refinement.
+  std::vector<NewTwoViewGeometry> geometries;
+  std::vector<ImagePair> removed_pairs;
+  std::vector<StepReport> steps;
+};
+
+// Called when a step begins, with its name and the share of steps that are
+// done.
+using StageProgress = std::function<void(const std::string&, double)>;
+
+// The coarse global stage in memory (design 7.2):
+//   1    view graph                     BuildInitialViewGraph
+//   2-6  coarse poses                   EstimateCoarsePoses
+//   7    tracks, points, adjustment     BuildCoarseModel, per component
+//   8    match refinement               RefineMatches
+// The scene is read with raw matches and original two-view geometries. An error
+// when the scene has no two images that hold together. Throws
+// std::invalid_argument for invalid options.
+StatusOr<GlobalStageResult> RunGlobalStage(const GlobalStageOptions& options,
+                                           const SceneData& scene,
+                                           const StageProgress& progress = {});
+
+}  // namespace adasfm

@@ -1,0 +1,138 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "colmap_ext/database/prior_tables.h"
+
+#include <map>
+#include <utility>
+
+#include "colmap_ext/database/prior_corrections.h"
+#include "colmap_ext/host/database.h"
+#include "colmap_ext/io/double_blob.h"
+
+namespace adasfm {
+namespace {
+
+constexpr int kSchemaVersion = 1;
+
+void CreateTables(SqliteConnection* database) {
+  CreateMetaTable(database);
+  database->Execute(
+      "CREATE TABLE IF NOT EXISTS adasfm_image_times ("
+      "image_id INTEGER PRIMARY KEY NOT NULL, name TEXT NOT NULL, "
+      "timestamp_ns INTEGER NOT NULL);"
+      "CREATE TABLE IF NOT EXISTS adasfm_relative_pose_priors ("
+      "image_id1 INTEGER NOT NULL, image_id2 INTEGER NOT NULL, "
+      "name1 TEXT NOT NULL, name2 TEXT NOT NULL, dt_ns INTEGER NOT NULL, "
+      "qvec BLOB NOT NULL, tvec BLOB NOT NULL, covariance BLOB NOT NULL, "
+      "flags INTEGER NOT NULL, PRIMARY KEY (image_id1, image_id2));"
+      "CREATE TABLE IF NOT EXISTS adasfm_gravity ("
+      "image_id INTEGER PRIMARY KEY NOT NULL, name TEXT NOT NULL, "
+      "gravity_in_cam BLOB NOT NULL);");
+}
+
+using Names = std::map<image_t, std::string>;
+
+const std::string& NameOf(const Names& names, image_t image_id) {
+  const auto name = names.find(image_id);
+  if (name != names.end()) return name->second;
+  throw SqliteError("no image with the id " + std::to_string(image_id));
+}
+
+void WriteImageTimes(const Names& names, const std::vector<ImageTimeRow>& rows,
+                     SqliteConnection* database) {
+  SqliteStatement statement(database,
+                            "INSERT INTO adasfm_image_times VALUES (?, ?, ?)");
+  for (const ImageTimeRow& row : rows) {
+    statement.Reset();
+    statement.BindInt(1, row.image_id);
+    statement.BindText(2, NameOf(names, row.image_id));
+    statement.BindInt(3, row.timestamp_ns);
+    statement.Step();
+  }
+}
+
+void WritePriors(const Names& names, const std::vector<RelativePosePrior>& rows,
+                 SqliteConnection* database) {
+  SqliteStatement statement(database,
+                            "INSERT INTO adasfm_relative_pose_priors VALUES "
+                            "(?, ?, ?, ?, ?, ?, ?, ?, ?)");
+  for (const RelativePosePrior& row : rows) {
+    const Eigen::Quaterniond& q = row.cam2_from_cam1.rotation;
+    const Eigen::Vector4d qvec(q.w(), q.x(), q.y(), q.z());
+    statement.Reset();
+    statement.BindInt(1, row.image_id1);
+    statement.BindInt(2, row.image_id2);
+    statement.BindText(3, NameOf(names, row.image_id1));
+    statement.BindText(4, NameOf(names, row.image_id2));
+    statement.BindInt(5, row.dt_ns);
+    BindDoubles(&statement, 6, qvec.data(), 4);
+    BindDoubles(&statement, 7, row.cam2_from_cam1.translation.data(), 3);
+    // Symmetric, so rows or columns first is the same.
+    BindDoubles(&statement, 8, row.covariance.data(), 36);
+    statement.BindInt(9, row.flags);
+    statement.Step();
+  }
+}
+
+void WriteGravity(const Names& names, const std::vector<GravityRow>& rows,
+                  SqliteConnection* database) {
+  SqliteStatement statement(database,
+                            "INSERT INTO adasfm_gravity VALUES (?, ?, ?)");
+  for (const GravityRow& row : rows) {
+    statement.Reset();
+    statement.BindInt(1, row.image_id);
+    statement.BindText(2, NameOf(names, row.image_id));
+    BindDoubles(&statement, 3, row.gravity_in_cam.data(), 3);
+    statement.Step();
+  }
+}
+
+}  // namespace
+
+void CreateMetaTable(SqliteConnection* database) {
+  database->Execute(
+      "CREATE TABLE IF NOT EXISTS adasfm_meta ("
+      "key TEXT PRIMARY KEY NOT NULL, value TEXT NOT NULL);"
+      "INSERT OR IGNORE INTO adasfm_meta VALUES ('schema_version', '" +
+      std::to_string(kSchemaVersion) + "');");
+  CheckMetaTable(database);
+}
+
+void CheckMetaTable(SqliteConnection* database) {
+  if (!database->HasTable("adasfm_meta")) return;
+  SqliteStatement statement(
+      database, "SELECT value FROM adasfm_meta WHERE key = 'schema_version'");
+  const std::string version = statement.Step() ? statement.Text(0) : "none";
+  if (version == std::to_string(kSchemaVersion)) return;
+  throw SqliteError("the adasfm_ tables have schema version " + version +
+                    ", this program knows " + std::to_string(kSchemaVersion));
+}
+
+Status WritePriorTables(const std::string& database_path,
+                        const PriorTables& tables) {
+  const Status checked = CheckDatabase(database_path);
+  if (!checked.ok()) return checked;
+  try {
+    SqliteConnection database(database_path, SqliteConnection::Mode::kWrite);
+    SqliteTransaction transaction(&database);
+    Names names;
+    for (DatabaseImage& image : ReadImages(&database)) {
+      names[image.image_id] = std::move(image.name);
+    }
+    CreateTables(&database);
+    database.Execute(
+        "DELETE FROM adasfm_image_times;"
+        "DELETE FROM adasfm_relative_pose_priors;"
+        "DELETE FROM adasfm_gravity;");
+    WriteImageTimes(names, tables.image_times, &database);
+    WritePriors(names, tables.priors, &database);
+    WriteGravity(names, tables.gravity, &database);
+    RemovePriorCorrections(&database);
+    transaction.Commit();
+  } catch (const SqliteError& error) {
+    return Status::Error("cannot write the priors to " + database_path + ": " +
+                         error.what() + "; the database is as it was");
+  }
+  return Status::Ok();
+}
+
+}  // namespace adasfm

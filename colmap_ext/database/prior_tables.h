@@ -1,0 +1,60 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <Eigen/Core>
+#include <string>
+#include <vector>
+
+#include "colmap_ext/io/sqlite.h"
+#include "core/relative_pose_prior.h"
+#include "core/status.h"
+#include "core/types.h"
+
+namespace adasfm {
+
+// The tables adasfm_image_times, adasfm_relative_pose_priors and adasfm_gravity
+// inside a COLMAP database (docs/reference/formats.md).
+
+struct ImageTimeRow {
+  image_t image_id = kInvalidImageId;
+  timestamp_t timestamp_ns = 0;
+};
+
+struct GravityRow {
+  image_t image_id = kInvalidImageId;
+  // Unit vector towards the ground, in the camera frame.
+  Eigen::Vector3d gravity_in_cam = Eigen::Vector3d::UnitY();
+};
+
+struct PriorTables {
+  std::vector<ImageTimeRow> image_times;
+  // Consecutive images, sorted by time.
+  std::vector<RelativePosePrior> priors;
+  std::vector<GravityRow> gravity;
+};
+
+// Replaces all rows, in one transaction. An error, and no change, when the
+// database is not COLMAP's, cannot be written, or lacks an image of the rows.
+Status WritePriorTables(const std::string& database_path,
+                        const PriorTables& tables);
+
+struct LoadedPriorTables {
+  PriorTables tables;
+  // Rows of images that the database does not have any more.
+  int num_ignored_rows = 0;
+};
+
+// Without the tables the result is empty. Rows are matched by image name: where
+// the ids have changed since the import the present ones are returned. An error
+// for rows that could not have been written by WritePriorTables.
+StatusOr<LoadedPriorTables> ReadPriorTables(const std::string& database_path);
+
+// As above on an open connection; throws SqliteError.
+LoadedPriorTables ReadPriorTables(SqliteConnection* database);
+
+// Creates adasfm_meta when needed, and throws SqliteError when its schema
+// version is not ours.
+void CreateMetaTable(SqliteConnection* database);
+void CheckMetaTable(SqliteConnection* database);
+
+}  // namespace adasfm

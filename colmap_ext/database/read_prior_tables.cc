@@ -1,0 +1,160 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <algorithm>
+#include <map>
+#include <optional>
+#include <utility>
+
+#include "colmap_ext/database/prior_tables.h"
+#include "colmap_ext/host/database.h"
+#include "colmap_ext/io/double_blob.h"
+
+namespace adasfm {
+namespace {
+
+constexpr uint32_t kAllFlags =
+    kPriorRotation | kPriorDirection | kPriorLength | kPriorWheelSlip;
+
+// The present id of the image that had this id and name; none when it is gone.
+class IdResolver {
+ public:
+  explicit IdResolver(SqliteConnection* database) {
+    for (const DatabaseImage& image : ReadImages(database)) {
+      ids_[image.name] = image.image_id;
+    }
+  }
+
+  std::optional<image_t> Resolve(const std::string& name) const {
+    const auto id = ids_.find(name);
+    if (id == ids_.end()) return std::nullopt;
+    return id->second;
+  }
+
+ private:
+  std::map<std::string, image_t> ids_;
+};
+
+void ReadImageTimes(const IdResolver& ids, SqliteConnection* database,
+                    LoadedPriorTables* loaded) {
+  if (!database->HasTable("adasfm_image_times")) return;
+  SqliteStatement statement(database,
+                            "SELECT name, timestamp_ns FROM adasfm_image_times "
+                            "ORDER BY timestamp_ns, name");
+  while (statement.Step()) {
+    const std::optional<image_t> image_id = ids.Resolve(statement.Text(0));
+    if (image_id.has_value()) {
+      loaded->tables.image_times.push_back({*image_id, statement.Int(1)});
+    } else {
+      ++loaded->num_ignored_rows;
+    }
+  }
+}
+
+RelativePosePrior PriorFromRow(const SqliteStatement& statement) {
+  const std::string row = "table adasfm_relative_pose_priors, images " +
+                          statement.Text(0) + " and " + statement.Text(1);
+  RelativePosePrior prior;
+  Eigen::Vector4d qvec;
+  Eigen::Vector3d tvec;
+  prior.dt_ns = statement.Int(2);
+  DoublesFromBlob(statement, 3, row, 4, qvec.data());
+  DoublesFromBlob(statement, 4, row, 3, tvec.data());
+  DoublesFromBlob(statement, 5, row, 36, prior.covariance.data());
+  const int64_t flags = statement.Int(6);
+  // Variances may be infinite, and what is not observed may be anything finite.
+  if (!tvec.allFinite() || !(std::abs(qvec.norm() - 1.0) < 1e-6) ||
+      prior.covariance.hasNaN() ||
+      !(prior.covariance.diagonal().array() >= 0.0).all() || prior.dt_ns < 0 ||
+      (flags & ~static_cast<int64_t>(kAllFlags)) != 0) {
+    throw SqliteError(row + ": values that are not a pose prior");
+  }
+  prior.cam2_from_cam1 =
+      Rigid3d(Eigen::Quaterniond(qvec(0), qvec(1), qvec(2), qvec(3)), tvec);
+  prior.flags = static_cast<uint32_t>(flags);
+  return prior;
+}
+
+void ReadPriors(const IdResolver& ids, SqliteConnection* database,
+                LoadedPriorTables* loaded) {
+  if (!database->HasTable("adasfm_relative_pose_priors")) return;
+  std::map<image_t, timestamp_t> times;
+  for (const ImageTimeRow& row : loaded->tables.image_times) {
+    times[row.image_id] = row.timestamp_ns;
+  }
+  SqliteStatement statement(
+      database,
+      "SELECT name1, name2, dt_ns, qvec, tvec, covariance, flags "
+      "FROM adasfm_relative_pose_priors ORDER BY image_id1, image_id2");
+  while (statement.Step()) {
+    const std::optional<image_t> id1 = ids.Resolve(statement.Text(0));
+    const std::optional<image_t> id2 = ids.Resolve(statement.Text(1));
+    if (!id1.has_value() || !id2.has_value()) {
+      ++loaded->num_ignored_rows;
+      continue;
+    }
+    RelativePosePrior prior = PriorFromRow(statement);
+    prior.image_id1 = *id1;
+    prior.image_id2 = *id2;
+    if (times.count(*id1) == 0 || times.count(*id2) == 0) {
+      throw SqliteError("table adasfm_relative_pose_priors: image " +
+                        statement.Text(times.count(*id1) == 0 ? 0 : 1) +
+                        " has no time");
+    }
+    loaded->tables.priors.push_back(prior);
+  }
+  std::stable_sort(
+      loaded->tables.priors.begin(), loaded->tables.priors.end(),
+      [&times](const RelativePosePrior& a, const RelativePosePrior& b) {
+        return std::make_pair(times.at(a.image_id1), times.at(a.image_id2)) <
+               std::make_pair(times.at(b.image_id1), times.at(b.image_id2));
+      });
+}
+
+void ReadGravity(const IdResolver& ids, SqliteConnection* database,
+                 LoadedPriorTables* loaded) {
+  if (!database->HasTable("adasfm_gravity")) return;
+  SqliteStatement statement(
+      database,
+      "SELECT name, gravity_in_cam FROM adasfm_gravity ORDER BY name");
+  while (statement.Step()) {
+    const std::string name = statement.Text(0);
+    const std::string row = "table adasfm_gravity, image " + name;
+    const std::optional<image_t> image_id = ids.Resolve(name);
+    if (!image_id.has_value()) {
+      ++loaded->num_ignored_rows;
+      continue;
+    }
+    GravityRow gravity;
+    gravity.image_id = *image_id;
+    DoublesFromBlob(statement, 1, row, 3, gravity.gravity_in_cam.data());
+    if (!(std::abs(gravity.gravity_in_cam.norm() - 1.0) < 1e-6)) {
+      throw SqliteError(row + ": not a unit vector");
+    }
+    loaded->tables.gravity.push_back(gravity);
+  }
+}
+
+}  // namespace
+
+StatusOr<LoadedPriorTables> ReadPriorTables(const std::string& database_path) {
+  const Status checked = CheckDatabase(database_path);
+  if (!checked.ok()) return checked;
+  try {
+    SqliteConnection database(database_path, SqliteConnection::Mode::kRead);
+    return ReadPriorTables(&database);
+  } catch (const SqliteError& error) {
+    return Status::Error(database_path + ": " + error.what() +
+                         "; run adasfm_prior_importer again");
+  }
+}
+
+LoadedPriorTables ReadPriorTables(SqliteConnection* database) {
+  CheckMetaTable(database);
+  const IdResolver ids(database);
+  LoadedPriorTables loaded;
+  ReadImageTimes(ids, database, &loaded);
+  ReadPriors(ids, database, &loaded);
+  ReadGravity(ids, database, &loaded);
+  return loaded;
+}
+
+}  // namespace adasfm

@@ -1,0 +1,256 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "colmap_ext/database/two_view_geometry_backup.h"
+
+#include <map>
+#include <optional>
+
+#include "colmap_ext/database/prior_tables.h"
+
+namespace adasfm {
+namespace {
+
+constexpr char kColumns[] =
+    "pair_id, rows, cols, data, config, F, E, H, qvec, tvec";
+
+void CreateTable(SqliteConnection* database) {
+  CreateMetaTable(database);
+  // written_digest belongs to the row that took this one's place; NULL when
+  // none did.
+  database->Execute(
+      "CREATE TABLE IF NOT EXISTS adasfm_two_view_geometries ("
+      "pair_id INTEGER PRIMARY KEY NOT NULL, rows INTEGER NOT NULL, "
+      "cols INTEGER NOT NULL, data BLOB, config INTEGER NOT NULL, F BLOB, "
+      "E BLOB, H BLOB, qvec BLOB, tvec BLOB, name1 TEXT NOT NULL, "
+      "name2 TEXT NOT NULL, written_digest INTEGER)");
+}
+
+// FNV-1a, 64 bits.
+class Digest {
+ public:
+  void Add(const void* data, size_t num_bytes) {
+    const auto* bytes = static_cast<const unsigned char*>(data);
+    for (size_t i = 0; i < num_bytes; ++i) {
+      value_ = (value_ ^ bytes[i]) * 0x100000001b3ull;
+    }
+  }
+  int64_t Value() const { return static_cast<int64_t>(value_); }
+
+ private:
+  uint64_t value_ = 0xcbf29ce484222325ull;
+};
+
+// Digests of the present two_view_geometries.
+class RowDigester {
+ public:
+  explicit RowDigester(SqliteConnection* database)
+      : statement_(database,
+                   std::string("SELECT ") + kColumns +
+                       " FROM two_view_geometries WHERE pair_id = ?") {}
+
+  // None when there is no row.
+  std::optional<int64_t> Compute(int64_t pair_id) {
+    statement_.Reset();
+    statement_.BindInt(1, pair_id);
+    if (!statement_.Step()) return std::nullopt;
+    Digest digest;
+    for (const int column : {1, 2, 4}) {
+      const int64_t value = statement_.Int(column);
+      digest.Add(&value, sizeof(value));
+    }
+    for (const int column : {3, 5, 6, 7, 8, 9}) {
+      const int64_t num_bytes = statement_.NumBytes(column);
+      digest.Add(&num_bytes, sizeof(num_bytes));
+      digest.Add(statement_.Blob(column), num_bytes);
+    }
+    return digest.Value();
+  }
+
+ private:
+  SqliteStatement statement_;
+};
+
+struct KeptRow {
+  int64_t pair_id = 0;
+  std::optional<int64_t> written_digest;
+  std::string name1;
+  std::string name2;
+};
+
+std::map<image_t, std::string> ReadNames(SqliteConnection* database) {
+  std::map<image_t, std::string> names;
+  for (DatabaseImage& image : ReadImages(database)) {
+    names[image.image_id] = std::move(image.name);
+  }
+  return names;
+}
+
+// Sorts the kept rows into those that count and the number of the others.
+std::vector<int64_t> FindCurrentRows(SqliteConnection* database,
+                                     int* num_outdated) {
+  *num_outdated = 0;
+  std::vector<int64_t> current;
+  if (!database->HasTable(kTwoViewGeometryBackupTable)) return current;
+  CheckMetaTable(database);
+  std::vector<KeptRow> rows;
+  SqliteStatement statement(database,
+                            "SELECT pair_id, written_digest, name1, name2 "
+                            "FROM adasfm_two_view_geometries ORDER BY pair_id");
+  while (statement.Step()) {
+    KeptRow row{statement.Int(0), std::nullopt, statement.Text(2),
+                statement.Text(3)};
+    if (!statement.IsNull(1)) row.written_digest = statement.Int(1);
+    rows.push_back(std::move(row));
+  }
+  const std::map<image_t, std::string> names = ReadNames(database);
+  const auto has_name = [&names](image_t image_id, const std::string& name) {
+    const auto found = names.find(image_id);
+    return found != names.end() && found->second == name;
+  };
+  RowDigester digester(database);
+  for (const KeptRow& row : rows) {
+    const ImagePair pair = ImagePairFromPairId(row.pair_id);
+    if (has_name(pair.image_id1, row.name1) &&
+        has_name(pair.image_id2, row.name2) &&
+        digester.Compute(row.pair_id) == row.written_digest) {
+      current.push_back(row.pair_id);
+    } else {
+      ++*num_outdated;
+    }
+  }
+  return current;
+}
+
+RestoreSummary RestoreRows(SqliteConnection* database) {
+  RestoreSummary summary;
+  const std::vector<int64_t> pair_ids =
+      FindCurrentRows(database, &summary.num_outdated);
+  if (pair_ids.empty() && summary.num_outdated == 0) return summary;
+  SqliteStatement statement(
+      database, std::string("INSERT OR REPLACE INTO two_view_geometries (") +
+                    kColumns + ") SELECT " + kColumns +
+                    " FROM adasfm_two_view_geometries WHERE pair_id = ?");
+  for (const int64_t pair_id : pair_ids) {
+    statement.Reset();
+    statement.BindInt(1, pair_id);
+    statement.Step();
+  }
+  summary.num_restored = pair_ids.size();
+  return summary;
+}
+
+void KeepRows(const std::vector<ImagePair>& pairs, SqliteConnection* database) {
+  const std::map<image_t, std::string> names = ReadNames(database);
+  SqliteStatement statement(
+      database, std::string("INSERT INTO adasfm_two_view_geometries SELECT ") +
+                    kColumns +
+                    ", ?, ?, NULL FROM two_view_geometries WHERE pair_id = ?");
+  for (const ImagePair& pair : pairs) {
+    const auto name1 = names.find(pair.image_id1);
+    const auto name2 = names.find(pair.image_id2);
+    if (name1 == names.end() || name2 == names.end()) {
+      throw SqliteError("the pair of images " + std::to_string(pair.image_id1) +
+                        " and " + std::to_string(pair.image_id2) +
+                        " is not in the database");
+    }
+    statement.Reset();
+    statement.BindText(1, name1->second);
+    statement.BindText(2, name2->second);
+    statement.BindInt(3, PairIdFromImagePair(pair));
+    statement.Step();
+  }
+}
+
+void RecordDigests(const std::vector<NewTwoViewGeometry>& rows,
+                   SqliteConnection* database) {
+  RowDigester digester(database);
+  SqliteStatement statement(
+      database,
+      "UPDATE adasfm_two_view_geometries SET written_digest = ? "
+      "WHERE pair_id = ?");
+  for (const NewTwoViewGeometry& row : rows) {
+    const int64_t pair_id = PairIdFromImagePair(row.pair);
+    statement.Reset();
+    statement.BindInt(1, digester.Compute(pair_id).value());
+    statement.BindInt(2, pair_id);
+    statement.Step();
+  }
+}
+
+void RemoveRows(const std::vector<ImagePair>& pairs,
+                SqliteConnection* database) {
+  SqliteStatement statement(
+      database, "DELETE FROM two_view_geometries WHERE pair_id = ?");
+  for (const ImagePair& pair : pairs) {
+    statement.Reset();
+    statement.BindInt(1, PairIdFromImagePair(pair));
+    statement.Step();
+  }
+}
+
+}  // namespace
+
+Status RewriteTwoViewGeometries(const std::string& database_path,
+                                const std::vector<NewTwoViewGeometry>& rows,
+                                const std::vector<ImagePair>& removed,
+                                const PriorCorrections& corrections) {
+  const Status checked = CheckDatabase(database_path);
+  if (!checked.ok()) return checked;
+  std::vector<ImagePair> pairs = removed;
+  for (const NewTwoViewGeometry& row : rows) pairs.push_back(row.pair);
+  try {
+    SqliteConnection database(database_path, SqliteConnection::Mode::kWrite);
+    SqliteTransaction transaction(&database);
+    CreateTable(&database);
+    RestoreRows(&database);
+    database.Execute("DELETE FROM adasfm_two_view_geometries");
+    KeepRows(pairs, &database);
+    RemoveRows(removed, &database);
+    WriteTwoViewGeometries(&database, rows);
+    RecordDigests(rows, &database);
+    WritePriorCorrections(corrections, &database);
+    transaction.Commit();
+  } catch (const SqliteError& error) {
+    return Status::Error("cannot rewrite the two-view geometries of " +
+                         database_path + ": " + error.what() +
+                         "; the database is as it was");
+  }
+  return Status::Ok();
+}
+
+StatusOr<RestoreSummary> RestoreTwoViewGeometries(
+    const std::string& database_path) {
+  const Status checked = CheckDatabase(database_path);
+  if (!checked.ok()) return checked;
+  try {
+    {
+      SqliteConnection database(database_path, SqliteConnection::Mode::kRead);
+      if (!database.HasTable(kTwoViewGeometryBackupTable) &&
+          !HasPriorCorrections(&database)) {
+        return RestoreSummary();
+      }
+    }
+    SqliteConnection database(database_path, SqliteConnection::Mode::kWrite);
+    SqliteTransaction transaction(&database);
+    RestoreSummary summary = RestoreRows(&database);
+    database.Execute("DROP TABLE IF EXISTS adasfm_two_view_geometries");
+    summary.priors_restored = HasPriorCorrections(&database);
+    RemovePriorCorrections(&database);
+    transaction.Commit();
+    return summary;
+  } catch (const SqliteError& error) {
+    return Status::Error("cannot restore the two-view geometries of " +
+                         database_path + ": " + error.what() +
+                         "; the database is as it was");
+  }
+}
+
+std::vector<ImagePair> FindKeptOriginals(SqliteConnection* database) {
+  int num_outdated = 0;
+  std::vector<ImagePair> pairs;
+  for (const int64_t pair_id : FindCurrentRows(database, &num_outdated)) {
+    pairs.push_back(ImagePairFromPairId(pair_id));
+  }
+  return pairs;
+}
+
+}  // namespace adasfm

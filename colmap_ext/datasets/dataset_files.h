@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <map>
+#include <string>
+#include <vector>
+
+#include "core/rigid3d.h"
+#include "core/sensor_log.h"
+
+namespace adasfm {
+
+// Helpers to read the calibration files of known datasets. What is wrong with a
+// file is thrown as std::runtime_error, with a message for the user.
+
+// Throws unless the folder, or the file with something in it, exists.
+void RequireFile(const std::string& path);
+bool PathExists(const std::string& path);
+
+std::string ReadText(const std::string& path);
+
+// All numbers of a text, in order; throws for a word that is no finite number.
+std::vector<double> NumbersFromText(const std::string& text,
+                                    const std::string& path);
+
+// "key: numbers" lines, as in KITTI's calibration files; lines whose values are
+// no numbers (dates) are left out.
+std::map<std::string, std::vector<double>> ReadKeyedNumbers(
+    const std::string& path);
+// The numbers of a key; throws when it is missing or has another count.
+const std::vector<double>& FindNumbers(
+    const std::map<std::string, std::vector<double>>& values,
+    const std::string& key, size_t count, const std::string& path);
+
+// The matrix itself; throws unless it is a rotation.
+Eigen::Matrix3d RequireRotation(const Eigen::Matrix3d& matrix,
+                                const std::string& path);
+
+// "a,b,c" with all digits.
+std::string JoinNumbers(const std::vector<double>& numbers);
+
+struct ImuDescription {
+  double rate_hz = 200.0;
+  ImuNoise noise;
+};
+
+// A calibration file of docs/reference/sensors.md.
+std::string FormatSensorsYaml(const Rigid3d& cam_from_imu, double timeshift_s,
+                              const ImuDescription& imu);
+
+}  // namespace adasfm

@@ -1,0 +1,232 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "colmap_ext/datasets/write_synthetic_world.h"
+
+#include <base/camera_models.h>
+#include <base/database.h>
+#include <estimators/two_view_geometry.h>
+
+#include <cstdio>
+#include <filesystem>
+#include <fstream>
+#include <functional>
+#include <iomanip>
+#include <limits>
+#include <system_error>
+#include <vector>
+
+#include "core/so3.h"
+
+namespace adasfm {
+namespace {
+
+namespace fs = std::filesystem;
+
+colmap::Camera ConvertCamera(const SyntheticCamera& synthetic) {
+  colmap::Camera camera;
+  camera.SetCameraId(1);
+  camera.SetWidth(synthetic.width);
+  camera.SetHeight(synthetic.height);
+  camera.SetPriorFocalLength(true);
+  std::vector<double> params = {synthetic.focal_px, synthetic.focal_px,
+                                synthetic.principal_x_px,
+                                synthetic.principal_y_px};
+  if (synthetic.model == SyntheticCameraModel::kFisheye) {
+    camera.SetModelIdFromName("OPENCV_FISHEYE");
+    for (int i = 0; i < 4; ++i) params.push_back(synthetic.fisheye_coeffs[i]);
+  } else {
+    camera.SetModelIdFromName("PINHOLE");
+  }
+  camera.SetParams(params);
+  return camera;
+}
+
+colmap::FeatureMatches ConvertMatches(
+    const std::vector<FeatureMatch>& matches) {
+  colmap::FeatureMatches converted;
+  converted.reserve(matches.size());
+  for (const FeatureMatch& match : matches) {
+    converted.emplace_back(match.point2D_idx1, match.point2D_idx2);
+  }
+  return converted;
+}
+
+void WriteImages(const SyntheticWorld& world, colmap::Database* database) {
+  for (const SyntheticImage& synthetic : world.images) {
+    colmap::Image image;
+    image.SetImageId(synthetic.image_id);
+    image.SetName(synthetic.name);
+    image.SetCameraId(1);
+    database->WriteImage(image, true);
+    colmap::FeatureKeypoints keypoints;
+    for (const Eigen::Vector2d& keypoint : synthetic.keypoints) {
+      keypoints.emplace_back(keypoint.x(), keypoint.y());
+    }
+    database->WriteKeypoints(synthetic.image_id, keypoints);
+  }
+}
+
+void WritePairs(const SyntheticWorld& world, colmap::Database* database) {
+  for (const SyntheticPair& pair : world.pairs) {
+    database->WriteMatches(pair.image_id1, pair.image_id2,
+                           ConvertMatches(pair.raw_matches));
+    colmap::TwoViewGeometry geometry;
+    geometry.config = colmap::TwoViewGeometry::CALIBRATED;
+    geometry.inlier_matches = ConvertMatches(pair.inlier_matches);
+    const Eigen::Quaterniond& rotation = pair.cam2_from_cam1.rotation;
+    geometry.qvec << rotation.w(), rotation.x(), rotation.y(), rotation.z();
+    geometry.tvec = pair.cam2_from_cam1.translation;
+    geometry.E = Hat(geometry.tvec) * rotation.toRotationMatrix();
+    database->WriteTwoViewGeometry(pair.image_id1, pair.image_id2, geometry);
+  }
+}
+
+// Writes a text file under a temporary name and puts it in place when it is
+// complete.
+Status WriteText(const fs::path& path,
+                 const std::function<void(std::ostream*)>& write) {
+  const fs::path temporary = path.string() + ".tmp";
+  {
+    std::ofstream file(temporary);
+    file << std::setprecision(9);
+    if (file) write(&file);
+    file.flush();
+    if (!file) {
+      return Status::Error("cannot write " + temporary.string() +
+                           "; check the folder's permissions and free space");
+    }
+  }
+  std::error_code error;
+  fs::rename(temporary, path, error);
+  if (!error) return Status::Ok();
+  return Status::Error("cannot write " + path.string() + ": " +
+                       error.message());
+}
+
+void WriteImu(const SyntheticWorld& world, std::ostream* file) {
+  *file << "#timestamp [ns],w_RS_S_x [rad s^-1],w_RS_S_y [rad s^-1],"
+           "w_RS_S_z [rad s^-1],a_RS_S_x [m s^-2],a_RS_S_y [m s^-2],"
+           "a_RS_S_z [m s^-2]\n";
+  for (const ImuSample& sample : world.imu_samples) {
+    *file << sample.timestamp_ns;
+    for (int k = 0; k < 3; ++k) *file << "," << sample.angular_velocity[k];
+    for (int k = 0; k < 3; ++k) *file << "," << sample.specific_force[k];
+    *file << "\n";
+  }
+}
+
+void WriteWheels(const SyntheticWorld& world, std::ostream* file) {
+  *file << "#timestamp [ns],v_left [m s^-1],v_right [m s^-1]\n"
+        << std::fixed << std::setprecision(6);
+  for (const WheelSample& sample : world.wheel_samples) {
+    *file << sample.timestamp_ns << "," << sample.first << "," << sample.second
+          << "\n";
+  }
+}
+
+void WriteTimes(const SyntheticWorld& world, std::ostream* file) {
+  *file << "#timestamp [ns],filename\n";
+  for (const SyntheticImage& image : world.images) {
+    *file << image.timestamp_ns << "," << image.name << "\n";
+  }
+}
+
+void WriteGroundTruth(const SyntheticWorld& world, std::ostream* file) {
+  *file << std::fixed << std::setprecision(9);
+  for (const SyntheticImage& image : world.images) {
+    const Eigen::Quaterniond& q = image.cam_from_world.rotation;
+    const Eigen::Vector3d& t = image.cam_from_world.translation;
+    *file << image.name << " " << q.w() << " " << q.x() << " " << q.y() << " "
+          << q.z() << " " << t.x() << " " << t.y() << " " << t.z() << "\n";
+  }
+}
+
+void WriteLandmarks(const SyntheticWorld& world, std::ostream* file) {
+  for (const SyntheticImage& image : world.images) {
+    *file << image.name;
+    for (const int id : image.landmark_ids) *file << " " << id;
+    *file << "\n";
+  }
+}
+
+void WriteTransform(const char* key, const Rigid3d& transform,
+                    std::ostream* file) {
+  const Eigen::Matrix<double, 3, 4> matrix = transform.ToMatrix();
+  *file << "  " << key << ":\n";
+  for (int row = 0; row < 3; ++row) {
+    *file << "    - [";
+    for (int column = 0; column < 4; ++column) {
+      *file << (column > 0 ? ", " : "") << matrix(row, column);
+    }
+    *file << "]\n";
+  }
+  *file << "    - [0.0, 0.0, 0.0, 1.0]\n";
+}
+
+void WriteSensors(const SyntheticWorld& world, std::ostream* file) {
+  const SyntheticWorldOptions& options = world.options;
+  const SyntheticCamera& camera = world.camera;
+  const bool is_fisheye = camera.model == SyntheticCameraModel::kFisheye;
+  const Eigen::Vector4d& k = camera.fisheye_coeffs;
+  *file << std::setprecision(12) << "cam0:\n  camera_model: pinhole\n"
+        << "  intrinsics: [" << camera.focal_px << ", " << camera.focal_px
+        << ", " << camera.principal_x_px << ", " << camera.principal_y_px
+        << "]\n  distortion_model: " << (is_fisheye ? "equidistant" : "radtan")
+        << "\n  distortion_coeffs: [" << k[0] << ", " << k[1] << ", " << k[2]
+        << ", " << k[3] << "]\n  resolution: [" << camera.width << ", "
+        << camera.height << "]\n";
+  WriteTransform("T_cam_imu", world.cam_from_imu, file);
+  const ImuNoise& noise = options.imu_noise;
+  *file << "  timeshift_cam_imu: " << options.timeshift_cam_imu_s
+        << "\nimu0:\n  update_rate: " << options.imu_rate_hz
+        << "\n  gyroscope_noise_density: " << noise.gyroscope_noise_density
+        << "\n  gyroscope_random_walk: " << noise.gyroscope_random_walk
+        << "\n  accelerometer_noise_density: "
+        << noise.accelerometer_noise_density
+        << "\n  accelerometer_random_walk: " << noise.accelerometer_random_walk
+        << "\nwheel0:\n  type: differential\n  update_rate: "
+        << options.wheel_rate_hz << "\n  track_width: " << world.track_width_m
+        << "\n  speed_noise: " << options.wheel_speed_noise << "\n";
+  WriteTransform("T_imu_wheel", world.imu_from_wheel, file);
+}
+
+}  // namespace
+
+Status WriteSyntheticDatabase(const SyntheticWorld& world,
+                              const std::string& path) {
+  // COLMAP ends the process when it cannot open a file: try first.
+  const std::string temporary = path + ".tmp";
+  if (!std::ofstream(temporary, std::ios::trunc)) {
+    return Status::Error("cannot write " + temporary +
+                         "; check the folder's permissions");
+  }
+  std::error_code error;
+  fs::remove(temporary, error);
+  {
+    colmap::Database database(temporary);
+    colmap::DatabaseTransaction transaction(&database);
+    database.WriteCamera(ConvertCamera(world.camera), true);
+    WriteImages(world, &database);
+    WritePairs(world, &database);
+  }
+  fs::rename(temporary, path, error);
+  if (!error) return Status::Ok();
+  return Status::Error("cannot write " + path + ": " + error.message());
+}
+
+Status WriteSyntheticLogs(const SyntheticWorld& world,
+                          const std::string& folder) {
+  using Writer = void (*)(const SyntheticWorld&, std::ostream*);
+  const std::vector<std::pair<const char*, Writer>> files = {
+      {"imu.csv", WriteImu},        {"wheel.csv", WriteWheels},
+      {"times.csv", WriteTimes},    {"sensors.yaml", WriteSensors},
+      {"gt.txt", WriteGroundTruth}, {"landmarks.txt", WriteLandmarks}};
+  for (const auto& [name, write] : files) {
+    const Status status = WriteText(
+        fs::path(folder) / name,
+        [&world, write = write](std::ostream* file) { write(world, file); });
+    if (!status.ok()) return status;
+  }
+  return Status::Ok();
+}
+
+}  // namespace adasfm

@@ -1,0 +1,111 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "colmap_ext/io/digest.h"
+
+#include <algorithm>
+#include <cstdint>
+#include <filesystem>
+#include <fstream>
+#include <sstream>
+
+namespace adasfm {
+namespace {
+
+namespace fs = std::filesystem;
+
+// FNV-1a.
+class Hash {
+ public:
+  void Add(const char* bytes, size_t size) {
+    for (size_t i = 0; i < size; ++i) {
+      hash_ = (hash_ ^ static_cast<unsigned char>(bytes[i])) * 1099511628211ull;
+    }
+  }
+  std::string Text() const {
+    std::ostringstream text;
+    text << std::hex << hash_;
+    return text.str();
+  }
+
+ private:
+  uint64_t hash_ = 14695981039346656037ull;
+};
+
+}  // namespace
+
+StatusOr<std::string> DigestPath(const std::string& path) {
+  if (path.empty()) return std::string("none");
+  std::error_code error;
+  if (fs::is_directory(path, error)) {
+    const StatusOr<std::vector<std::string>> names = ListFilesRecursively(path);
+    if (!names.ok()) return names.status();
+    return DigestFiles(path, *names);
+  }
+  std::ifstream file(path, std::ios::binary);
+  if (!file) {
+    return Status::Error("cannot read " + path + "; check the path");
+  }
+  Hash hash;
+  std::vector<char> block(1 << 20);
+  while (file.read(block.data(), block.size()) || file.gcount() > 0) {
+    hash.Add(block.data(), file.gcount());
+  }
+  return hash.Text();
+}
+
+StatusOr<std::map<std::string, std::string>> DigestPaths(
+    const std::map<std::string, std::string>& paths) {
+  std::map<std::string, std::string> digests;
+  for (const auto& [name, path] : paths) {
+    const StatusOr<std::string> digest = DigestPath(path);
+    if (!digest.ok()) return digest.status();
+    digests[name] = *digest;
+  }
+  return digests;
+}
+
+std::string DigestFiles(const std::string& folder,
+                        const std::vector<std::string>& names) {
+  Hash hash;
+  for (const std::string& name : names) {
+    std::error_code error;
+    const std::string size =
+        std::to_string(fs::file_size(fs::path(folder) / name, error));
+    hash.Add(name.c_str(), name.size() + 1);
+    hash.Add(size.c_str(), size.size() + 1);
+  }
+  return std::to_string(names.size()) + " files, " + hash.Text();
+}
+
+StatusOr<std::vector<std::string>> ListFilesRecursively(
+    const std::string& folder, const std::string& excluded) {
+  std::error_code error;
+  if (!fs::is_directory(folder, error)) {
+    return Status::Error("the folder " + folder +
+                         " does not exist; check --image_path");
+  }
+  std::vector<std::string> names;
+  fs::recursive_directory_iterator entry(
+      folder, fs::directory_options::follow_directory_symlink, error);
+  for (; !error && entry != fs::recursive_directory_iterator();
+       entry.increment(error)) {
+    const bool is_hidden = entry->path().filename().string()[0] == '.';
+    if (entry->is_directory()) {
+      std::error_code none;
+      if (is_hidden || (!excluded.empty() &&
+                        fs::equivalent(entry->path(), excluded, none))) {
+        entry.disable_recursion_pending();
+      }
+      continue;
+    }
+    if (is_hidden || !entry->is_regular_file()) continue;
+    names.push_back(entry->path().lexically_relative(folder).generic_string());
+  }
+  if (error) {
+    return Status::Error("cannot read the folder " + folder + ": " +
+                         error.message());
+  }
+  std::sort(names.begin(), names.end());
+  return names;
+}
+
+}  // namespace adasfm

@@ -1,0 +1,20 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstddef>
+#include <string>
+
+#include "colmap_ext/io/sqlite.h"
+
+namespace adasfm {
+
+// Arrays of doubles as little-endian blobs of fixed size, whatever the machine.
+
+void BindDoubles(SqliteStatement* statement, int parameter,
+                 const double* values, size_t size);
+
+// Throws SqliteError, beginning with `row`, for a blob of another size.
+void DoublesFromBlob(const SqliteStatement& statement, int column,
+                     const std::string& row, size_t size, double* values);
+
+}  // namespace adasfm

@@ -1,0 +1,127 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "colmap_ext/io/step_journal.h"
+
+#include <algorithm>
+#include <chrono>
+#include <filesystem>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <stdexcept>
+
+#include "colmap_ext/io/output_files.h"
+
+namespace adasfm {
+
+StatusOr<StepJournal> StepJournal::Read(const std::string& path) {
+  StepJournal journal;
+  journal.path_ = path;
+  std::error_code error;
+  if (!std::filesystem::exists(path, error)) return journal;
+  try {
+    std::ifstream file(path);
+    for (const nlohmann::json& entry : nlohmann::json::parse(file)) {
+      Step step;
+      step.name = entry.at("name");
+      step.inputs = entry.at("inputs").get<StepInputs>();
+      step.is_done = entry.at("is_done");
+      step.seconds = entry.at("seconds");
+      journal.steps_.push_back(std::move(step));
+    }
+  } catch (const nlohmann::json::exception&) {
+    return Status::Error(path +
+                         " is damaged; remove it to do all steps again, or "
+                         "choose another workspace");
+  }
+  return journal;
+}
+
+const StepJournal::Step* StepJournal::Find(const std::string& name) const {
+  const auto step =
+      std::find_if(steps_.begin(), steps_.end(),
+                   [&name](const Step& entry) { return entry.name == name; });
+  return step == steps_.end() ? nullptr : &*step;
+}
+
+StepJournal::State StepJournal::GetState(const std::string& name,
+                                         const StepInputs& inputs) const {
+  const Step* step = Find(name);
+  if (step == nullptr) return State::kNew;
+  if (step->inputs != inputs) return State::kChanged;
+  return step->is_done ? State::kDone : State::kBegun;
+}
+
+std::string StepJournal::DescribeChange(const std::string& name,
+                                        const StepInputs& inputs) const {
+  const Step* step = Find(name);
+  if (step == nullptr) return "";
+  std::string text;
+  for (const auto& [key, value] : inputs) {
+    const auto old = step->inputs.find(key);
+    const std::string old_value = old == step->inputs.end() ? "" : old->second;
+    if (old_value == value) continue;
+    text += (text.empty() ? "" : ", ") + key + " is '" + value + "', was '" +
+            old_value + "'";
+  }
+  return text;
+}
+
+Status StepJournal::Begin(const std::string& name, const StepInputs& inputs) {
+  const Step* old = Find(name);
+  if (old != nullptr) steps_.resize(old - steps_.data());
+  steps_.push_back({name, inputs, false, 0.0});
+  return Write();
+}
+
+Status StepJournal::Finish(const std::string& name, double seconds) {
+  if (Find(name) == nullptr) {
+    throw std::logic_error("StepJournal: " + name + " has not begun");
+  }
+  Step& step = steps_[Find(name) - steps_.data()];
+  step.is_done = true;
+  step.seconds = seconds;
+  return Write();
+}
+
+StatusOr<double> StepJournal::Run(const std::string& name,
+                                  const StepInputs& inputs,
+                                  const std::function<Status()>& reset,
+                                  const std::function<Status()>& work,
+                                  const MessageCallback& message) {
+  const State state = GetState(name, inputs);
+  if (state == State::kDone) {
+    message(name + ": done before");
+    return Find(name)->seconds;
+  }
+  if (state == State::kChanged) {
+    message(name + ": " + DescribeChange(name, inputs) +
+            "; doing this and all that follows anew");
+  }
+  const auto start = std::chrono::steady_clock::now();
+  Status status;
+  if (state != State::kBegun) {
+    // After a crash in here no inputs are those of the step.
+    status = Begin(name, {{"removing", "old results"}});
+    if (status.ok()) status = reset();
+  }
+  if (status.ok()) status = Begin(name, inputs);
+  if (status.ok()) status = work();
+  if (!status.ok()) return status;
+  const std::chrono::duration<double> elapsed =
+      std::chrono::steady_clock::now() - start;
+  status = Finish(name, elapsed.count());
+  if (!status.ok()) return status;
+  return elapsed.count();
+}
+
+Status StepJournal::Write() const {
+  nlohmann::json json = nlohmann::json::array();
+  for (const Step& step : steps_) {
+    json.push_back({{"name", step.name},
+                    {"inputs", step.inputs},
+                    {"is_done", step.is_done},
+                    {"seconds", step.seconds}});
+  }
+  return WriteTextFile(path_, json.dump(2) + "\n");
+}
+
+}  // namespace adasfm

@@ -1,0 +1,274 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "colmap_ext/mapper/local_mapper.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <stdexcept>
+#include <utility>
+#include <vector>
+
+#include "colmap_ext/host/pose_conversion.h"
+#include "colmap_ext/host/triangulation.h"
+#include "colmap_ext/mapper/part_adjuster.h"
+#include "colmap_ext/mapper/prior_support.h"
+#include "core/interruption.h"
+
+namespace adasfm {
+namespace {
+
+// A first pair that triangulates fewer points is given up for the next one.
+constexpr size_t kMinNumInitialPoints = 15;
+constexpr size_t kMaxNumInitialTrials = 5;
+// A batch larger than this share of the model would stand on points that no
+// adjustment has seen.
+constexpr double kMaxBatchRatio = 0.5;
+constexpr size_t kMinBatchSize = 8;
+
+class LocalMapper {
+ public:
+  LocalMapper(const LocalMapperOptions& options, const SceneData& data,
+              const CoarsePoseMap& coarse, const std::set<image_t>& images)
+      : options_(options),
+        scene_(BuildMapperScene(data, coarse, images)),
+        reconstruction_(scene_->reconstruction),
+        triangulator_(&scene_->graph, &reconstruction_,
+                      options.min_triangulation_angle_deg),
+        adjuster_(options, scene_.get(), &triangulator_) {}
+
+  LocalMapResult Run() {
+    while (RegisterInitialPair()) {  // 1
+      while (RegisterBatch()) {      // 2
+        AdjustAsGrown();             // 3
+        ThrowIfInterrupted();
+      }
+      num_registered_at_adjustment_ = 0;
+    }  // 4
+    if (reconstruction_.NumRegImages() == 0) {
+      throw std::runtime_error("no initial pair among the part's images");
+    }
+    RegisterByPriors();  // 5
+    Finish();            // 6
+    reconstruction_.TearDown();
+    result_.num_global_adjustments = adjuster_.NumGlobalAdjustments();
+    result_.keypoint_sigma_factor = adjuster_.KeypointSigmaFactor();
+    result_.mean_reproj_error_px =
+        reconstruction_.ComputeMeanReprojectionError();
+    result_.reconstruction = std::move(reconstruction_);
+    return std::move(result_);
+  }
+
+ private:
+  std::set<image_t> RegisteredImages() const {
+    return {reconstruction_.RegImageIds().begin(),
+            reconstruction_.RegImageIds().end()};
+  }
+
+  void Register(image_t image_id, const Rigid3d& cam_from_world) {
+    SetCamFromWorld(cam_from_world, &reconstruction_.Image(image_id));
+    reconstruction_.RegisterImage(image_id);
+  }
+
+  bool RegisterInitialPair() {
+    for (const InitialPair& pair : FindInitialPairs(
+             options_.initial_pair, *scene_, kMaxNumInitialTrials)) {
+      const Rigid3d local_from_coarse = FindLocalFromCoarse(pair.image_id1);
+      Register(pair.image_id1,
+               pair.cam1_from_world * local_from_coarse.Inverse());
+      Register(pair.image_id2,
+               pair.cam2_from_world * local_from_coarse.Inverse());
+      triangulator_.TriangulateImage(pair.image_id1);
+      adjuster_.AdjustPair(pair.image_id1, pair.image_id2);
+      if (reconstruction_.Image(pair.image_id1).NumPoints3D() >=
+          kMinNumInitialPoints) {
+        return true;
+      }
+      reconstruction_.DeRegisterImage(pair.image_id2);
+      reconstruction_.DeRegisterImage(pair.image_id1);
+    }
+    return false;
+  }
+
+  // Where the coarse frame has drifted to near an image that begins a new
+  // piece: from the registered image that the coarse poses put nearest to it.
+  Rigid3d FindLocalFromCoarse(image_t image_id) const {
+    const Eigen::Vector3d center =
+        scene_->coarse->at(image_id).TargetOriginInSource();
+    double best_distance = 0.0;
+    image_t nearest = kInvalidImageId;
+    for (const image_t other : RegisteredImages()) {
+      const auto coarse = scene_->coarse->find(other);
+      if (coarse == scene_->coarse->end()) continue;
+      const double distance =
+          (coarse->second.TargetOriginInSource() - center).norm();
+      if (nearest == kInvalidImageId || distance < best_distance) {
+        best_distance = distance;
+        nearest = other;
+      }
+    }
+    if (nearest == kInvalidImageId) return Rigid3d();
+    return CamFromWorld(reconstruction_.Image(nearest)).Inverse() *
+           scene_->coarse->at(nearest);
+  }
+
+  // The unregistered images that see v_p points, most points first. An image
+  // that failed is tried again only when it sees more than it did.
+  std::vector<image_t> FindBatch() const {
+    std::vector<std::pair<int, image_t>> candidates;
+    for (const image_t image_id : scene_->images) {
+      if (reconstruction_.IsImageRegistered(image_id)) continue;
+      const int num_visible =
+          static_cast<int>(FindVisiblePoints(*scene_, image_id).size());
+      const auto failed = num_visible_at_failure_.find(image_id);
+      if (num_visible < options_.registration.min_num_visible_points ||
+          (failed != num_visible_at_failure_.end() &&
+           num_visible < 1.2 * failed->second)) {
+        continue;
+      }
+      candidates.emplace_back(-num_visible, image_id);
+    }
+    std::sort(candidates.begin(), candidates.end());
+    std::vector<image_t> batch;
+    for (const auto& candidate : candidates) batch.push_back(candidate.second);
+    return batch;
+  }
+
+  // False when no image could be registered.
+  bool RegisterBatch() {
+    const size_t max_size = std::max(
+        kMinBatchSize,
+        static_cast<size_t>(kMaxBatchRatio * reconstruction_.NumRegImages()));
+    batch_.clear();
+    for (const image_t image_id : FindBatch()) {
+      if (batch_.size() == max_size) break;
+      const RegisterImageResult pose =
+          EstimateImagePose(options_.registration, *scene_, image_id);
+      if (pose.registered_by == RegisteredBy::kNone) {
+        num_visible_at_failure_[image_id] = pose.num_visible_points;
+        continue;
+      }
+      result_.num_registered_by_global_pose +=
+          pose.registered_by == RegisteredBy::kGlobalPose;
+      Register(image_id, pose.cam_from_world);
+      triangulator_.TriangulateImage(image_id);
+      batch_.insert(image_id);
+    }
+    return !batch_.empty();
+  }
+
+  void AdjustAsGrown() {
+    if (reconstruction_.NumRegImages() >=
+        options_.global_adjustment_growth * num_registered_at_adjustment_) {
+      adjuster_.AdjustAll(10);
+      num_registered_at_adjustment_ = reconstruction_.NumRegImages();
+    } else {
+      adjuster_.AdjustBatch(batch_);
+    }
+  }
+
+  // Breadth first from the registered images along priors that confirm the
+  // coarse motion.
+  void RegisterByPriors() {
+    bool grew = true;
+    while (grew) {
+      grew = false;
+      for (const image_t image_id : scene_->images) {
+        if (reconstruction_.IsImageRegistered(image_id) ||
+            !HasConfirmedNeighbor(image_id)) {
+          continue;
+        }
+        const auto pose = ComputeGlobalCandidate(*scene_, image_id);
+        if (!pose) continue;
+        Register(image_id, *pose);
+        result_.prior_only_images.insert(image_id);
+        grew = true;
+      }
+    }
+  }
+
+  // Whether a registered image is tied to this one by a prior that agrees with
+  // the coarse motion between the two.
+  bool HasConfirmedNeighbor(image_t image_id) const {
+    const auto indices = scene_->priors_of_image.find(image_id);
+    if (indices == scene_->priors_of_image.end()) return false;
+    for (const size_t i : indices->second) {
+      const RelativePosePrior& prior = scene_->priors[i];
+      const image_t other =
+          prior.image_id1 == image_id ? prior.image_id2 : prior.image_id1;
+      const auto coarse1 = scene_->coarse->find(prior.image_id1);
+      const auto coarse2 = scene_->coarse->find(prior.image_id2);
+      if (reconstruction_.IsImageRegistered(other) &&
+          coarse1 != scene_->coarse->end() &&
+          coarse2 != scene_->coarse->end() &&
+          IsSupportedByPrior(
+              {}, prior,
+              ComputeCam2FromCam1(coarse1->second, coarse2->second))) {
+        return true;
+      }
+    }
+    return false;
+  }
+
+  void Finish() {
+    adjuster_.AdjustAll(15);
+    for (const image_t image_id : RegisteredImages()) {
+      triangulator_.TriangulateImage(image_id);
+    }
+    adjuster_.AdjustAll(15);
+    for (auto it = result_.prior_only_images.begin();
+         it != result_.prior_only_images.end();) {
+      // Points reached it after all.
+      const bool has_points = reconstruction_.Image(*it).NumPoints3D() >=
+                              options_.registration.min_num_visible_points;
+      it = has_points ? result_.prior_only_images.erase(it) : std::next(it);
+    }
+  }
+
+  const LocalMapperOptions& options_;
+  std::unique_ptr<MapperScene> scene_;
+  colmap::Reconstruction& reconstruction_;
+  Triangulator triangulator_;
+  PartAdjuster adjuster_;
+  std::set<image_t> batch_;
+  std::map<image_t, int> num_visible_at_failure_;
+  size_t num_registered_at_adjustment_ = 0;
+  LocalMapResult result_;
+};
+
+}  // namespace
+
+bool LocalMapperOptions::IsValid(std::string* error) const {
+  const auto check = [error](bool holds, const std::string& name, double value,
+                             const std::string& rule) {
+    if (!holds) {
+      *error =
+          "AdaSfmMapper." + name + " = " + std::to_string(value) + " " + rule;
+    }
+    return holds;
+  };
+  return check(registration.min_num_visible_points >= 4,
+               "min_num_visible_points", registration.min_num_visible_points,
+               "must be at least 4") &&
+         check(registration.max_reproj_error_px > 0.0, "max_reproj_error_px",
+               registration.max_reproj_error_px, "must be positive") &&
+         check(filter_max_reproj_error_px > 0.0, "filter_max_reproj_error_px",
+               filter_max_reproj_error_px, "must be positive") &&
+         check(min_triangulation_angle_deg > 0.0, "min_triangulation_angle_deg",
+               min_triangulation_angle_deg, "must be positive") &&
+         check(global_adjustment_growth > 1.0, "global_adjustment_growth",
+               global_adjustment_growth, "must be above 1") &&
+         check(keypoint_sigma_px > 0.0, "keypoint_sigma_px", keypoint_sigma_px,
+               "must be positive") &&
+         balance.IsValid(error);
+}
+
+LocalMapResult ReconstructLocally(const LocalMapperOptions& options,
+                                  const SceneData& data,
+                                  const CoarsePoseMap& coarse,
+                                  const std::set<image_t>& images) {
+  std::string error;
+  if (!options.IsValid(&error)) throw std::invalid_argument(error);
+  return LocalMapper(options, data, coarse, images).Run();
+}
+
+}  // namespace adasfm

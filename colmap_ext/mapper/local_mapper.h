@@ -1,0 +1,70 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <base/reconstruction.h>
+
+#include <memory>
+#include <set>
+#include <string>
+
+#include "colmap_ext/bundle_adjustment/balance_priors.h"
+#include "colmap_ext/bundle_adjustment/bundle_adjustment.h"
+#include "colmap_ext/mapper/initial_pair.h"
+#include "colmap_ext/mapper/local_mapper_scene.h"
+#include "colmap_ext/mapper/register_image.h"
+
+namespace adasfm {
+
+struct LocalMapperOptions {
+  RegisterImageOptions registration;
+  InitialPairOptions initial_pair;
+  // Terms of the sensor priors in the adjustments.
+  bool use_priors_in_adjustment = true;
+  // After an adjustment, observations beyond this error are removed, and points
+  // below this angle.
+  double filter_max_reproj_error_px = 4.0;
+  double min_triangulation_angle_deg = 1.5;
+  // The whole part is adjusted when it has grown by this factor since the last
+  // time. The coarse poses keep drift small in between, so this is seldom
+  // (COLMAP: 1.1 and every 500 images).
+  double global_adjustment_growth = 1.5;
+  // 1 sigma of a keypoint's position, which weighs priors against keypoints.
+  double keypoint_sigma_px = 0.5;
+  // How vision is weighed against the priors.
+  PriorBalanceOptions balance;
+  int num_threads = 1;
+
+  bool IsValid(std::string* error) const;
+};
+
+struct LocalMapResult {
+  // Only registered images; in the coarse frame up to drift.
+  colmap::Reconstruction reconstruction;
+  // Registered images whose pose rests on priors alone.
+  std::set<image_t> prior_only_images;
+  int num_registered_by_global_pose = 0;
+  int num_global_adjustments = 0;
+  double mean_reproj_error_px = 0.0;
+  // By which keypoint_sigma_px was raised in balance with the priors.
+  double keypoint_sigma_factor = 1.0;
+};
+
+// Reconstructs one part incrementally, steered by the coarse poses (paper,
+// section on local incremental SfM):
+//   1. initial pair, in the coarse frame
+//   2. batches of all images that see v_p points, best first, each with the
+//      better one of its two candidate poses
+//   3. bundle adjustment with priors: the batch after each batch, the part when
+//      it has grown
+//   4. again from 1 for what the matches did not reach: the coarse frame joins
+//      the pieces
+//   5. images that no points reach take the coarse pose where priors confirm it
+//   6. retriangulation and a final adjustment.
+// Images that nothing supports stay out. Throws std::runtime_error when not
+// even an initial pair is found.
+LocalMapResult ReconstructLocally(const LocalMapperOptions& options,
+                                  const SceneData& data,
+                                  const CoarsePoseMap& coarse,
+                                  const std::set<image_t>& images);
+
+}  // namespace adasfm

@@ -1,0 +1,116 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "colmap_ext/mapper/part_adjuster.h"
+
+#include <algorithm>
+#include <map>
+#include <utility>
+
+#include "colmap_ext/bundle_adjustment/balance_priors.h"
+
+namespace adasfm {
+namespace {
+
+// Registered images that see the batch's points, held fixed in its adjustment.
+constexpr size_t kMaxNumConstantImages = 30;
+// What the next images, or the refinement of the whole, bring moves the part by
+// more.
+constexpr double kFunctionTolerance = 1e-3;
+
+}  // namespace
+
+std::vector<PosePriorEdge> FindPriorEdges(const MapperScene& scene,
+                                          const std::set<image_t>& images) {
+  std::vector<PosePriorEdge> edges;
+  for (const RelativePosePrior& prior : scene.priors) {
+    if (images.count(prior.image_id1) && images.count(prior.image_id2)) {
+      edges.push_back(PosePriorEdgeFromPrior(prior));
+    }
+  }
+  return edges;
+}
+
+PartAdjuster::PartAdjuster(const LocalMapperOptions& options,
+                           MapperScene* scene, Triangulator* triangulator)
+    : options_(options),
+      scene_(*scene),
+      reconstruction_(scene->reconstruction),
+      triangulator_(*triangulator) {}
+
+void PartAdjuster::AdjustPair(image_t image_id1, image_t image_id2) {
+  const std::set<image_t> images = {image_id1, image_id2};
+  AdjustImages(images, {}, 20);
+  Filter(images);
+}
+
+void PartAdjuster::AdjustBatch(const std::set<image_t>& batch) {
+  AdjustImages(batch, FindConstantImages(batch), 8);
+  Filter(batch);
+}
+
+std::set<image_t> PartAdjuster::FindConstantImages(
+    const std::set<image_t>& batch) const {
+  std::map<image_t, int> num_matches;
+  for (const image_t image_id : batch) {
+    for (const auto& [neighbor, count] : scene_.neighbors.at(image_id)) {
+      if (reconstruction_.IsImageRegistered(neighbor) &&
+          !batch.count(neighbor)) {
+        num_matches[neighbor] += count;
+      }
+    }
+  }
+  std::vector<std::pair<int, image_t>> ranked;
+  for (const auto& [image_id, count] : num_matches) {
+    ranked.emplace_back(-count, image_id);
+  }
+  std::sort(ranked.begin(), ranked.end());
+  std::set<image_t> constant_images;
+  for (const auto& [count, image_id] : ranked) {
+    if (constant_images.size() == kMaxNumConstantImages) break;
+    constant_images.insert(image_id);
+  }
+  return constant_images;
+}
+
+void PartAdjuster::AdjustImages(const std::set<image_t>& images,
+                                const std::set<image_t>& constant_images,
+                                int max_num_iterations) {
+  PriorBundleAdjustmentProblem problem;
+  problem.images = images;
+  problem.constant_images = constant_images;
+  if (options_.use_priors_in_adjustment) {
+    std::set<image_t> all = images;
+    all.insert(constant_images.begin(), constant_images.end());
+    problem.priors = FindPriorEdges(scene_, all);
+  }
+  PriorBundleAdjustmentOptions options;
+  options.keypoint_sigma_px = options_.keypoint_sigma_px;
+  options.max_num_iterations = max_num_iterations;
+  options.function_tolerance = kFunctionTolerance;
+  options.num_threads = options_.num_threads;
+  if (!constant_images.empty()) {
+    // Neighbours that stand fixed say nothing about the balance.
+    options.keypoint_sigma_px *= keypoint_sigma_factor_;
+    AdjustBundle(options, problem, &reconstruction_);
+    return;
+  }
+  AdjustBundleInBalance(options_.balance, options, problem, &reconstruction_,
+                        &keypoint_sigma_factor_);
+}
+
+void PartAdjuster::AdjustAll(int max_num_iterations) {
+  ++num_global_adjustments_;
+  triangulator_.CompleteAndMergeTracks(options_.filter_max_reproj_error_px);
+  AdjustImages({reconstruction_.RegImageIds().begin(),
+                reconstruction_.RegImageIds().end()},
+               {}, max_num_iterations);
+  reconstruction_.FilterAllPoints3D(options_.filter_max_reproj_error_px,
+                                    options_.min_triangulation_angle_deg);
+}
+
+void PartAdjuster::Filter(const std::set<image_t>& images) {
+  reconstruction_.FilterPoints3DInImages(options_.filter_max_reproj_error_px,
+                                         options_.min_triangulation_angle_deg,
+                                         {images.begin(), images.end()});
+}
+
+}  // namespace adasfm

@@ -1,0 +1,55 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <base/reconstruction.h>
+
+#include <set>
+#include <vector>
+
+#include "colmap_ext/bundle_adjustment/bundle_adjustment.h"
+#include "colmap_ext/host/triangulation.h"
+#include "colmap_ext/mapper/local_mapper.h"
+#include "colmap_ext/mapper/local_mapper_scene.h"
+
+namespace adasfm {
+
+// The priors among the images, as terms of an adjustment.
+std::vector<PosePriorEdge> FindPriorEdges(const MapperScene& scene,
+                                          const std::set<image_t>& images);
+
+// The bundle adjustments of a part that grows, with priors, each followed by
+// the filters of points. Vision's weight against the priors is kept from one to
+// the next. The arguments must outlive it.
+class PartAdjuster {
+ public:
+  PartAdjuster(const LocalMapperOptions& options, MapperScene* scene,
+               Triangulator* triangulator);
+
+  // The first two images.
+  void AdjustPair(image_t image_id1, image_t image_id2);
+  // The batch, with the registered images that share most matches with it held
+  // fixed.
+  void AdjustBatch(const std::set<image_t>& batch);
+  // All registered images, after joining tracks.
+  void AdjustAll(int max_num_iterations);
+
+  // Calls of AdjustAll.
+  int NumGlobalAdjustments() const { return num_global_adjustments_; }
+  double KeypointSigmaFactor() const { return keypoint_sigma_factor_; }
+
+ private:
+  std::set<image_t> FindConstantImages(const std::set<image_t>& batch) const;
+  void AdjustImages(const std::set<image_t>& images,
+                    const std::set<image_t>& constant_images,
+                    int max_num_iterations);
+  void Filter(const std::set<image_t>& images);
+
+  const LocalMapperOptions& options_;
+  const MapperScene& scene_;
+  colmap::Reconstruction& reconstruction_;
+  Triangulator& triangulator_;
+  double keypoint_sigma_factor_ = 1.0;
+  int num_global_adjustments_ = 0;
+};
+
+}  // namespace adasfm

@@ -1,0 +1,50 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "colmap_ext/mapper/prior_support.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/so3.h"
+
+namespace adasfm {
+namespace {
+
+constexpr double kNumSigmas = 4.0;
+
+// The largest standard deviation of a 3x3 block's diagonal.
+double MaxSigma(const Eigen::Matrix<double, 6, 6>& covariance, int begin) {
+  return std::sqrt(
+      std::max(0.0, covariance.diagonal().segment<3>(begin).maxCoeff()));
+}
+
+}  // namespace
+
+bool IsSupportedByPrior(const PriorSupportOptions& options,
+                        const RelativePosePrior& prior,
+                        const Rigid3d& cam2_from_cam1) {
+  if (!prior.HasRotation() && !prior.HasDirection() && !prior.HasLength()) {
+    return false;
+  }
+  if (prior.HasRotation()) {
+    const double angle_rad =
+        AngleBetweenRad(cam2_from_cam1.rotation, prior.cam2_from_cam1.rotation);
+    if (angle_rad > options.rotation_tolerance_rad +
+                        kNumSigmas * MaxSigma(prior.covariance, 0)) {
+      return false;
+    }
+  }
+  const double prior_length = prior.cam2_from_cam1.translation.norm();
+  const double length = cam2_from_cam1.translation.norm();
+  if (!prior.HasLength()) return true;
+  const double tolerance_m =
+      std::max(options.translation_tolerance_m,
+               options.translation_tolerance_ratio * prior_length) +
+      kNumSigmas * MaxSigma(prior.covariance, 3);
+  if (!prior.HasDirection()) {
+    return std::abs(length - prior_length) <= tolerance_m;
+  }
+  return (cam2_from_cam1.translation - prior.cam2_from_cam1.translation)
+             .norm() <= tolerance_m;
+}
+
+}  // namespace adasfm

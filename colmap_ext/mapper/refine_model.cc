@@ -1,0 +1,280 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "colmap_ext/mapper/refine_model.h"
+
+#include <algorithm>
+#include <stdexcept>
+#include <utility>
+#include <vector>
+
+#include "colmap_ext/bundle_adjustment/bundle_adjustment.h"
+#include "colmap_ext/host/pose_conversion.h"
+#include "colmap_ext/host/triangulation.h"
+#include "colmap_ext/mapper/local_mapper.h"
+#include "colmap_ext/mapper/part_adjuster.h"
+#include "colmap_ext/mapper/prior_support.h"
+#include "colmap_ext/mapper/register_image.h"
+
+namespace adasfm {
+namespace {
+
+// Fewer points than this do not hold an image by themselves.
+constexpr size_t kMinNumPointsToHold = 20;
+// And with fewer than this nothing is known of its pose.
+constexpr size_t kMinNumPointsToKeep = 6;
+// How weak the ties of such images to the coarse motion are.
+constexpr double kCoarseRotationSigmaRad = 0.02;
+constexpr double kCoarseDirectionSigmaRad = 0.1;
+constexpr double kCoarseLengthSigmaRatio = 0.2;
+constexpr size_t kMaxNumCoarseEdges = 4;
+// What no vision error and no calibration error explains.
+constexpr double kContradictionRotationRad = 0.1;
+constexpr double kContradictionTranslationRatio = 0.5;
+constexpr double kContradictionTranslationM = 0.5;
+
+class ModelRefiner {
+ public:
+  ModelRefiner(const RefineModelOptions& options, MapperScene* scene,
+               RefineModelSummary* summary)
+      : options_(options),
+        scene_(*scene),
+        reconstruction_(scene->reconstruction),
+        triangulator_(&scene->graph, &scene->reconstruction,
+                      options.min_triangulation_angle_deg),
+        summary_(*summary) {}
+
+  void JoinParts() {
+    if (!options_.join_parts) return;
+    const double loose_px = 3.0 * options_.filter_max_reproj_error_px;
+    AdjustTentatively(10);
+    Filter(loose_px);
+    triangulator_.CompleteAndMergeTracks(loose_px);
+  }
+
+  void AdjustRoughly() {
+    TriangulateWeakImages();
+    AdjustTentatively(15);
+    Filter(options_.filter_max_reproj_error_px);
+    if (PutBackContradictedImages()) AdjustTentatively(10);
+  }
+
+  void AdjustFinely() {
+    triangulator_.CompleteAndMergeTracks(options_.filter_max_reproj_error_px);
+    Adjust(25, 1e-6, FindPriors(), &summary_.keypoint_sigma_factor);
+    Filter(options_.filter_max_reproj_error_px);
+    LeaveOutUnsupportedImages();
+  }
+
+ private:
+  std::set<image_t> RegisteredImages() const {
+    return {reconstruction_.RegImageIds().begin(),
+            reconstruction_.RegImageIds().end()};
+  }
+
+  void Filter(double max_reproj_error_px) {
+    reconstruction_.FilterAllPoints3D(max_reproj_error_px,
+                                      options_.min_triangulation_angle_deg);
+  }
+
+  void TriangulateWeakImages() {
+    for (const image_t image_id : RegisteredImages()) {
+      const colmap::Image& image = reconstruction_.Image(image_id);
+      if (2 * image.NumPoints3D() < image.NumPoints2D()) {
+        triangulator_.TriangulateImage(image_id);
+      }
+    }
+  }
+
+  // For images on few points, the coarse motion to registered neighbours.
+  void AddCoarseEdges(std::vector<PosePriorEdge>* edges) const {
+    for (const image_t image_id : RegisteredImages()) {
+      const auto coarse = scene_.coarse->find(image_id);
+      if (coarse == scene_.coarse->end() ||
+          reconstruction_.Image(image_id).NumPoints3D() >=
+              kMinNumPointsToHold ||
+          (options_.use_priors_in_adjustment &&
+           scene_.priors_of_image.count(image_id))) {
+        continue;
+      }
+      size_t num_edges = 0;
+      for (const auto& [neighbor, num_matches] :
+           scene_.neighbors.at(image_id)) {
+        const auto coarse_neighbor = scene_.coarse->find(neighbor);
+        if (coarse_neighbor == scene_.coarse->end() ||
+            !reconstruction_.IsImageRegistered(neighbor)) {
+          continue;
+        }
+        PosePriorEdge edge;
+        edge.image_id1 = neighbor;
+        edge.image_id2 = image_id;
+        edge.cam2_from_cam1 =
+            ComputeCam2FromCam1(coarse_neighbor->second, coarse->second);
+        edge.rotation_sigma_rad = kCoarseRotationSigmaRad;
+        const double length = edge.cam2_from_cam1.translation.norm();
+        if (length > 1e-6) {
+          edge.direction_sigma_rad = kCoarseDirectionSigmaRad;
+          edge.length_sigma_m = kCoarseLengthSigmaRatio * length;
+        }
+        edges->push_back(edge);
+        if (++num_edges == kMaxNumCoarseEdges) break;
+      }
+    }
+  }
+
+  void MarkPriorsInGaps(std::vector<PosePriorEdge>* edges) const {
+    const auto is_held = [this](image_t image_id) {
+      return reconstruction_.Image(image_id).NumPoints3D() >=
+             kMinNumPointsToHold;
+    };
+    for (PosePriorEdge& edge : *edges) {
+      edge.is_held_by_points =
+          is_held(edge.image_id1) && is_held(edge.image_id2);
+    }
+  }
+
+  std::vector<PosePriorEdge> FindPriors() const {
+    if (!options_.use_priors_in_adjustment) return {};
+    return FindPriorEdges(scene_, RegisteredImages());
+  }
+
+  // Until parts and gaps are in place, priors are off for other reasons than
+  // keypoints; the balance found then serves this adjustment only.
+  void AdjustTentatively(int max_num_iterations) {
+    std::vector<PosePriorEdge> priors = FindPriors();
+    MarkPriorsInGaps(&priors);
+    double keypoint_sigma_factor = summary_.keypoint_sigma_factor;
+    Adjust(max_num_iterations, 1e-3, std::move(priors), &keypoint_sigma_factor);
+  }
+
+  void Adjust(int max_num_iterations, double function_tolerance,
+              std::vector<PosePriorEdge> priors,
+              double* keypoint_sigma_factor) {
+    PriorBundleAdjustmentProblem problem;
+    problem.images = RegisteredImages();
+    problem.priors = std::move(priors);
+    AddCoarseEdges(&problem.priors);
+    PriorBundleAdjustmentOptions options;
+    options.keypoint_sigma_px = options_.keypoint_sigma_px;
+    options.refine_focal_length = options_.refine_focal_length;
+    options.refine_principal_point = options_.refine_principal_point;
+    options.refine_extra_params = options_.refine_extra_params;
+    options.max_num_iterations = max_num_iterations;
+    options.function_tolerance = function_tolerance;
+    options.num_threads = options_.num_threads;
+    summary_.num_iterations +=
+        AdjustBundleInBalance(options_.balance, options, problem,
+                              &reconstruction_, keypoint_sigma_factor)
+            .num_iterations;
+    summary_.keypoint_sigma_px =
+        options_.keypoint_sigma_px * *keypoint_sigma_factor;
+    summary_.prior_chi2_per_dof =
+        ComputePriorChi2PerDof(problem.priors, reconstruction_);
+  }
+
+  bool IsContradicted(const RelativePosePrior& prior) const {
+    PriorSupportOptions options;
+    options.rotation_tolerance_rad = kContradictionRotationRad;
+    options.translation_tolerance_ratio = kContradictionTranslationRatio;
+    options.translation_tolerance_m = kContradictionTranslationM;
+    return !IsSupportedByPrior(
+        options, prior,
+        ComputeCam2FromCam1(
+            CamFromWorld(reconstruction_.Image(prior.image_id1)),
+            CamFromWorld(reconstruction_.Image(prior.image_id2))));
+  }
+
+  // The images all of whose usable priors are contradicted.
+  std::set<image_t> FindContradictedImages() const {
+    std::set<image_t> contradicted;
+    for (const auto& [image_id, indices] : scene_.priors_of_image) {
+      int num_usable = 0;
+      int num_contradicted = 0;
+      for (const size_t i : indices) {
+        const RelativePosePrior& prior = scene_.priors[i];
+        if (prior.flags & kPriorWheelSlip ||
+            !reconstruction_.IsImageRegistered(prior.image_id1) ||
+            !reconstruction_.IsImageRegistered(prior.image_id2)) {
+          continue;
+        }
+        ++num_usable;
+        num_contradicted += IsContradicted(prior);
+      }
+      if (num_contradicted > 0 && num_contradicted == num_usable &&
+          scene_.coarse->count(image_id)) {
+        contradicted.insert(image_id);
+      }
+    }
+    return contradicted;
+  }
+
+  bool PutBackContradictedImages() {
+    if (!options_.use_priors_in_adjustment) return false;
+    const std::set<image_t> images = FindContradictedImages();
+    for (const image_t image_id : images) {
+      reconstruction_.DeRegisterImage(image_id);
+    }
+    for (const image_t image_id : images) {
+      const auto pose = ComputeGlobalCandidate(scene_, image_id);
+      SetCamFromWorld(pose ? *pose : scene_.coarse->at(image_id),
+                      &reconstruction_.Image(image_id));
+      reconstruction_.RegisterImage(image_id);
+    }
+    summary_.num_images_put_back = static_cast<int>(images.size());
+    return !images.empty();
+  }
+
+  // A coarse pose that neither points nor priors confirm is only a guess.
+  void LeaveOutUnsupportedImages() {
+    for (const image_t image_id : RegisteredImages()) {
+      if (scene_.priors_of_image.count(image_id) > 0 ||
+          reconstruction_.Image(image_id).NumPoints3D() >=
+              kMinNumPointsToKeep) {
+        continue;
+      }
+      reconstruction_.DeRegisterImage(image_id);
+      ++summary_.num_images_left_out;
+    }
+  }
+
+  const RefineModelOptions& options_;
+  MapperScene& scene_;
+  colmap::Reconstruction& reconstruction_;
+  Triangulator triangulator_;
+  RefineModelSummary& summary_;
+};
+
+}  // namespace
+
+bool RefineModelOptions::IsValid(std::string* error) const {
+  if (filter_max_reproj_error_px > 0.0 && min_triangulation_angle_deg > 0.0 &&
+      keypoint_sigma_px > 0.0) {
+    return balance.IsValid(error);
+  }
+  *error =
+      "AdaSfmMapper.filter_max_reproj_error_px, min_triangulation_angle_deg "
+      "and keypoint_sigma_px must be positive";
+  return false;
+}
+
+void RefineModel(const RefineModelOptions& options, int round,
+                 MapperScene* scene, RefineModelSummary* summary) {
+  ModelRefiner refiner(options, scene, summary);
+  switch (round) {
+    case 1:
+      return refiner.JoinParts();
+    case 2:
+      return refiner.AdjustRoughly();
+    case kNumRefinementRounds:
+      return refiner.AdjustFinely();
+  }
+  throw std::invalid_argument("RefineModel: no round " + std::to_string(round));
+}
+
+void RegisterAtCoarsePoses(MapperScene* scene) {
+  for (const auto& [image_id, cam_from_world] : *scene->coarse) {
+    if (scene->images.count(image_id) == 0) continue;
+    SetCamFromWorld(cam_from_world, &scene->reconstruction.Image(image_id));
+    scene->reconstruction.RegisterImage(image_id);
+  }
+}
+
+}  // namespace adasfm

@@ -1,0 +1,64 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <set>
+#include <string>
+
+#include "colmap_ext/bundle_adjustment/balance_priors.h"
+#include "colmap_ext/mapper/local_mapper_scene.h"
+#include "core/types.h"
+
+namespace adasfm {
+
+struct RefineModelOptions {
+  bool use_priors_in_adjustment = true;
+  double filter_max_reproj_error_px = 4.0;
+  double min_triangulation_angle_deg = 1.5;
+  double keypoint_sigma_px = 0.5;
+  // As in LocalMapperOptions.
+  PriorBalanceOptions balance;
+  // Intrinsics are adjusted here and nowhere else, so that all parts agree
+  // about them.
+  bool refine_focal_length = false;
+  bool refine_principal_point = false;
+  bool refine_extra_params = false;
+  // Parts that were put together need a round with loose thresholds, in which
+  // tracks of different parts find each other.
+  bool join_parts = true;
+  int num_threads = -1;
+
+  bool IsValid(std::string* error) const;
+};
+
+struct RefineModelSummary {
+  int num_iterations = 0;
+  // By which the keypoints' sigma is multiplied. Every round begins with what
+  // the parts had; what the last one finds is kept.
+  double keypoint_sigma_factor = 1.0;
+  // 1 sigma of keypoints that agrees with the priors (balance_priors.h).
+  double keypoint_sigma_px = 0.0;
+  // Squared whitened residual of the priors per degree of freedom at the end.
+  double prior_chi2_per_dof = 0.0;
+  // Images that the priors contradict and that were put back.
+  int num_images_put_back = 0;
+  // Images without priors that end with too few points for a pose.
+  int num_images_left_out = 0;
+};
+
+inline constexpr int kNumRefinementRounds = 3;
+
+// Refines the whole model, in rounds from 1 to kNumRefinementRounds that follow
+// each other on the same summary; between them the model can be saved. Joining
+// of tracks, triangulation of what is still missing, filters, and bundle
+// adjustments with priors. Images that hold on few points are tied by weak
+// coarse motions. An image whose motion contradicts the priors on all sides is
+// put back to where the coarse model has it, without its points, so that the
+// result is not worse than the priors. An image that neither points nor priors
+// hold is left out in the end.
+void RefineModel(const RefineModelOptions& options, int round,
+                 MapperScene* scene, RefineModelSummary* summary);
+
+// Registers the scene's images where the coarse model has them, without points.
+void RegisterAtCoarsePoses(MapperScene* scene);
+
+}  // namespace adasfm

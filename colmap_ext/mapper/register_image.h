@@ -1,0 +1,59 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <optional>
+
+#include "colmap_ext/host/absolute_pose.h"
+#include "colmap_ext/mapper/local_mapper_scene.h"
+#include "core/rigid3d.h"
+#include "core/types.h"
+
+namespace adasfm {
+
+struct RegisterImageOptions {
+  // v_p: an image that sees fewer points is not tried.
+  int min_num_visible_points = 10;
+  // A point within this distance of its keypoint speaks for a pose.
+  double max_reproj_error_px = 8.0;
+  // Of the visible points; below it wrong matches explain as much.
+  double min_inlier_ratio = 0.25;
+  // P3P needs more points than v_p to be believed when no other pose confirms
+  // it.
+  int min_num_p3p_inliers = 15;
+  // Whether the coarse poses give a second candidate.
+  bool use_global_candidate = true;
+};
+
+enum class RegisteredBy { kNone, kP3p, kGlobalPose };
+
+struct RegisterImageResult {
+  RegisteredBy registered_by = RegisteredBy::kNone;
+  Rigid3d cam_from_world;
+  int num_visible_points = 0;
+  int num_inliers = 0;
+};
+
+// The pose of an image among the registered ones (paper, section on image
+// registration): the candidates are P3P and P_gb, the pose that explains more
+// of the visible points wins and is refined on them. Nothing is changed.
+RegisterImageResult EstimateImagePose(const RegisterImageOptions& options,
+                                      const MapperScene& scene,
+                                      image_t image_id);
+
+// P_gb: the coarse motion from the registered co-visible images k, and from
+// those that priors tie to the image. Rotation: the L1 mean (Weiszfeld; Hartley
+// et al. 2013) of R^_ki R_k. Position: the per-axis median of
+//   C_k + s R_k^T R^_k (C^_i - C^_k),
+// where s is the length of the local model over that of the coarse one nearby.
+// The paper takes the median of translations instead; centres do not depend on
+// where the origin lies. None when no such image is registered.
+std::optional<Rigid3d> ComputeGlobalCandidate(const MapperScene& scene,
+                                              image_t image_id);
+
+// True where the point projects within max_error_px of its keypoint.
+std::vector<char> FindReprojectionInliers(const PointsInImage& points,
+                                          const colmap::Camera& camera,
+                                          const Rigid3d& cam_from_world,
+                                          double max_error_px);
+
+}  // namespace adasfm

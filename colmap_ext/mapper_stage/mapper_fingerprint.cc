@@ -1,0 +1,164 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "colmap_ext/mapper_stage/mapper_fingerprint.h"
+
+#include <sstream>
+
+namespace adasfm {
+namespace {
+
+// FNV-1a over bytes.
+class Hash {
+ public:
+  template <typename T>
+  void Add(const T& value) {
+    const auto* bytes = reinterpret_cast<const unsigned char*>(&value);
+    for (size_t i = 0; i < sizeof(T); ++i) {
+      hash_ = (hash_ ^ bytes[i]) * 1099511628211ull;
+    }
+  }
+  void Add(const std::string& text) {
+    for (const char c : text) Add(c);
+  }
+  void Add(const Rigid3d& pose) {
+    for (int i = 0; i < 4; ++i) Add(pose.rotation.coeffs()(i));
+    for (int i = 0; i < 3; ++i) Add(pose.translation(i));
+  }
+  std::string Text() const {
+    std::ostringstream text;
+    text << std::hex << hash_;
+    return text.str();
+  }
+
+ private:
+  uint64_t hash_ = 14695981039346656037ull;
+};
+
+void AddScene(const SceneData& data, Hash* hash) {
+  for (const auto& [image_id, image] : data.images) {
+    hash->Add(image_id);
+    hash->Add(image.name);
+    for (const Eigen::Vector2d& keypoint : image.keypoints) {
+      hash->Add(keypoint.x());
+      hash->Add(keypoint.y());
+    }
+    if (image.gravity_in_cam) {
+      for (int i = 0; i < 3; ++i) hash->Add((*image.gravity_in_cam)(i));
+    }
+  }
+  for (const auto& [camera_id, camera] : data.cameras) {
+    hash->Add(camera_id);
+    hash->Add(camera.ModelId());
+    for (const double parameter : camera.Params()) hash->Add(parameter);
+  }
+  for (const ScenePair& pair : data.pairs) {
+    hash->Add(pair.image_id1);
+    hash->Add(pair.image_id2);
+    for (const FeatureMatch& match : pair.inlier_matches) {
+      hash->Add(match.point2D_idx1);
+      hash->Add(match.point2D_idx2);
+    }
+  }
+  for (const RelativePosePrior& prior : data.priors) {
+    hash->Add(prior.image_id1);
+    hash->Add(prior.image_id2);
+    hash->Add(prior.cam2_from_cam1);
+    for (int i = 0; i < 36; ++i) hash->Add(prior.covariance(i));
+    hash->Add(prior.flags);
+  }
+}
+
+void AddBalance(const PriorBalanceOptions& balance, Hash* hash) {
+  hash->Add(balance.enabled);
+  hash->Add(balance.max_chi2_per_dof);
+  hash->Add(balance.max_sigma_factor);
+}
+
+void AddPartitionOptions(const PartitionPlanOptions& partition, Hash* hash) {
+  hash->Add(partition.cut.max_part_size);
+  hash->Add(partition.cut.min_part_size);
+  hash->Add(partition.cut.seed);
+  hash->Add(partition.flood_fill.min_overlap_ratio);
+  hash->Add(partition.max_num_images_undivided);
+}
+
+void AddLocalOptions(const LocalMapperOptions& local, Hash* hash) {
+  hash->Add(local.registration.min_num_visible_points);
+  hash->Add(local.registration.max_reproj_error_px);
+  hash->Add(local.registration.min_inlier_ratio);
+  hash->Add(local.registration.min_num_p3p_inliers);
+  hash->Add(local.registration.use_global_candidate);
+  for (const double parallax_deg : local.initial_pair.min_parallaxes_deg) {
+    hash->Add(parallax_deg);
+  }
+  hash->Add(local.initial_pair.min_num_points);
+  hash->Add(local.initial_pair.max_epipolar_error_px);
+  hash->Add(local.use_priors_in_adjustment);
+  hash->Add(local.filter_max_reproj_error_px);
+  hash->Add(local.min_triangulation_angle_deg);
+  hash->Add(local.global_adjustment_growth);
+  hash->Add(local.keypoint_sigma_px);
+  AddBalance(local.balance, hash);
+}
+
+void AddAlignOptions(const AlignSimilarityOptions& align, Hash* hash) {
+  hash->Add(align.initial_threshold);
+  hash->Add(align.threshold_increase);
+  hash->Add(align.threshold_decrease);
+  hash->Add(align.min_inlier_ratio);
+  hash->Add(align.max_inlier_ratio);
+  hash->Add(align.max_num_iterations);
+  hash->Add(align.min_threshold);
+  hash->Add(align.max_threshold_to_extent);
+  hash->Add(align.max_rotation_error_deg);
+  hash->Add(align.adapt_threshold);
+  hash->Add(align.num_trials);
+  hash->Add(align.seed);
+}
+
+void AddRefineOptions(const RefineModelOptions& refine, Hash* hash) {
+  hash->Add(refine.use_priors_in_adjustment);
+  hash->Add(refine.filter_max_reproj_error_px);
+  hash->Add(refine.min_triangulation_angle_deg);
+  hash->Add(refine.keypoint_sigma_px);
+  AddBalance(refine.balance, hash);
+  hash->Add(refine.refine_focal_length);
+  hash->Add(refine.refine_principal_point);
+  hash->Add(refine.refine_extra_params);
+}
+
+}  // namespace
+
+std::string ComputePartsFingerprint(const PartitionPlanOptions& partition,
+                                    const LocalMapperOptions& local,
+                                    const SceneData& data,
+                                    const CoarsePoseMap& coarse) {
+  Hash hash;
+  AddScene(data, &hash);
+  for (const auto& [image_id, pose] : coarse) {
+    hash.Add(image_id);
+    hash.Add(pose);
+  }
+  AddPartitionOptions(partition, &hash);
+  AddLocalOptions(local, &hash);
+  return hash.Text();
+}
+
+std::string ComputeMergeFingerprint(const std::string& parts_fingerprint,
+                                    const AlignSimilarityOptions& align,
+                                    const RefineModelOptions& refine,
+                                    const std::vector<PartReport>& parts) {
+  Hash hash;
+  hash.Add(parts_fingerprint);
+  AddAlignOptions(align, &hash);
+  AddRefineOptions(refine, &hash);
+  for (const PartReport& part : parts) {
+    hash.Add(part.part_index);
+    hash.Add(part.failure.empty());
+    hash.Add(part.num_registered);
+    hash.Add(part.num_points);
+    hash.Add(part.mean_reproj_error_px);
+  }
+  return hash.Text();
+}
+
+}  // namespace adasfm

@@ -1,0 +1,254 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "colmap_ext/mapper_stage/mapper_stage.h"
+
+#include <algorithm>
+#include <atomic>
+#include <filesystem>
+#include <iomanip>
+#include <sstream>
+#include <stdexcept>
+
+#include "colmap_ext/mapper_stage/mapper_fingerprint.h"
+#include "colmap_ext/mapper_stage/mapper_steps.h"
+#include "colmap_ext/mapper_stage/part_memory.h"
+#include "core/parallel.h"
+
+namespace adasfm {
+namespace {
+
+namespace fs = std::filesystem;
+
+// The rest is for the scene itself, the system and what else runs.
+constexpr double kShareOfAvailableMemory = 0.7;
+
+// For a part that threw: fewer wrong poses and points to stumble over.
+LocalMapperOptions StricterOptions(LocalMapperOptions options) {
+  options.registration.min_num_visible_points *= 2;
+  options.registration.min_inlier_ratio =
+      std::max(0.5, options.registration.min_inlier_ratio);
+  options.registration.max_reproj_error_px *= 0.5;
+  options.initial_pair.max_epipolar_error_px *= 0.5;
+  return options;
+}
+
+bool IsMetric(const SceneData& data) {
+  return std::any_of(data.priors.begin(), data.priors.end(),
+                     [](const auto& prior) { return prior.HasLength(); });
+}
+
+MapperStageOptions WithThreads(MapperStageOptions options) {
+  options.refine.num_threads = EffectiveNumThreads(options.num_threads);
+  return options;
+}
+
+std::string InMegabytes(double bytes) {
+  std::ostringstream text;
+  text << std::fixed << std::setprecision(0) << bytes / 1e6 << " MB";
+  return text.str();
+}
+
+}  // namespace
+
+std::string PartCheckpointPath(const std::string& checkpoint_path,
+                               int part_index) {
+  return checkpoint_path + "/part_" + std::to_string(part_index);
+}
+
+bool MapperStageOptions::IsValid(std::string* error) const {
+  if (max_memory_gb == 0.0 || !(max_memory_gb >= -1.0)) {
+    *error = "AdaSfmMapper.max_memory_gb = " + std::to_string(max_memory_gb) +
+             " must be positive, or -1";
+    return false;
+  }
+  return partition.IsValid(error) && local.IsValid(error) &&
+         align.IsValid(error) && refine.IsValid(error);
+}
+
+MapperStage::MapperStage(const MapperStageOptions& options,
+                         const SceneData& data, const CoarsePoseMap& coarse,
+                         const std::string& output_path,
+                         MapperProgress progress, PartMapper part_mapper)
+    : options_(WithThreads(options)),
+      data_(data),
+      coarse_(coarse),
+      checkpoint_path_(output_path + "/checkpoints"),
+      fingerprint_(ComputePartsFingerprint(options.partition, options.local,
+                                           data, coarse)),
+      progress_(std::move(progress)),
+      part_mapper_(std::move(part_mapper)) {
+  std::string error;
+  if (!options.IsValid(&error)) throw std::invalid_argument(error);
+  summary_.is_metric = IsMetric(data);
+}
+
+void MapperStage::Report(const std::string& line, double share_done) const {
+  share_done_ = std::max(share_done_.load(), share_done);
+  if (progress_) progress_(line, share_done_);
+}
+
+Status MapperStage::Plan() {
+  const StepTimer timer;
+  const std::string path = checkpoint_path_ + "/plan.json";
+  if (ReadPlan().ok()) {
+    Report("plan of " + std::to_string(summary_.plan.parts.size()) +
+               " parts taken from " + path,
+           0.02);
+    return Status::Ok();
+  }
+  // Parts of another plan must not be mixed with this one's.
+  std::error_code error;
+  if (fs::exists(path)) {
+    Report("options or database have changed: starting anew", 0.0);
+  }
+  fs::remove_all(checkpoint_path_, error);
+  fs::create_directories(checkpoint_path_, error);
+  if (error) {
+    return Status::Error("cannot create the folder " + checkpoint_path_);
+  }
+  summary_.plan = BuildPartitionPlan(options_.partition, data_, coarse_);
+  const Status status = WritePartitionPlan(path, fingerprint_, summary_.plan);
+  summary_.plan_seconds = timer.Seconds();
+  return status;
+}
+
+Status MapperStage::ReadPlan() {
+  StatusOr<PartitionPlan> plan =
+      ReadPartitionPlan(checkpoint_path_ + "/plan.json", fingerprint_);
+  if (!plan.ok()) return plan.status();
+  summary_.plan = std::move(*plan);
+  return Status::Ok();
+}
+
+Status MapperStage::RunPart(int part_index) {
+  const Status status = ReadPlan();
+  if (!status.ok()) return status;
+  const int num_parts = static_cast<int>(summary_.plan.parts.size());
+  if (part_index < 0 || part_index >= num_parts) {
+    return Status::Error(
+        "AdaSfmMapper.part_index = " + std::to_string(part_index) +
+        ", but the plan has the parts 0 to " + std::to_string(num_parts - 1));
+  }
+  return RunPartWithThreads(part_index,
+                            EffectiveNumThreads(options_.num_threads));
+}
+
+// Never throws: a part that fails has a report that says so.
+PartReport MapperStage::MapPart(int part_index, int num_threads,
+                                LocalMapResult* result) const {
+  const std::vector<image_t>& part = summary_.plan.parts[part_index];
+  const std::set<image_t> images(part.begin(), part.end());
+  const StepTimer timer;
+  PartReport report;
+  report.part_index = part_index;
+  report.num_images = static_cast<int>(part.size());
+  LocalMapperOptions options = options_.local;
+  options.num_threads = num_threads;
+  for (int attempt = 0; attempt < 2; ++attempt) {
+    report.failure.clear();
+    try {
+      *result = part_mapper_(options, data_, coarse_, images);
+      break;
+    } catch (const std::exception& exception) {
+      report.failure = exception.what();
+      if (attempt == 0) report.retry_reason = exception.what();
+      Report("part " + std::to_string(part_index) +
+             " failed: " + exception.what() +
+             (attempt == 0 ? "; trying again with stricter settings"
+                           : "; the others go on without it"));
+      options = StricterOptions(options);
+    }
+  }
+  report.seconds = timer.Seconds();
+  if (!report.failure.empty()) return report;
+  report.num_registered = result->reconstruction.NumRegImages();
+  report.num_points = result->reconstruction.NumPoints3D();
+  report.num_registered_by_global_pose = result->num_registered_by_global_pose;
+  report.num_global_adjustments = result->num_global_adjustments;
+  report.mean_reproj_error_px = result->mean_reproj_error_px;
+  report.keypoint_sigma_factor = result->keypoint_sigma_factor;
+  report.prior_only_images = result->prior_only_images;
+  return report;
+}
+
+Status MapperStage::RunPartWithThreads(int part_index, int num_threads) {
+  const std::string path = PartCheckpointPath(checkpoint_path_, part_index);
+  if (ReadPartReport(path, fingerprint_).ok()) return Status::Ok();
+  LocalMapResult result;
+  const PartReport report = MapPart(part_index, num_threads, &result);
+  return WritePartCheckpoint(
+      path, fingerprint_, report,
+      report.failure.empty() ? &result.reconstruction : nullptr);
+}
+
+int MapperStage::FindNumParallelParts() {
+  const int num_parts = static_cast<int>(summary_.plan.parts.size());
+  std::vector<double> bytes;
+  for (const auto& part : summary_.plan.parts) {
+    bytes.push_back(EstimatePartMemoryBytes(data_, part));
+    summary_.max_part_memory_bytes =
+        std::max(summary_.max_part_memory_bytes, bytes.back());
+  }
+  const double limit = options_.max_memory_gb > 0.0
+                           ? 1e9 * options_.max_memory_gb
+                           : kShareOfAvailableMemory * AvailableMemoryBytes();
+  int num_parallel =
+      std::min({EffectiveNumThreads(options_.num_threads),
+                std::max(1, num_parts), CountPartsThatFit(bytes, limit)});
+  if (options_.max_num_parallel_parts > 0) {
+    num_parallel = std::min(num_parallel, options_.max_num_parallel_parts);
+  }
+  summary_.num_parallel_parts = num_parallel;
+  std::string line = std::to_string(num_parts) + " parts, " +
+                     std::to_string(num_parallel) + " at a time, up to " +
+                     InMegabytes(summary_.max_part_memory_bytes) +
+                     " each; memory for them: " + InMegabytes(limit);
+  if (summary_.max_part_memory_bytes > limit) {
+    line +=
+        "; WARNING: not enough for one, use a smaller "
+        "AdaSfmPartition.max_part_size";
+  }
+  Report(line, 0.02);
+  return num_parallel;
+}
+
+Status MapperStage::RunAllParts() {
+  const StepTimer timer;
+  const std::vector<std::vector<image_t>>& parts = summary_.plan.parts;
+  std::vector<int> order(parts.size());
+  size_t num_images = 0;
+  for (size_t k = 0; k < parts.size(); ++k) {
+    order[k] = static_cast<int>(k);
+    num_images += parts[k].size();
+  }
+  std::stable_sort(order.begin(), order.end(), [&](int a, int b) {
+    return parts[a].size() > parts[b].size();
+  });
+  const int num_parallel = FindNumParallelParts();
+  const int num_threads =
+      std::max(1, EffectiveNumThreads(options_.num_threads) / num_parallel);
+  std::vector<Status> statuses(parts.size());
+  std::atomic<size_t> next{0};
+  std::atomic<size_t> num_images_done{0};
+  std::atomic<size_t> num_parts_done{0};
+  // One worker takes one part after another, the biggest first.
+  ParallelFor(num_parallel, num_parallel, [&](size_t) {
+    for (size_t i = next++; i < parts.size(); i = next++) {
+      statuses[order[i]] = RunPartWithThreads(order[i], num_threads);
+      const double share =
+          1.0 * (num_images_done += parts[order[i]].size()) / num_images;
+      std::ostringstream line;
+      line << ++num_parts_done << " of " << parts.size()
+           << " parts done, about "
+           << static_cast<int>(timer.Seconds() * (1.0 / share - 1.0))
+           << " s left for the parts";
+      Report(line.str(), 0.02 + 0.6 * share);
+    }
+  });
+  summary_.parts_seconds = timer.Seconds();
+  for (const Status& status : statuses) {
+    if (!status.ok()) return status;
+  }
+  return Status::Ok();
+}
+
+}  // namespace adasfm

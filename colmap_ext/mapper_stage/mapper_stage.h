@@ -1,0 +1,136 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <atomic>
+#include <functional>
+#include <memory>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "colmap_ext/mapper/align_parts.h"
+#include "colmap_ext/mapper/local_mapper.h"
+#include "colmap_ext/mapper/merge_reconstructions.h"
+#include "colmap_ext/mapper/refine_model.h"
+#include "colmap_ext/mapper_stage/part_checkpoint.h"
+#include "colmap_ext/mapper_stage/partition_plan.h"
+#include "colmap_ext/scene/scene_data.h"
+#include "core/status.h"
+
+namespace adasfm {
+
+enum class MapperSteps { kAll, kPlan, kPart, kMerge };
+
+// Nested by step, in order of their use (design 7.3 to 7.5).
+struct MapperStageOptions {
+  PartitionPlanOptions partition;
+  LocalMapperOptions local;
+  AlignSimilarityOptions align;
+  RefineModelOptions refine;
+  // Threads of the whole stage; parts that run at the same time share them.
+  int num_threads = -1;
+  // Bound of the parts that run at the same time; -1: as many as there are
+  // threads and as fit into the memory.
+  int max_num_parallel_parts = -1;
+  // For the parts that run at the same time, in GB (1e9 bytes); -1: 70 % of
+  // what the machine has available when they begin. One part always runs.
+  double max_memory_gb = -1.0;
+
+  bool IsValid(std::string* error) const;
+};
+
+struct MapperStageSummary {
+  int num_images = 0;
+  int num_points = 0;
+  double mean_reproj_error_px = 0.0;
+  PartitionPlan plan;
+  // In the plan's order.
+  std::vector<PartReport> parts;
+  AlignPartsResult aligned;
+  MergeSummary merge;
+  RefineModelSummary refine;
+  // The merged parts contradicted the priors far more than the coarse model
+  // does; the model was refined from the coarse poses instead.
+  bool started_from_coarse_poses = false;
+  bool is_metric = false;
+  bool is_level = false;
+  int num_parallel_parts = 0;
+  // Of the biggest part, estimated before it runs.
+  double max_part_memory_bytes = 0.0;
+  double plan_seconds = 0.0;
+  double parts_seconds = 0.0;
+  double merge_seconds = 0.0;
+  double refine_seconds = 0.0;
+};
+
+// One line of text and the share of the stage that is done, from any thread.
+using MapperProgress = std::function<void(const std::string&, double)>;
+
+// How a part is reconstructed: ReconstructLocally, or what a test puts there.
+using PartMapper = std::function<LocalMapResult(
+    const LocalMapperOptions&, const SceneData&, const CoarsePoseMap&,
+    const std::set<image_t>&)>;
+
+// The mapper stage on a folder (design 7.3 to 7.5, 10). Every step leaves its
+// result in output_path/checkpoints, complete or not at all, with a fingerprint
+// of what it was made from; a step whose result is there is not done again.
+//   1  plan     partition of the view graph      checkpoints/plan.json
+//   2  part k   local reconstruction             checkpoints/part_k/
+//   3  merge    alignment, merge                 checkpoints/refine_0/
+//   4           round r of the refinement        checkpoints/refine_r/
+// Steps 3 and 4 give the model returned; only the last of their folders stays.
+class MapperStage {
+ public:
+  // `data` and `coarse` must outlive the stage.
+  MapperStage(const MapperStageOptions& options, const SceneData& data,
+              const CoarsePoseMap& coarse, const std::string& output_path,
+              MapperProgress progress = {},
+              PartMapper part_mapper = ReconstructLocally);
+
+  // Makes the plan, or takes the one that is there.
+  Status Plan();
+  // Reconstructs one part of the plan. A part that throws is tried once more
+  // with stricter settings; its report then says why.
+  Status RunPart(int part_index);
+  // All parts of the plan, the biggest first.
+  Status RunAllParts();
+  // Merges the parts that are there and refines the model. With
+  // `require_all_parts` a missing part is an error that names it.
+  StatusOr<colmap::Reconstruction> Merge(bool require_all_parts);
+
+  const MapperStageSummary& Summary() const { return summary_; }
+  const std::string& Fingerprint() const { return fingerprint_; }
+
+ private:
+  Status ReadPlan();
+  Status RunPartWithThreads(int part_index, int num_threads);
+  PartReport MapPart(int part_index, int num_threads,
+                     LocalMapResult* result) const;
+  int FindNumParallelParts();
+  void Report(const std::string& line, double share_done = 0.0) const;
+
+  Status ReadPartReports(bool require_all_parts);
+  Status MergePartModels(const std::string& fingerprint);
+  std::unique_ptr<MapperScene> BuildWholeScene() const;
+  Status RefineMerged(const std::string& fingerprint, int num_done,
+                      std::unique_ptr<MapperScene>* scene);
+  // So that the result is never worse than the prior trajectory.
+  void FallBackToCoarsePoses(std::unique_ptr<MapperScene>* scene);
+
+  const MapperStageOptions options_;
+  const SceneData& data_;
+  const CoarsePoseMap& coarse_;
+  const std::string checkpoint_path_;
+  const std::string fingerprint_;
+  const MapperProgress progress_;
+  const PartMapper part_mapper_;
+  // The largest share reported.
+  mutable std::atomic<double> share_done_{0.0};
+  MapperStageSummary summary_;
+};
+
+// As JSON, and as the lines for the screen.
+std::string FormatMapperSummaryJson(const MapperStageSummary& summary);
+std::string FormatMapperSummaryText(const MapperStageSummary& summary);
+
+}  // namespace adasfm

@@ -1,0 +1,206 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Steps 3 and 4 of the mapper stage.
+#include <algorithm>
+#include <map>
+#include <optional>
+#include <utility>
+
+#include "colmap_ext/mapper/part_adjuster.h"
+#include "colmap_ext/mapper_stage/mapper_fingerprint.h"
+#include "colmap_ext/mapper_stage/mapper_stage.h"
+#include "colmap_ext/mapper_stage/mapper_steps.h"
+#include "colmap_ext/mapper_stage/merge_checkpoint.h"
+#include "colmap_ext/scene/align_to_gravity.h"
+
+namespace adasfm {
+namespace {
+
+// The unit of thresholds where metres are unknown.
+double ComputeNeighborDistance(const SceneData& data,
+                               const CoarsePoseMap& coarse) {
+  // The median distance between an image and the one it is matched to best.
+  std::map<image_t, std::pair<size_t, image_t>> best;
+  for (const ScenePair& pair : data.pairs) {
+    if (!coarse.count(pair.image_id1) || !coarse.count(pair.image_id2)) {
+      continue;
+    }
+    const size_t num_matches = pair.inlier_matches.size();
+    best[pair.image_id1] =
+        std::max(best[pair.image_id1], {num_matches, pair.image_id2});
+    best[pair.image_id2] =
+        std::max(best[pair.image_id2], {num_matches, pair.image_id1});
+  }
+  std::vector<double> distances;
+  for (const auto& [image_id, neighbor] : best) {
+    distances.push_back((coarse.at(image_id).TargetOriginInSource() -
+                         coarse.at(neighbor.second).TargetOriginInSource())
+                            .norm());
+  }
+  if (distances.empty()) return 1.0;
+  std::sort(distances.begin(), distances.end());
+  const double median = distances[distances.size() / 2];
+  return median > 0.0 ? median : 1.0;
+}
+
+// Of the merged parts: where the balance of the whole begins, since it is only
+// raised.
+double FindSmallestSigmaFactor(const std::vector<PartReport>& parts,
+                               const AlignPartsResult& aligned) {
+  std::optional<double> smallest;
+  for (size_t k = 0; k < parts.size(); ++k) {
+    if (!aligned.alignments[k].success) continue;
+    smallest = std::min(smallest.value_or(parts[k].keypoint_sigma_factor),
+                        parts[k].keypoint_sigma_factor);
+  }
+  return smallest.value_or(1.0);
+}
+
+int CountTorn(const MapperScene& scene) {
+  return CountTornPriors(FindPriorEdges(scene, scene.images),
+                         scene.reconstruction);
+}
+
+}  // namespace
+
+Status MapperStage::ReadPartReports(bool require_all_parts) {
+  std::string missing;
+  summary_.parts.clear();
+  for (size_t k = 0; k < summary_.plan.parts.size(); ++k) {
+    const StatusOr<PartReport> report =
+        ReadPartReport(PartCheckpointPath(checkpoint_path_, k), fingerprint_);
+    if (report.ok()) {
+      summary_.parts.push_back(*report);
+      continue;
+    }
+    missing += " " + std::to_string(k);
+    PartReport missing_report;
+    missing_report.part_index = static_cast<int>(k);
+    missing_report.num_images = static_cast<int>(summary_.plan.parts[k].size());
+    missing_report.failure = report.status().message();
+    summary_.parts.push_back(missing_report);
+  }
+  if (!require_all_parts || missing.empty()) return Status::Ok();
+  return Status::Error("missing parts:" + missing +
+                       "; run --AdaSfmMapper.stage part with each of them "
+                       "as --AdaSfmMapper.part_index");
+}
+
+std::unique_ptr<MapperScene> MapperStage::BuildWholeScene() const {
+  std::set<image_t> images;
+  for (const auto& [image_id, image] : data_.images) images.insert(image_id);
+  return BuildMapperScene(data_, coarse_, images);
+}
+
+Status MapperStage::MergePartModels(const std::string& fingerprint) {
+  std::vector<PartModel> parts;
+  for (const PartReport& report : summary_.parts) {
+    PartModel part;
+    part.part_index = report.part_index;
+    part.prior_only_images = report.prior_only_images;
+    if (report.failure.empty()) {
+      ReadPartModel(PartCheckpointPath(checkpoint_path_, report.part_index),
+                    &part.reconstruction);
+    }
+    parts.push_back(std::move(part));
+  }
+  AlignSimilarityOptions align = options_.align;
+  if (!summary_.is_metric) align.unit = ComputeNeighborDistance(data_, coarse_);
+  summary_.aligned = AlignParts(align, coarse_, parts);
+  summary_.refine.keypoint_sigma_factor =
+      FindSmallestSigmaFactor(summary_.parts, summary_.aligned);
+  const std::unique_ptr<MapperScene> scene = BuildWholeScene();
+  summary_.merge = MergeParts(summary_.aligned, parts, scene.get());
+  if (scene->reconstruction.NumRegImages() < 2) {
+    return Status::Error(
+        "no image could be reconstructed; does the coarse model at "
+        "--input_path belong to this database?");
+  }
+  return WriteMergeCheckpoint(checkpoint_path_, fingerprint, 0, summary_,
+                              *scene);
+}
+
+void MapperStage::FallBackToCoarsePoses(std::unique_ptr<MapperScene>* scene) {
+  if (!options_.refine.use_priors_in_adjustment) return;
+  const int num_torn = CountTorn(**scene);
+  if (num_torn == 0) return;
+  auto coarse_scene = BuildMapperScene(data_, coarse_, (*scene)->images);
+  RegisterAtCoarsePoses(coarse_scene.get());
+  // Priors that tear in the coarse model too are wrong themselves.
+  if (num_torn <= CountTorn(*coarse_scene)) return;
+  Report("the parts contradict the priors; refining the coarse poses", 0.9);
+  RefineModelOptions options = options_.refine;
+  options.join_parts = false;
+  RefineModelSummary refined;
+  for (int round = 1; round <= kNumRefinementRounds; ++round) {
+    RefineModel(options, round, coarse_scene.get(), &refined);
+  }
+  if (CountTorn(*coarse_scene) >= num_torn) return;
+  summary_.refine = refined;
+  summary_.started_from_coarse_poses = true;
+  *scene = std::move(coarse_scene);
+}
+
+Status MapperStage::RefineMerged(const std::string& fingerprint, int num_done,
+                                 std::unique_ptr<MapperScene>* scene) {
+  RefineModelOptions options = options_.refine;
+  options.join_parts =
+      summary_.parts.size() > 1 || !summary_.merge.coarse_images.empty();
+  for (int round = num_done + 1; round <= kNumRefinementRounds; ++round) {
+    Report("refining " +
+               std::to_string((*scene)->reconstruction.NumRegImages()) +
+               " images, round " + std::to_string(round) + " of " +
+               std::to_string(kNumRefinementRounds),
+           0.65 + 0.3 * (round - 1) / kNumRefinementRounds);
+    RefineModel(options, round, scene->get(), &summary_.refine);
+    if (round == kNumRefinementRounds) FallBackToCoarsePoses(scene);
+    const Status status = WriteMergeCheckpoint(checkpoint_path_, fingerprint,
+                                               round, summary_, **scene);
+    if (!status.ok()) return status;
+    // From the file, as a run that was killed here would: its points have other
+    // ids, and so another order.
+    scene->reset();
+    *scene = BuildWholeScene();
+    const StatusOr<int> read = ReadMergeCheckpoint(
+        checkpoint_path_, fingerprint, &summary_, scene->get());
+    if (!read.ok()) return read.status();
+  }
+  return Status::Ok();
+}
+
+StatusOr<colmap::Reconstruction> MapperStage::Merge(bool require_all_parts) {
+  const StepTimer timer;
+  if (summary_.plan.parts.empty()) {
+    const Status status = ReadPlan();
+    if (!status.ok()) return status;
+  }
+  Status status = ReadPartReports(require_all_parts);
+  if (!status.ok()) return status;
+  const std::string fingerprint = ComputeMergeFingerprint(
+      fingerprint_, options_.align, options_.refine, summary_.parts);
+  std::unique_ptr<MapperScene> scene = BuildWholeScene();
+  StatusOr<int> num_done = ReadMergeCheckpoint(checkpoint_path_, fingerprint,
+                                               &summary_, scene.get());
+  if (!num_done.ok()) {
+    scene.reset();  // Merging needs one of its own.
+    status = MergePartModels(fingerprint);
+    if (!status.ok()) return status;
+    scene = BuildWholeScene();
+    num_done = ReadMergeCheckpoint(checkpoint_path_, fingerprint, &summary_,
+                                   scene.get());
+    if (!num_done.ok()) return num_done.status();
+  }
+  summary_.merge_seconds = timer.Seconds();
+  const StepTimer refine_timer;
+  status = RefineMerged(fingerprint, *num_done, &scene);
+  if (!status.ok()) return status;
+  colmap::Reconstruction& model = scene->reconstruction;
+  model.TearDown();
+  summary_.is_level = AlignToGravity(data_, &model);
+  summary_.refine_seconds = refine_timer.Seconds();
+  summary_.num_images = model.NumRegImages();
+  summary_.num_points = model.NumPoints3D();
+  summary_.mean_reproj_error_px = model.ComputeMeanReprojectionError();
+  return std::move(model);
+}
+
+}  // namespace adasfm

@@ -1,0 +1,28 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <string>
+
+#include "colmap_ext/mapper/local_mapper_scene.h"
+#include "colmap_ext/mapper_stage/mapper_stage.h"
+#include "core/status.h"
+
+namespace adasfm {
+
+// The merged model after a number of rounds of refinement, 0 for none, with
+// what the summary says about alignment, merge and refinement: the folder
+// refine_<rounds> in checkpoint_path. Those of fewer rounds are removed.
+Status WriteMergeCheckpoint(const std::string& checkpoint_path,
+                            const std::string& fingerprint, int num_rounds,
+                            const MapperStageSummary& summary,
+                            const MapperScene& scene);
+
+// Reads the checkpoint of most rounds into the summary and the scene, none of
+// whose images may be registered, and returns its rounds. An error when there
+// is none of this fingerprint.
+StatusOr<int> ReadMergeCheckpoint(const std::string& checkpoint_path,
+                                  const std::string& fingerprint,
+                                  MapperStageSummary* summary,
+                                  MapperScene* scene);
+
+}  // namespace adasfm

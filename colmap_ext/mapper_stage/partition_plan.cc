@@ -1,0 +1,110 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "colmap_ext/mapper_stage/partition_plan.h"
+
+#include <filesystem>
+#include <fstream>
+#include <nlohmann/json.hpp>
+
+namespace adasfm {
+namespace {
+
+// A prior holds two images together about as well as a weak pair; parts are cut
+// through vision rather than through the priors of a tunnel.
+constexpr double kPriorWeight = 30.0;
+
+}  // namespace
+
+bool PartitionPlanOptions::IsValid(std::string* error) const {
+  if (max_num_images_undivided < 2) {
+    *error = "AdaSfmPartition.max_num_images_undivided = " +
+             std::to_string(max_num_images_undivided) + " must be at least 2";
+    return false;
+  }
+  return cut.IsValid(error) && flood_fill.IsValid(error);
+}
+
+ImageGraph BuildImageGraph(const SceneData& data, const CoarsePoseMap& coarse) {
+  ImageGraph graph;
+  for (const auto& [image_id, pose] : coarse) {
+    if (data.images.count(image_id)) graph.images.insert(image_id);
+  }
+  const auto add_edge = [&graph](image_t a, image_t b, double weight) {
+    graph.images.insert(a);
+    graph.images.insert(b);
+    graph.edges[ImagePair(a, b)] += weight;
+  };
+  for (const ScenePair& pair : data.pairs) {
+    if (pair.inlier_matches.empty()) continue;
+    add_edge(pair.image_id1, pair.image_id2,
+             static_cast<double>(pair.inlier_matches.size()));
+  }
+  for (const RelativePosePrior& prior : data.priors) {
+    if (!graph.images.count(prior.image_id1) ||
+        !graph.images.count(prior.image_id2)) {
+      continue;
+    }
+    add_edge(prior.image_id1, prior.image_id2, kPriorWeight);
+  }
+  return graph;
+}
+
+PartitionPlan BuildPartitionPlan(const PartitionPlanOptions& options,
+                                 const SceneData& data,
+                                 const CoarsePoseMap& coarse) {
+  const ImageGraph graph = BuildImageGraph(data, coarse);
+  PartitionPlan plan;
+  if (graph.images.size() <= options.max_num_images_undivided) {
+    plan.parts.emplace_back(graph.images.begin(), graph.images.end());
+  } else {
+    plan.parts = ExpandByFloodFill(options.flood_fill, graph,
+                                   ComputeNormalizedCut(options.cut, graph))
+                     .parts;
+  }
+  plan.overlap_ratios = ComputeOverlapRatios(plan.parts);
+  return plan;
+}
+
+Status WritePartitionPlan(const std::string& path,
+                          const std::string& fingerprint,
+                          const PartitionPlan& plan) {
+  nlohmann::json json;
+  json["fingerprint"] = fingerprint;
+  json["parts"] = plan.parts;
+  json["overlap_ratios"] = plan.overlap_ratios;
+  const std::string temporary_path = path + ".tmp";
+  {
+    std::ofstream file(temporary_path);
+    file << json.dump(1) << "\n";
+    if (!file) return Status::Error("cannot write " + temporary_path);
+  }
+  std::error_code error;
+  std::filesystem::rename(temporary_path, path, error);
+  if (error) return Status::Error("cannot write " + path);
+  return Status::Ok();
+}
+
+StatusOr<PartitionPlan> ReadPartitionPlan(const std::string& path,
+                                          const std::string& fingerprint) {
+  std::ifstream file(path);
+  if (!file) {
+    return Status::Error("no partition plan at " + path +
+                         "; run --AdaSfmMapper.stage plan first");
+  }
+  try {
+    const nlohmann::json json = nlohmann::json::parse(file);
+    if (json.at("fingerprint").get<std::string>() != fingerprint) {
+      return Status::Error(
+          path +
+          " was made with other options or another database; run "
+          "--AdaSfmMapper.stage plan again");
+    }
+    PartitionPlan plan;
+    plan.parts = json.at("parts").get<std::vector<std::vector<image_t>>>();
+    plan.overlap_ratios = json.at("overlap_ratios").get<std::vector<double>>();
+    return plan;
+  } catch (const nlohmann::json::exception&) {
+    return Status::Error(path + " is damaged; delete it and run again");
+  }
+}
+
+}  // namespace adasfm

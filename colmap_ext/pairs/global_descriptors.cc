@@ -1,0 +1,182 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "colmap_ext/pairs/global_descriptors.h"
+
+#include <algorithm>
+#include <stdexcept>
+#include <utility>
+
+#include "colmap_ext/host/database.h"
+#include "colmap_ext/host/descriptors.h"
+#include "core/parallel.h"
+#include "core/random.h"
+
+namespace adasfm {
+namespace {
+
+// Images that are described at a time, on all threads.
+constexpr size_t kBlockSize = 64;
+
+int CountImages(SqliteConnection* database) {
+  SqliteStatement statement(database,
+                            "SELECT COUNT(*) FROM descriptors WHERE rows > 0");
+  return statement.Step() ? statement.Int(0) : 0;
+}
+
+// Equally many descriptors of every image, drawn at random.
+RowMatrixXf SampleDescriptors(const GlobalDescriptorOptions& options,
+                              int num_images, SqliteConnection* database) {
+  const int num_per_image =
+      std::max(1, options.max_num_training_descriptors / num_images);
+  // Of more images than that, every k-th one gives one.
+  const int stride =
+      std::max(1, (num_images + options.max_num_training_descriptors - 1) /
+                      options.max_num_training_descriptors);
+  Random random(options.vocabulary.seed);
+  std::vector<RowMatrixXf> samples;
+  Eigen::Index num_rows = 0;
+  int index = 0;
+  ReadDescriptors(database, [&](image_t, const DescriptorBytes& descriptors) {
+    if (index++ % stride != 0) return;
+    if (!samples.empty() && descriptors.cols() != samples[0].cols()) {
+      throw SqliteError("descriptors of different lengths");
+    }
+    const std::vector<int> rows = random.Sample(
+        std::min<int>(num_per_image, descriptors.rows()), descriptors.rows());
+    RowMatrixXf sample(rows.size(), descriptors.cols());
+    for (size_t i = 0; i < rows.size(); ++i) {
+      sample.row(i) = descriptors.row(rows[i]).cast<float>();
+    }
+    num_rows += sample.rows();
+    samples.push_back(std::move(sample));
+  });
+  RowMatrixXf all(num_rows, samples[0].cols());
+  Eigen::Index row = 0;
+  for (const RowMatrixXf& sample : samples) {
+    all.middleRows(row, sample.rows()) = sample;
+    row += sample.rows();
+  }
+  return all;
+}
+
+// Calls function(index, image_id, vlad) for every stride-th image, in order;
+// the vectors are computed on all threads.
+void ForEachVlad(
+    const RowMatrixXf& vocabulary, int stride, int num_threads,
+    SqliteConnection* database,
+    const std::function<void(int, image_t, const Eigen::RowVectorXf&)>&
+        function) {
+  std::vector<std::pair<image_t, DescriptorBytes>> block;
+  std::vector<Eigen::RowVectorXf> vlads;
+  int num_done = 0;
+  const auto flush = [&] {
+    vlads.resize(block.size());
+    ParallelFor(num_threads, block.size(), [&](size_t i) {
+      vlads[i] = ComputeVlad(vocabulary, block[i].second.cast<float>());
+    });
+    for (size_t i = 0; i < block.size(); ++i) {
+      function(num_done++, block[i].first, vlads[i]);
+    }
+    block.clear();
+  };
+  int index = 0;
+  ReadDescriptors(database,
+                  [&](image_t image_id, const DescriptorBytes& descriptors) {
+                    if (index++ % stride != 0) return;
+                    block.emplace_back(image_id, descriptors);
+                    if (block.size() == kBlockSize) flush();
+                  });
+  flush();
+}
+
+PcaBasis LearnPca(const GlobalDescriptorOptions& options,
+                  const RowMatrixXf& vocabulary, int num_images,
+                  SqliteConnection* database) {
+  const int stride = (num_images + options.max_num_pca_images - 1) /
+                     options.max_num_pca_images;
+  RowMatrixXf rows((num_images + stride - 1) / stride, vocabulary.size());
+  ForEachVlad(vocabulary, stride, options.num_threads, database,
+              [&rows](int index, image_t, const Eigen::RowVectorXf& vlad) {
+                rows.row(index) = vlad;
+              });
+  return ComputePca(rows, options.num_dimensions);
+}
+
+GlobalDescriptors DescribeImages(const GlobalDescriptorOptions& options,
+                                 int num_images, SqliteConnection* database,
+                                 const ProgressCallback& progress) {
+  if (progress) progress("training the vocabulary", 0.0);
+  const RowMatrixXf vocabulary = TrainVocabulary(
+      options.vocabulary, SampleDescriptors(options, num_images, database));
+  const bool reduce = options.num_dimensions > 0 &&
+                      options.num_dimensions < vocabulary.size() &&
+                      num_images > 2;
+  PcaBasis basis;
+  if (reduce) {
+    if (progress) progress("learning the principal components", 0.3);
+    basis = LearnPca(options, vocabulary, num_images, database);
+  }
+  GlobalDescriptors result;
+  result.vectors.resize(num_images,
+                        reduce ? basis.axes.cols() : vocabulary.size());
+  ForEachVlad(vocabulary, 1, options.num_threads, database,
+              [&](int index, image_t image_id, const Eigen::RowVectorXf& vlad) {
+                result.image_ids.push_back(image_id);
+                result.vectors.row(index) =
+                    reduce ? ReduceByPca(basis, vlad) : vlad;
+                if (!progress) return;
+                progress("describing image " + std::to_string(index + 1) +
+                             " of " + std::to_string(num_images),
+                         0.5 + 0.5 * (index + 1) / num_images);
+              });
+  return result;
+}
+
+}  // namespace
+
+bool GlobalDescriptorOptions::IsValid(std::string* error) const {
+  const std::pair<const char*, int> positive[] = {
+      {"max_num_training_descriptors", max_num_training_descriptors},
+      {"max_num_pca_images", max_num_pca_images}};
+  for (const auto& [name, value] : positive) {
+    if (value >= 1) continue;
+    *error = std::string("AdaSfmPairs.") + name + " = " +
+             std::to_string(value) + " must be positive";
+    return false;
+  }
+  if (num_dimensions < 0) {
+    *error = "AdaSfmPairs.num_dimensions = " + std::to_string(num_dimensions) +
+             " must not be negative";
+    return false;
+  }
+  return vocabulary.IsValid(error);
+}
+
+StatusOr<GlobalDescriptors> ComputeGlobalDescriptors(
+    const GlobalDescriptorOptions& options, const std::string& database_path,
+    const ProgressCallback& progress) {
+  std::string error;
+  if (!options.IsValid(&error)) throw std::invalid_argument(error);
+  try {
+    SqliteConnection database(database_path, SqliteConnection::Mode::kRead);
+    const int num_images = CountImages(&database);
+    if (num_images == 0) {
+      return Status::Error("the database " + database_path +
+                           " has no local descriptors; run COLMAP's "
+                           "feature_extractor, or give --descriptors_path");
+    }
+    GlobalDescriptors result =
+        DescribeImages(options, num_images, &database, progress);
+    const int num_missing =
+        static_cast<int>(ReadImages(&database).size()) - num_images;
+    if (num_missing > 0) {
+      result.warnings.push_back(std::to_string(num_missing) +
+                                " images have no local descriptors, and so no "
+                                "similar images");
+    }
+    return result;
+  } catch (const SqliteError& sqlite_error) {
+    return Status::Error(database_path + ": " + sqlite_error.what());
+  }
+}
+
+}  // namespace adasfm

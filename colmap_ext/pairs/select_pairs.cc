@@ -1,0 +1,198 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "colmap_ext/pairs/select_pairs.h"
+
+#include <algorithm>
+#include <map>
+#include <set>
+#include <stdexcept>
+
+#include "colmap_ext/database/prior_tables.h"
+#include "colmap_ext/host/database.h"
+#include "colmap_ext/pairs/nearest_rows.h"
+#include "colmap_ext/scene/capture_order.h"
+#include "sensors/io/read_image_times.h"
+
+namespace adasfm {
+namespace {
+
+StatusOr<std::map<image_t, timestamp_t>> TimesFromDatabase(
+    const std::string& database_path) {
+  const StatusOr<LoadedPriorTables> tables = ReadPriorTables(database_path);
+  if (!tables.ok()) return tables.status();
+  std::map<image_t, timestamp_t> times;
+  for (const ImageTimeRow& row : tables->tables.image_times) {
+    times[row.image_id] = row.timestamp_ns;
+  }
+  return times;
+}
+
+std::string BaseName(const std::string& path) {
+  return path.substr(path.find_last_of('/') + 1);
+}
+
+StatusOr<std::map<image_t, timestamp_t>> TimesFromFile(
+    const std::string& path, const std::vector<DatabaseImage>& images) {
+  const StatusOr<std::vector<ImageTime>> list = ReadImageTimes(path);
+  if (!list.ok()) return list.status();
+  // Time lists often leave the folder out.
+  std::map<std::string, timestamp_t> by_name;
+  for (const ImageTime& time : *list) {
+    by_name.emplace(BaseName(time.name), time.timestamp_ns);
+  }
+  std::map<image_t, timestamp_t> times;
+  for (const DatabaseImage& image : images) {
+    const auto time = by_name.find(BaseName(image.name));
+    if (time != by_name.end()) times[image.image_id] = time->second;
+  }
+  return times;
+}
+
+StatusOr<GlobalDescriptors> GetDescriptors(const PairSelectionOptions& options,
+                                           const std::string& database_path,
+                                           const ProgressCallback& progress) {
+  if (!options.descriptors_path.empty()) {
+    return ReadGlobalDescriptors(options.descriptors_path, database_path);
+  }
+  return ComputeGlobalDescriptors(
+      options.descriptors, database_path,
+      [&progress](const std::string& what, double share_done) {
+        if (progress) progress(what, 0.7 * share_done);
+      });
+}
+
+// Pairs of the most similar images.
+Status AddSimilarPairs(const PairSelectionOptions& options,
+                       const std::string& database_path,
+                       const ProgressCallback& progress,
+                       std::set<ImagePair>* pairs, PairSelection* selection) {
+  const StatusOr<GlobalDescriptors> descriptors =
+      GetDescriptors(options, database_path, progress);
+  if (!descriptors.ok()) return descriptors.status();
+  selection->warnings.insert(selection->warnings.end(),
+                             descriptors->warnings.begin(),
+                             descriptors->warnings.end());
+  // In a drive the next images are the most similar ones, and are chosen
+  // already: a place seen before must not lose its room to them.
+  const std::set<ImagePair> neighbors = *pairs;
+  const std::vector<std::vector<int>> nearest = FindNearestRows(
+      descriptors->vectors,
+      options.num_similar_images + 2 * options.num_temporal_neighbors,
+      options.descriptors.num_threads,
+      [&progress](const std::string& what, double share_done) {
+        if (progress) progress(what, 0.7 + 0.3 * share_done);
+      });
+  for (size_t i = 0; i < nearest.size(); ++i) {
+    int num_chosen = 0;
+    for (const int k : nearest[i]) {
+      const ImagePair pair(descriptors->image_ids[i],
+                           descriptors->image_ids[k]);
+      if (neighbors.count(pair) > 0) continue;
+      if (num_chosen++ == options.num_similar_images) break;
+      if (pairs->insert(pair).second) ++selection->num_similar;
+    }
+  }
+  return Status::Ok();
+}
+
+}  // namespace
+
+bool PairSelectionOptions::IsValid(std::string* error) const {
+  const std::pair<const char*, int> counts[] = {
+      {"num_temporal_neighbors", num_temporal_neighbors},
+      {"num_similar_images", num_similar_images}};
+  for (const auto& [name, value] : counts) {
+    if (value >= 0) continue;
+    *error = std::string("AdaSfmPairs.") + name + " = " +
+             std::to_string(value) + " must not be negative";
+    return false;
+  }
+  if (num_temporal_neighbors == 0 && num_similar_images == 0) {
+    *error =
+        "AdaSfmPairs.num_temporal_neighbors and .num_similar_images are both "
+        "0; one of them must be positive";
+    return false;
+  }
+  return descriptors.IsValid(error);
+}
+
+StatusOr<std::vector<image_t>> OrderImages(const std::string& database_path,
+                                           const std::string& image_times_path,
+                                           bool* ordered_by_time) {
+  std::vector<DatabaseImage> images;
+  try {
+    SqliteConnection database(database_path, SqliteConnection::Mode::kRead);
+    images = ReadImages(&database);
+  } catch (const SqliteError& error) {
+    return Status::Error(database_path + ": " + error.what());
+  }
+  const StatusOr<std::map<image_t, timestamp_t>> times_or =
+      image_times_path.empty() ? TimesFromDatabase(database_path)
+                               : TimesFromFile(image_times_path, images);
+  if (!times_or.ok()) return times_or.status();
+  const std::map<image_t, timestamp_t>& times = *times_or;
+  std::vector<CapturedImage> captured;
+  for (const DatabaseImage& image : images) {
+    const auto time = times.find(image.image_id);
+    captured.push_back({image.image_id, image.name,
+                        time == times.end()
+                            ? std::nullopt
+                            : std::optional<timestamp_t>(time->second)});
+  }
+  return OrderByCapture(std::move(captured), ordered_by_time);
+}
+
+StatusOr<PairSelection> SelectPairs(const PairSelectionOptions& options,
+                                    const std::string& database_path,
+                                    const ProgressCallback& progress) {
+  std::string error;
+  if (!options.IsValid(&error)) throw std::invalid_argument(error);
+  Status status = CheckDatabase(database_path);
+  if (!status.ok()) return status;
+  PairSelection selection;
+  const StatusOr<std::vector<image_t>> order = OrderImages(
+      database_path, options.image_times_path, &selection.ordered_by_time);
+  if (!order.ok()) return order.status();
+  const int num_images = order->size();
+  selection.num_images = num_images;
+  std::set<ImagePair> pairs;
+  for (int i = 0; i < num_images; ++i) {
+    const int end =
+        std::min(num_images - 1, i + options.num_temporal_neighbors);
+    for (int k = i + 1; k <= end; ++k) {
+      pairs.insert(ImagePair((*order)[i], (*order)[k]));
+    }
+  }
+  selection.num_temporal = pairs.size();
+  if (options.num_similar_images > 0) {
+    status =
+        AddSimilarPairs(options, database_path, progress, &pairs, &selection);
+    if (!status.ok()) return status;
+  }
+  selection.pairs.assign(pairs.begin(), pairs.end());
+  return selection;
+}
+
+StatusOr<std::string> FormatPairList(const std::vector<ImagePair>& pairs,
+                                     const std::string& database_path) {
+  std::map<image_t, std::string> names;
+  try {
+    SqliteConnection database(database_path, SqliteConnection::Mode::kRead);
+    for (const DatabaseImage& image : ReadImages(&database)) {
+      if (image.name.find_first_of(" \t\n") != std::string::npos) {
+        return Status::Error("the image name '" + image.name +
+                             "' has a space, which COLMAP's pair lists cannot "
+                             "hold; rename the file");
+      }
+      names[image.image_id] = image.name;
+    }
+  } catch (const SqliteError& error) {
+    return Status::Error(database_path + ": " + error.what());
+  }
+  std::string text;
+  for (const ImagePair& pair : pairs) {
+    text += names.at(pair.image_id1) + " " + names.at(pair.image_id2) + "\n";
+  }
+  return text;
+}
+
+}  // namespace adasfm

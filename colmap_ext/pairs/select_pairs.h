@@ -1,0 +1,58 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "colmap_ext/pairs/global_descriptors.h"
+#include "core/progress.h"
+#include "core/status.h"
+#include "core/types.h"
+
+namespace adasfm {
+
+struct PairSelectionOptions {
+  // Every image is matched with so many of the next ones in time.
+  int num_temporal_neighbors = 10;
+  // ... and with so many of the most similar ones beyond them (the paper's 30).
+  int num_similar_images = 30;
+  // Times of the images (sensors/io/read_image_times.h); empty: those that
+  // adasfm_prior_importer left in the database.
+  std::string image_times_path;
+  GlobalDescriptorOptions descriptors;
+  // Vectors from elsewhere (ReadGlobalDescriptors); empty: VLAD.
+  std::string descriptors_path;
+
+  bool IsValid(std::string* error) const;
+};
+
+struct PairSelection {
+  // Sorted, each pair once.
+  std::vector<ImagePair> pairs;
+  int num_images = 0;
+  int num_temporal = 0;
+  // Those that only similarity found.
+  int num_similar = 0;
+  // Otherwise by name.
+  bool ordered_by_time = false;
+  std::vector<std::string> warnings;
+};
+
+// Which pairs of the database's images to match. The database is not changed.
+StatusOr<PairSelection> SelectPairs(const PairSelectionOptions& options,
+                                    const std::string& database_path,
+                                    const ProgressCallback& progress = {});
+
+// The image ids in the order of time: by the file or adasfm_image_times where
+// every image has a time there, else by name (digits count as numbers: image2
+// comes before image10).
+StatusOr<std::vector<image_t>> OrderImages(const std::string& database_path,
+                                           const std::string& image_times_path,
+                                           bool* ordered_by_time);
+
+// Lines `name1 name2`, for matches_importer --match_type pairs. An error for
+// names with spaces, which that format cannot hold.
+StatusOr<std::string> FormatPairList(const std::vector<ImagePair>& pairs,
+                                     const std::string& database_path);
+
+}  // namespace adasfm

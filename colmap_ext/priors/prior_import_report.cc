@@ -1,0 +1,128 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <nlohmann/json.hpp>
+#include <sstream>
+
+#include "colmap_ext/priors/prior_importer.h"
+
+namespace adasfm {
+namespace {
+
+std::vector<double> ToList(const Eigen::Ref<const Eigen::VectorXd>& vector) {
+  return {vector.data(), vector.data() + vector.size()};
+}
+
+std::string ToText(const Eigen::Vector3d& vector) {
+  std::ostringstream text;
+  text.precision(3);
+  text << vector.x() << " " << vector.y() << " " << vector.z();
+  return text.str();
+}
+
+std::string ImuLines(const SensorSummary& summary) {
+  std::ostringstream text;
+  text.precision(4);
+  text << "IMU                 " << summary.imu_rate_hz << " Hz, "
+       << summary.num_imu_gaps << " gaps (longest " << summary.max_imu_gap_s
+       << " s)\n"
+       << "gyroscope bias      " << ToText(summary.gyroscope_bias) << " +- "
+       << summary.gyroscope_bias_sigma << " rad/s\n"
+       << "accelerometer bias  " << ToText(summary.accelerometer_bias) << " +- "
+       << summary.accelerometer_bias_sigma << " m/s^2\n"
+       << "gravity             " << ToText(summary.first_gravity_in_cam)
+       << " in the first camera\n"
+       << "standstill          " << summary.standstill_s << " s\n"
+       << "vision in smoother  " << summary.num_visual_links << " pairs, +- "
+       << summary.visual_sigma_deg << " deg\n";
+  if (summary.gyroscope_lag_s > 0.0) {
+    text << "gyroscope filter    low-pass of " << summary.gyroscope_lag_s
+         << " s undone\n";
+  }
+  return text.str();
+}
+
+}  // namespace
+
+std::string FormatPriorImport(const PriorImport& import) {
+  const SensorSummary& summary = import.summary;
+  std::ostringstream text;
+  text.precision(4);
+  text << "images              " << summary.num_images << " with times, "
+       << summary.num_images_in_logs << " inside the logs\n"
+       << "priors              " << summary.num_priors << " ("
+       << 100.0 * summary.prior_ratio << " % of consecutive images)\n"
+       << "two-view rotations  " << import.num_visual_rotations << "\n"
+       << "time shift          " << summary.timeshift_cam_imu_s
+       << " s, vision would add " << summary.visual_timeshift_correction_s
+       << " s\n";
+  if (summary.imu_rate_hz > 0.0) text << ImuLines(summary);
+  if (summary.wheel_rate_hz > 0.0) {
+    text << "wheels              " << summary.wheel_rate_hz << " Hz, "
+         << summary.num_wheel_gaps << " gaps (longest "
+         << summary.max_wheel_gap_s << " s), scale " << summary.wheel_scale
+         << " +- " << summary.wheel_scale_sigma << "\n"
+         << "driving direction   " << summary.wheel_mount_deg.x() << " left, "
+         << summary.wheel_mount_deg.y() << " down of T_imu_wheel's, +- "
+         << summary.wheel_mount_sigma_deg.x() << " and "
+         << summary.wheel_mount_sigma_deg.y() << " deg\n"
+         << "distance            " << summary.distance_m << " m, "
+         << summary.wheel_slips.size() << " slips\n";
+    for (const WheelSlip& slip : summary.wheel_slips) {
+      text << "  slip              " << slip.start_ns << " to " << slip.end_ns
+           << " ns, " << slip.speed_error_m_s << " m/s off\n";
+    }
+    text << "expected drift      " << summary.drift_per_100m_m << " m and "
+         << summary.drift_per_100m_deg << " deg per 100 m\n";
+  }
+  for (const std::string& warning : import.warnings) {
+    text << "WARNING: " << warning << "\n";
+  }
+  return text.str();
+}
+
+std::string PriorImportToJson(const PriorImport& import) {
+  const SensorSummary& summary = import.summary;
+  nlohmann::ordered_json json = {
+      {"num_images", summary.num_images},
+      {"num_images_in_logs", summary.num_images_in_logs},
+      {"num_images_without_time", import.num_images_without_time},
+      {"num_priors", summary.num_priors},
+      {"prior_ratio", summary.prior_ratio},
+      {"num_visual_rotations", import.num_visual_rotations},
+      {"timeshift_cam_imu_s", summary.timeshift_cam_imu_s},
+      {"visual_timeshift_correction_s", summary.visual_timeshift_correction_s},
+      {"gyroscope_lag_s", summary.gyroscope_lag_s},
+      {"gyroscope_delay_s", summary.gyroscope_delay_s},
+      {"num_visual_links", summary.num_visual_links},
+      {"visual_sigma_deg", summary.visual_sigma_deg},
+      {"imu_rate_hz", summary.imu_rate_hz},
+      {"num_imu_gaps", summary.num_imu_gaps},
+      {"max_imu_gap_s", summary.max_imu_gap_s},
+      {"standstill_s", summary.standstill_s},
+      {"gyroscope_bias_rad_s", ToList(summary.gyroscope_bias)},
+      {"gyroscope_bias_sigma_rad_s", summary.gyroscope_bias_sigma},
+      {"accelerometer_bias_m_s2", ToList(summary.accelerometer_bias)},
+      {"accelerometer_bias_sigma_m_s2", summary.accelerometer_bias_sigma},
+      {"first_gravity_in_cam", ToList(summary.first_gravity_in_cam)},
+      {"wheel_rate_hz", summary.wheel_rate_hz},
+      {"num_wheel_gaps", summary.num_wheel_gaps},
+      {"max_wheel_gap_s", summary.max_wheel_gap_s},
+      {"wheel_scale", summary.wheel_scale},
+      {"wheel_scale_sigma", summary.wheel_scale_sigma},
+      {"wheel_mount_deg", ToList(summary.wheel_mount_deg)},
+      {"wheel_mount_sigma_deg", ToList(summary.wheel_mount_sigma_deg)},
+      {"distance_m", summary.distance_m},
+      {"drift_per_100m_m", summary.drift_per_100m_m},
+      {"drift_per_100m_deg", summary.drift_per_100m_deg},
+      {"seconds", import.seconds},
+      {"warnings", import.warnings}};
+  json["wheel_slips"] = nlohmann::ordered_json::array();
+  for (const WheelSlip& slip : summary.wheel_slips) {
+    json["wheel_slips"].push_back({{"start_ns", slip.start_ns},
+                                   {"end_ns", slip.end_ns},
+                                   {"speed_error_m_s", slip.speed_error_m_s}});
+  }
+  // Texts that are not UTF-8 (file names) must not end in an exception.
+  return json.dump(2, ' ', false, nlohmann::json::error_handler_t::replace);
+}
+
+}  // namespace adasfm

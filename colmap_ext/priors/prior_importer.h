@@ -1,0 +1,50 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "colmap_ext/database/prior_tables.h"
+#include "core/status.h"
+#include "sensors/estimate_priors.h"
+
+namespace adasfm {
+
+// Empty paths: the machine has no such log.
+struct PriorImportPaths {
+  std::string database_path;
+  std::string image_times_path;
+  std::string imu_path;
+  std::string wheel_path;
+  std::string sensors_path;
+};
+
+struct PriorImportOptions {
+  PriorEstimationOptions estimation;
+  // Two-view rotations are taken from images at most this many apart in time:
+  // rotations grow with the gap, but so does the chance of a wrong pair.
+  int max_visual_gap = 3;
+
+  bool IsValid(std::string* error) const;
+};
+
+struct PriorImport {
+  PriorTables tables;
+  SensorSummary summary;
+  int num_images_without_time = 0;
+  int num_visual_rotations = 0;
+  // Of the import and of the sensors.
+  std::vector<std::string> warnings;
+  double seconds = 0.0;  // that it took
+};
+
+// (1) Reads the scene, the calibration and the logs, (2) gives the images their
+// times by name, (3) takes the two-view rotations of near images, (4) estimates
+// the priors. The database is not changed: WritePriorTables does that.
+StatusOr<PriorImport> ComputePriorImport(const PriorImportPaths& paths,
+                                         const PriorImportOptions& options);
+
+std::string FormatPriorImport(const PriorImport& import);
+std::string PriorImportToJson(const PriorImport& import);
+
+}  // namespace adasfm

@@ -1,0 +1,46 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "colmap_ext/report/report_html.h"
+#include "core/types.h"
+
+namespace adasfm {
+
+// What the stages wrote about themselves. Null JSON where a file is missing;
+// one that is cut short is left out too, and named in `notes`.
+struct ReportSummaries {
+  nlohmann::json importer;  // <database>.priors.json
+  nlohmann::json global;    // summary.json beside the coarse model
+  nlohmann::json mapper;    // summary.json beside the model
+  nlohmann::json steps;     // steps.json of the workspace above the model
+  // Image ids of the mapper's parts, of its checkpoints' plan.
+  std::vector<std::vector<image_t>> parts;
+  std::vector<std::string> notes;
+};
+
+// The folders are those that hold 0/, and may be empty.
+ReportSummaries ReadReportSummaries(const std::string& database_path,
+                                    const std::string& coarse_folder,
+                                    const std::string& mapper_folder);
+
+// None when no stage says.
+std::optional<bool> IsMetric(const ReportSummaries& summaries);
+
+// A bar of the chart of times.
+struct StageTime {
+  std::string stage;
+  std::string step;
+  double seconds = 0.0;
+};
+std::vector<StageTime> ListStageTimes(const ReportSummaries& summaries);
+
+ReportTable FormatSensors(const ReportSummaries& summaries);
+ReportTable FormatGlobalSteps(const ReportSummaries& summaries);
+ReportTable FormatParts(const ReportSummaries& summaries, bool is_metric);
+
+}  // namespace adasfm

@@ -1,0 +1,160 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "colmap_ext/scene/scene_data.h"
+
+#include <utility>
+
+#include "colmap_ext/database/prior_corrections.h"
+#include "colmap_ext/database/prior_tables.h"
+#include "colmap_ext/database/two_view_geometry_backup.h"
+#include "colmap_ext/host/database.h"
+#include "colmap_ext/io/sqlite.h"
+
+namespace adasfm {
+namespace {
+
+void ReadSceneImages(SqliteConnection* database, SceneData* scene) {
+  std::map<image_t, std::vector<Eigen::Vector2d>> keypoints =
+      ReadKeypoints(database);
+  for (DatabaseImage& row : ReadImages(database)) {
+    if (scene->cameras.count(row.camera_id) == 0) {
+      throw SqliteError("image " + row.name + " has a camera, id " +
+                        std::to_string(row.camera_id) + ", that is missing");
+    }
+    SceneImage& image = scene->images[row.image_id];
+    image.image_id = row.image_id;
+    image.camera_id = row.camera_id;
+    image.name = std::move(row.name);
+    const auto points = keypoints.find(row.image_id);
+    if (points != keypoints.end()) image.keypoints = std::move(points->second);
+  }
+}
+
+void ReadScenePriors(SqliteConnection* database,
+                     const SceneDataOptions& options, SceneData* scene) {
+  LoadedPriorTables loaded = ReadPriorTables(database);
+  for (const ImageTimeRow& row : loaded.tables.image_times) {
+    scene->images.at(row.image_id).timestamp_ns = row.timestamp_ns;
+  }
+  Eigen::Quaterniond camera_mount = Eigen::Quaterniond::Identity();
+  scene->priors = std::move(loaded.tables.priors);
+  if (!options.use_original_two_view_geometries) {
+    ApplyPriorCorrections(database, &scene->priors);
+    camera_mount = ReadCameraMount(database).value_or(camera_mount);
+  }
+  for (const GravityRow& row : loaded.tables.gravity) {
+    scene->images.at(row.image_id).gravity_in_cam =
+        camera_mount * row.gravity_in_cam;
+  }
+  if (loaded.num_ignored_rows > 0) {
+    scene->warnings.push_back(
+        std::to_string(loaded.num_ignored_rows) +
+        " sensor rows belong to images that the database does not have any "
+        "more; run adasfm_prior_importer again");
+  }
+}
+
+void CheckIndices(const SceneData& scene, const ImagePair& pair,
+                  const std::vector<FeatureMatch>& matches) {
+  const SceneImage& image1 = scene.images.at(pair.image_id1);
+  const SceneImage& image2 = scene.images.at(pair.image_id2);
+  for (const FeatureMatch& match : matches) {
+    if (match.point2D_idx1 < image1.keypoints.size() &&
+        match.point2D_idx2 < image2.keypoints.size()) {
+      continue;
+    }
+    throw SqliteError("the matches of " + image1.name + " and " + image2.name +
+                      " name keypoints that these images do not have");
+  }
+}
+
+// The rows to start from, by pair: the present ones, or the originals where
+// adasfm_global replaced them.
+std::map<ImagePair, DatabaseTwoViewGeometry> ReadRows(
+    SqliteConnection* database, const SceneDataOptions& options) {
+  std::map<ImagePair, DatabaseTwoViewGeometry> rows;
+  for (DatabaseTwoViewGeometry& row : ReadTwoViewGeometries(
+           database, "two_view_geometries", options.min_num_matches)) {
+    const ImagePair pair = row.pair;
+    rows[pair] = std::move(row);
+  }
+  if (!options.use_original_two_view_geometries) return rows;
+  const std::vector<ImagePair> kept = FindKeptOriginals(database);
+  if (kept.empty()) return rows;
+  std::map<ImagePair, DatabaseTwoViewGeometry> originals;
+  for (DatabaseTwoViewGeometry& row : ReadTwoViewGeometries(
+           database, kTwoViewGeometryBackupTable, options.min_num_matches)) {
+    const ImagePair pair = row.pair;
+    originals[pair] = std::move(row);
+  }
+  for (const ImagePair& pair : kept) {
+    const auto original = originals.find(pair);
+    if (original == originals.end()) {
+      rows.erase(pair);
+    } else {
+      rows[pair] = std::move(original->second);
+    }
+  }
+  return rows;
+}
+
+void ReadScenePairs(SqliteConnection* database, const SceneDataOptions& options,
+                    SceneData* scene) {
+  for (auto& [pair, row] : ReadRows(database, options)) {
+    // COLMAP leaves the pairs of deleted images in the table.
+    if (scene->images.count(pair.image_id1) == 0 ||
+        scene->images.count(pair.image_id2) == 0) {
+      continue;
+    }
+    CheckIndices(*scene, pair, row.inlier_matches);
+    ScenePair scene_pair;
+    scene_pair.image_id1 = pair.image_id1;
+    scene_pair.image_id2 = pair.image_id2;
+    scene_pair.config = row.config;
+    scene_pair.inlier_matches = std::move(row.inlier_matches);
+    scene_pair.cam2_from_cam1 = row.cam2_from_cam1;
+    scene_pair.essential_matrix = row.essential_matrix;
+    scene->pairs.push_back(std::move(scene_pair));
+  }
+}
+
+void ReadRawMatches(SqliteConnection* database, SceneData* scene) {
+  auto next = scene->pairs.begin();
+  ReadMatches(database,
+              [&](const ImagePair& pair, std::vector<FeatureMatch> matches) {
+                // Both are sorted by pair.
+                while (next != scene->pairs.end() &&
+                       ImagePair(next->image_id1, next->image_id2) < pair) {
+                  ++next;
+                }
+                if (next == scene->pairs.end() ||
+                    !(ImagePair(next->image_id1, next->image_id2) == pair)) {
+                  return;
+                }
+                CheckIndices(*scene, pair, matches);
+                next->raw_matches = std::move(matches);
+              });
+}
+
+}  // namespace
+
+StatusOr<SceneData> ReadSceneData(const std::string& database_path,
+                                  const SceneDataOptions& options) {
+  const Status checked = CheckDatabase(database_path);
+  if (!checked.ok()) return checked;
+  SceneData scene;
+  try {
+    SqliteConnection database(database_path, SqliteConnection::Mode::kRead);
+    scene.cameras = ReadCameras(&database);
+    ReadSceneImages(&database, &scene);
+    ReadScenePriors(&database, options, &scene);
+    ReadScenePairs(&database, options, &scene);
+    if (options.read_raw_matches) ReadRawMatches(&database, &scene);
+  } catch (const SqliteError& error) {
+    return Status::Error(database_path + ": " + error.what() +
+                         "; the database is damaged or out of step with "
+                         "itself, extract and match again");
+  }
+  return scene;
+}
+
+}  // namespace adasfm

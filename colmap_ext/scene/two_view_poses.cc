@@ -1,0 +1,194 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "colmap_ext/scene/two_view_poses.h"
+
+#include <base/essential_matrix.h>
+#include <estimators/pose.h>
+#include <estimators/two_view_geometry.h>
+#include <util/random.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "colmap_ext/scene/capture_order.h"
+#include "core/parallel.h"
+#include "global/view_graph/epipolar.h"
+
+namespace adasfm {
+namespace {
+
+// Matches looked at to tell the four decompositions apart and to judge a pose.
+constexpr int kMaxNumTestedMatches = 100;
+
+enum class PoseOrigin { kNone, kStored, kDecomposed, kReestimated };
+
+double InlierRatio(double max_error_px, const Rigid3d& pose,
+                   const EdgeBearings& selected) {
+  const Eigen::Matrix3d rotation = pose.rotation.toRotationMatrix();
+  int num_inliers = 0;
+  for (size_t k = 0; k < selected.bearings1.size(); ++k) {
+    const EpipolarResidual residual =
+        ComputeEpipolarResidual(*selected.bearings1[k], *selected.bearings2[k],
+                                rotation, pose.translation);
+    if (std::abs(residual.distance_px) <= max_error_px) ++num_inliers;
+  }
+  return num_inliers / std::max<double>(1.0, selected.bearings1.size());
+}
+
+std::optional<Rigid3d> EstimateFromMatches(const TwoViewPoseOptions& options,
+                                           const SceneData& scene,
+                                           const ScenePair& pair) {
+  const SceneImage& image1 = scene.images.at(pair.image_id1);
+  const SceneImage& image2 = scene.images.at(pair.image_id2);
+  const colmap::Camera& camera1 = scene.cameras.at(image1.camera_id);
+  const colmap::Camera& camera2 = scene.cameras.at(image2.camera_id);
+  std::vector<Eigen::Vector2d> points1, points2;
+  for (const FeatureMatch& match : pair.inlier_matches) {
+    const Eigen::Vector2d point1 =
+        camera1.ImageToWorld(image1.keypoints.at(match.point2D_idx1));
+    const Eigen::Vector2d point2 =
+        camera2.ImageToWorld(image2.keypoints.at(match.point2D_idx2));
+    if (!point1.allFinite() || !point2.allFinite()) continue;
+    points1.push_back(point1);
+    points2.push_back(point2);
+  }
+  if (points1.size() < 8) return std::nullopt;
+  colmap::RANSACOptions ransac;
+  ransac.max_error =
+      0.5 * options.max_error_px *
+      (1.0 / camera1.MeanFocalLength() + 1.0 / camera2.MeanFocalLength()) / 2.0;
+  ransac.min_inlier_ratio = 0.3;
+  ransac.max_num_trials = 1000;
+  ransac.confidence = 0.999;
+  colmap::SetPRNGSeed(pair.image_id1 * 40503u + pair.image_id2);
+  Eigen::Vector4d qvec;
+  Eigen::Vector3d tvec;
+  if (colmap::EstimateRelativePose(ransac, points1, points2, &qvec, &tvec) ==
+          0 ||
+      !qvec.allFinite() || !tvec.allFinite() || tvec.norm() < 1e-9) {
+    return std::nullopt;
+  }
+  return Rigid3d(Eigen::Quaterniond(qvec(0), qvec(1), qvec(2), qvec(3)),
+                 tvec.normalized());
+}
+
+bool IsUsable(const ScenePair& pair) {
+  return pair.config != colmap::TwoViewGeometry::UNDEFINED &&
+         pair.config != colmap::TwoViewGeometry::DEGENERATE &&
+         pair.config != colmap::TwoViewGeometry::WATERMARK;
+}
+
+PoseOrigin FindPose(const TwoViewPoseOptions& options, const SceneData& scene,
+                    const std::vector<Bearing>& bearings1,
+                    const std::vector<Bearing>& bearings2,
+                    const ScenePair& pair, Rigid3d* cam2_from_cam1) {
+  if (!IsUsable(pair)) return PoseOrigin::kNone;
+  const EdgeBearings selected = SelectEdgeBearings(
+      bearings1, bearings2, pair.inlier_matches, kMaxNumTestedMatches);
+  const auto is_supported = [&] {
+    return cam2_from_cam1->translation.allFinite() &&
+           cam2_from_cam1->rotation.coeffs().allFinite() &&
+           InlierRatio(options.max_error_px, *cam2_from_cam1, selected) >=
+               options.min_inlier_ratio;
+  };
+  if (pair.cam2_from_cam1.has_value()) {
+    *cam2_from_cam1 = *pair.cam2_from_cam1;
+    if (is_supported()) return PoseOrigin::kStored;
+  }
+  if (pair.essential_matrix.has_value()) {
+    *cam2_from_cam1 = DecomposeEssential(*pair.essential_matrix, bearings1,
+                                         bearings2, pair.inlier_matches);
+    if (is_supported()) return PoseOrigin::kDecomposed;
+  }
+  const std::optional<Rigid3d> estimated =
+      EstimateFromMatches(options, scene, pair);
+  if (!estimated.has_value()) return PoseOrigin::kNone;
+  *cam2_from_cam1 = *estimated;
+  return PoseOrigin::kReestimated;
+}
+
+}  // namespace
+
+bool TwoViewPoseOptions::IsValid(std::string* error) const {
+  if (!(min_inlier_ratio >= 0.0 && min_inlier_ratio <= 1.0)) {
+    *error = "min_inlier_ratio is " + std::to_string(min_inlier_ratio) +
+             ", but must lie between 0 and 1";
+    return false;
+  }
+  if (!(max_error_px > 0.0)) {
+    *error = "max_error_px is " + std::to_string(max_error_px) +
+             ", but must be positive";
+    return false;
+  }
+  return true;
+}
+
+Rigid3d DecomposeEssential(const Eigen::Matrix3d& essential_matrix,
+                           const std::vector<Bearing>& bearings1,
+                           const std::vector<Bearing>& bearings2,
+                           const std::vector<FeatureMatch>& matches) {
+  Eigen::Matrix3d rotations[2];
+  Eigen::Vector3d translation;
+  colmap::DecomposeEssentialMatrix(essential_matrix, &rotations[0],
+                                   &rotations[1], &translation);
+  const EdgeBearings selected =
+      SelectEdgeBearings(bearings1, bearings2, matches, kMaxNumTestedMatches);
+  int best_votes = -1;
+  Rigid3d best;
+  for (const Eigen::Matrix3d& rotation : rotations) {
+    for (const double sign : {1.0, -1.0}) {
+      const Eigen::Vector3d signed_translation = sign * translation;
+      int votes = 0;
+      for (size_t k = 0; k < selected.bearings1.size(); ++k) {
+        double depth1, depth2, sin_parallax;
+        votes += ComputeRayDepths(selected.bearings1[k]->direction,
+                                  selected.bearings2[k]->direction, rotation,
+                                  signed_translation, &depth1, &depth2,
+                                  &sin_parallax) &&
+                 depth1 > 0.0 && depth2 > 0.0;
+      }
+      if (votes <= best_votes) continue;
+      best_votes = votes;
+      best = Rigid3d(rotation, signed_translation.normalized());
+    }
+  }
+  return best;
+}
+
+InitialViewGraph BuildInitialViewGraph(
+    const TwoViewPoseOptions& options, const SceneData& scene,
+    const std::map<image_t, std::vector<Bearing>>& bearings) {
+  InitialViewGraph initial;
+  std::vector<CapturedImage> captured;
+  for (const auto& [image_id, image] : scene.images) {
+    initial.graph.images.push_back(image_id);
+    captured.push_back({image_id, image.name, image.timestamp_ns});
+  }
+  initial.graph.capture_ranks.resize(captured.size());
+  int64_t rank = 0;
+  for (const image_t image_id : OrderByCapture(std::move(captured))) {
+    initial.graph.capture_ranks[initial.graph.IndexOf(image_id)] = rank++;
+  }
+  std::vector<PoseOrigin> origins(scene.pairs.size(), PoseOrigin::kNone);
+  std::vector<Rigid3d> poses(scene.pairs.size());
+  ParallelFor(options.num_threads, scene.pairs.size(), [&](size_t i) {
+    const ScenePair& pair = scene.pairs[i];
+    origins[i] = FindPose(options, scene, bearings.at(pair.image_id1),
+                          bearings.at(pair.image_id2), pair, &poses[i]);
+  });
+  for (size_t i = 0; i < scene.pairs.size(); ++i) {
+    initial.num_without_pose += origins[i] == PoseOrigin::kNone;
+    initial.num_stored_poses += origins[i] == PoseOrigin::kStored;
+    initial.num_decomposed += origins[i] == PoseOrigin::kDecomposed;
+    initial.num_reestimated += origins[i] == PoseOrigin::kReestimated;
+    if (origins[i] == PoseOrigin::kNone) continue;
+    ViewGraphEdge edge;
+    edge.image_id1 = scene.pairs[i].image_id1;
+    edge.image_id2 = scene.pairs[i].image_id2;
+    edge.cam2_from_cam1 = poses[i];
+    edge.num_inliers = static_cast<int>(scene.pairs[i].inlier_matches.size());
+    initial.graph.edges.push_back(edge);
+  }
+  return initial;
+}
+
+}  // namespace adasfm

@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <map>
+#include <optional>
+#include <vector>
+
+#include "colmap_ext/scene/scene_data.h"
+#include "core/bearing.h"
+#include "global/view_graph/view_graph.h"
+
+namespace adasfm {
+
+struct TwoViewPoseOptions {
+  // A stored pose or essential matrix is used when at least this share of the
+  // pair's matches agrees with it ...
+  double min_inlier_ratio = 0.6;
+  // ... within this epipolar distance in px; otherwise the pose is estimated
+  // anew from the matches.
+  double max_error_px = 4.0;
+  int num_threads = -1;
+
+  bool IsValid(std::string* error) const;
+};
+
+struct InitialViewGraph {
+  // All images of the scene; the pairs that have a relative pose.
+  ViewGraph graph;
+  int num_stored_poses = 0;
+  int num_decomposed = 0;
+  int num_reestimated = 0;
+  // Watermarks, degenerate pairs, and those whose matches support no pose.
+  int num_without_pose = 0;
+};
+
+// Step 1 of the coarse global stage (design 7.2): the view graph of the
+// verified pairs. A pair's pose is the stored one; else the decomposed
+// essential matrix; else (planar, uncalibrated and multiple configurations
+// without one) the five-point solution of its inlier matches. Pairs are
+// independent and draw their samples from a seed of their own, so threads
+// change nothing.
+InitialViewGraph BuildInitialViewGraph(
+    const TwoViewPoseOptions& options, const SceneData& scene,
+    const std::map<image_t, std::vector<Bearing>>& bearings);
+
+// The pose (unit translation) of an essential matrix that puts most points in
+// front of both cameras.
+Rigid3d DecomposeEssential(const Eigen::Matrix3d& essential_matrix,
+                           const std::vector<Bearing>& bearings1,
+                           const std::vector<Bearing>& bearings2,
+                           const std::vector<FeatureMatch>& matches);
+
+}  // namespace adasfm

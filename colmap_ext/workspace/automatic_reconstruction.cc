@@ -1,0 +1,294 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "colmap_ext/workspace/automatic_reconstruction.h"
+
+#include <sstream>
+#include <stdexcept>
+
+#include "colmap_ext/coarse/global_report.h"
+#include "colmap_ext/host/color_points.h"
+#include "colmap_ext/io/digest.h"
+#include "colmap_ext/io/output_files.h"
+#include "colmap_ext/io/step_journal.h"
+#include "colmap_ext/report/report.h"
+#include "colmap_ext/workspace/open_workspace.h"
+#include "colmap_ext/workspace/prepare_reconstruction.h"
+#include "colmap_ext/workspace/reset_workspace.h"
+
+namespace adasfm {
+namespace {
+
+// Steps whose files are replaced have nothing to remove beforehand.
+Status KeepAll() { return Status::Ok(); }
+
+class Reconstructor {
+ public:
+  Reconstructor(const AutomaticReconstructionOptions& options,
+                const AutomaticReconstructionPaths& paths,
+                const ProgressCallback& progress,
+                const MessageCallback& message)
+      : options_(options),
+        paths_(paths),
+        progress_(progress),
+        message_(message) {}
+
+  StatusOr<AutomaticReconstructionResult> Run() {
+    Status status = Prepare();
+    if (status.ok()) status = Features();
+    if (status.ok()) status = Matching();
+    if (status.ok()) status = Priors();
+    if (status.ok()) status = Coarse();
+    if (status.ok()) status = Model();
+    if (status.ok()) status = Report();
+    if (!status.ok()) return status;
+    return result_;
+  }
+
+ private:
+  // The shares of the steps in the time of all; with CPU features matching is
+  // most of it.
+  struct Range {
+    double begin;
+    double end;
+  };
+  static constexpr Range kFeatures{0.0, 0.2}, kMatching{0.2, 0.75},
+      kPriors{0.75, 0.77}, kCoarse{0.77, 0.85}, kModel{0.85, 0.99},
+      kReport{0.99, 1.0};
+
+  std::string InWorkspace(const std::string& name) const {
+    return paths_.workspace_path + "/" + name;
+  }
+
+  ProgressCallback ProgressIn(const Range& range, const std::string& title) {
+    return [this, range, title](const std::string& what, double share_done) {
+      progress_(title + ": " + what,
+                range.begin + (range.end - range.begin) * share_done);
+    };
+  }
+
+  void Warn(const std::vector<std::string>& warnings) {
+    for (const std::string& warning : warnings) {
+      message_("WARNING: " + warning);
+    }
+  }
+
+  template <typename Reset, typename Work>
+  Status RunStep(const std::string& name, const StepInputs& inputs,
+                 const Reset& reset, const Work& work) {
+    const StatusOr<double> seconds =
+        journal_.Run(name, inputs, reset, work, message_);
+    if (!seconds.ok()) return seconds.status();
+    result_.steps.push_back({name, *seconds});
+    return Status::Ok();
+  }
+
+  Status Prepare();
+  Status Features();
+  Status ExtractAll(const std::vector<std::string>& names);
+  Status Matching();
+  Status Priors();
+  Status Coarse();
+  Status Model();
+  Status Report();
+
+  AutomaticReconstructionOptions options_;
+  AutomaticReconstructionPaths paths_;
+  const ProgressCallback& progress_;
+  const MessageCallback& message_;
+  std::string database_path_;
+  StepJournal journal_;
+  AutomaticReconstructionResult result_;
+};
+
+Status Reconstructor::Prepare() {
+  std::string error;
+  if (!options_.IsValid(&error)) throw std::invalid_argument(error);
+  Status status = PrepareOutputFolder(InWorkspace("logs"));
+  if (status.ok()) status = PrepareReconstruction(&options_, &paths_);
+  if (!status.ok()) return status;
+  database_path_ = InWorkspace("database.db");
+  result_.model_path = InWorkspace("sparse/0");
+  result_.report_path = InWorkspace("report.html");
+  StatusOr<StepJournal> journal =
+      OpenWorkspace(paths_.workspace_path, options_.restart, message_);
+  if (!journal.ok()) return journal.status();
+  journal_ = std::move(journal).value();
+  return Status::Ok();
+}
+
+Status Reconstructor::ExtractAll(const std::vector<std::string>& names) {
+  const ProgressCallback progress = ProgressIn(kFeatures, "features");
+  const StatusOr<ImageRegistration> images = RegisterImages(
+      options_.features, paths_.image_path, names, database_path_,
+      [&progress](const std::string& what, double share_done) {
+        progress(what, 0.1 * share_done);
+      });
+  if (!images.ok()) return images.status();
+  std::ostringstream text;
+  text << "features: " << images->num_images << " photos, "
+       << images->num_cameras
+       << (images->num_cameras == 1 ? " camera" : " cameras");
+  if (options_.features.camera_params.empty()) {
+    text << ", focal lengths from EXIF: " << images->num_known_focal_lengths
+         << ", guessed: "
+         << images->num_cameras - images->num_known_focal_lengths;
+  }
+  message_(text.str());
+  if (!images->unreadable.empty()) {
+    Warn({"not images: " + std::to_string(images->unreadable.size()) + " of " +
+          std::to_string(names.size()) + " files (the first one is " +
+          images->unreadable.front() + ")"});
+  }
+  return ExtractFeatures(
+      options_.features, paths_.image_path, database_path_,
+      InWorkspace("logs/features.log"),
+      [&progress](const std::string& what, double share_done) {
+        progress(what, 0.1 + 0.9 * share_done);
+      });
+}
+
+Status Reconstructor::Features() {
+  const StatusOr<std::vector<std::string>> names =
+      ListFilesRecursively(paths_.image_path, paths_.workspace_path);
+  if (!names.ok()) return names.status();
+  if (names->empty()) {
+    return Status::Error("the folder " + paths_.image_path +
+                         " has no files; check --image_path");
+  }
+  const FeatureOptions& features = options_.features;
+  const StepInputs inputs = {
+      {"photos", DigestFiles(paths_.image_path, *names)},
+      {"camera_model", features.camera_model},
+      {"camera_params", features.camera_params},
+      {"single_camera", std::to_string(features.single_camera)},
+      {"max_image_size", std::to_string(features.max_image_size)},
+      {"max_num_features", std::to_string(features.max_num_features)}};
+  return RunStep(
+      "features", inputs,
+      [this] { return ResetFeatures(paths_.workspace_path); },
+      [&] { return ExtractAll(*names); });
+}
+
+Status Reconstructor::Matching() {
+  const PairSelectionOptions& pairs = options_.pairs;
+  StatusOr<StepInputs> inputs =
+      DigestPaths({{"image_times", paths_.image_times_path},
+                   {"descriptors", pairs.descriptors_path}});
+  if (!inputs.ok()) return inputs.status();
+  inputs.value()["num_temporal_neighbors"] =
+      std::to_string(pairs.num_temporal_neighbors);
+  inputs.value()["num_similar_images"] =
+      std::to_string(pairs.num_similar_images);
+  const auto reset = [this] { return ResetMatches(database_path_); };
+  return RunStep("matching", *inputs, reset, [&] {
+    const ProgressCallback progress = ProgressIn(kMatching, "matching");
+    const StatusOr<PairSelection> selection =
+        SelectPairs(pairs, database_path_,
+                    [&progress](const std::string& what, double share_done) {
+                      progress(what, 0.05 * share_done);
+                    });
+    if (!selection.ok()) return selection.status();
+    Warn(selection->warnings);
+    message_("matching: " + std::to_string(selection->num_temporal) +
+             " pairs of neighbours in time, " +
+             std::to_string(selection->num_similar) +
+             " more of similar images");
+    return MatchPairs(options_.features, selection->pairs, database_path_,
+                      InWorkspace("logs/matching.log"),
+                      [&progress](const std::string& what, double share_done) {
+                        progress(what, 0.05 + 0.95 * share_done);
+                      });
+  });
+}
+
+Status Reconstructor::Priors() {
+  const StatusOr<StepInputs> inputs =
+      DigestPaths({{"image_times", paths_.image_times_path},
+                   {"imu", paths_.imu_path},
+                   {"wheel", paths_.wheel_path},
+                   {"sensors", paths_.sensors_path}});
+  if (!inputs.ok()) return inputs.status();
+  const auto reset = [this] { return ResetPriors(database_path_); };
+  return RunStep("priors", *inputs, reset, [this] {
+    if (paths_.imu_path.empty() && paths_.wheel_path.empty()) {
+      return Status::Ok();
+    }
+    ProgressIn(kPriors, "priors")("reading the logs", 0.0);
+    const PriorImportPaths paths = {database_path_, paths_.image_times_path,
+                                    paths_.imu_path, paths_.wheel_path,
+                                    paths_.sensors_path};
+    const StatusOr<PriorImport> import =
+        ImportPriors(options_.priors, paths, database_path_ + ".priors.json");
+    if (!import.ok()) return import.status();
+    message_(FormatPriorImport(*import));
+    return Status::Ok();
+  });
+}
+
+Status Reconstructor::Coarse() {
+  const StepInputs inputs = {
+      {"refine_intrinsics", std::to_string(options_.map.refine_focal_length)}};
+  return RunStep("coarse", inputs, &KeepAll, [this] {
+    const StatusOr<CoarseModelReport> report = EstimateCoarseModel(
+        options_.global, database_path_, InWorkspace("coarse"),
+        ProgressIn(kCoarse, "coarse model"));
+    if (!report.ok()) return report.status();
+    Warn(report->warnings);
+    message_(FormatGlobalReportText(report->result, report->seconds));
+    return Status::Ok();
+  });
+}
+
+Status Reconstructor::Model() {
+  return RunStep("model", {}, &KeepAll, [this] {
+    MapRequest request;
+    request.database_path = database_path_;
+    request.input_path = InWorkspace("coarse/0");
+    request.output_path = InWorkspace("sparse");
+    const StatusOr<MapReport> report =
+        MapParts(options_.map, request, ProgressIn(kModel, "model"));
+    if (!report.ok()) return report.status();
+    message_(FormatMapperSummaryText(report->summary));
+    return ColorPoints(paths_.image_path, InWorkspace("sparse"),
+                       InWorkspace("logs/colors.log"));
+  });
+}
+
+Status Reconstructor::Report() {
+  const StatusOr<StepInputs> inputs =
+      DigestPaths({{"ground_truth", paths_.ground_truth_path}});
+  if (!inputs.ok()) return inputs.status();
+  return RunStep("report", *inputs, &KeepAll, [this] {
+    ProgressIn(kReport, "report")("drawing", 0.0);
+    ReportOptions options;
+    options.input_path = InWorkspace("sparse");
+    options.coarse_path = InWorkspace("coarse");
+    options.database_path = database_path_;
+    options.image_path = paths_.image_path;
+    options.ground_truth_path = paths_.ground_truth_path;
+    options.ground_truth.image_times_path = paths_.image_times_path;
+    const StatusOr<std::string> page = BuildReport(options);
+    if (!page.ok()) return page.status();
+    return WriteTextFile(result_.report_path, *page);
+  });
+}
+
+}  // namespace
+
+bool AutomaticReconstructionOptions::IsValid(std::string* error) const {
+  if (refine_intrinsics < -1 || refine_intrinsics > 1) {
+    *error = "refine_intrinsics = " + std::to_string(refine_intrinsics) +
+             " must be -1, 0 or 1";
+    return false;
+  }
+  return features.IsValid(error) && pairs.IsValid(error) &&
+         priors.IsValid(error) && global.IsValid(error) && map.IsValid(error);
+}
+
+StatusOr<AutomaticReconstructionResult> ReconstructAutomatically(
+    const AutomaticReconstructionOptions& options,
+    const AutomaticReconstructionPaths& paths, const ProgressCallback& progress,
+    const MessageCallback& message) {
+  return Reconstructor(options, paths, progress, message).Run();
+}
+
+}  // namespace adasfm

@@ -1,0 +1,76 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "colmap_ext/adasfm_pipeline.h"
+#include "colmap_ext/host/features.h"
+#include "colmap_ext/io/step_journal.h"
+#include "colmap_ext/pairs/select_pairs.h"
+#include "core/progress.h"
+#include "core/status.h"
+
+namespace adasfm {
+
+struct AutomaticReconstructionOptions {
+  FeatureOptions features;
+  PairSelectionOptions pairs;
+  PriorImportOptions priors;
+  GlobalStageOptions global;
+  MapOptions map;
+  // Whether the model adjusts focal length and distortion: 0, 1, or -1 for
+  // cameras without features.camera_params. If it does, the coarse stage leaves
+  // the matches as they are.
+  int refine_intrinsics = -1;
+  // Removes what earlier calls left in the workspace, and does it all anew.
+  bool restart = false;
+  // Of all stages; -1: all of the machine's.
+  int num_threads = -1;
+
+  bool IsValid(std::string* error) const;
+};
+
+// Empty paths: there is no such file.
+struct AutomaticReconstructionPaths {
+  std::string image_path;
+  std::string workspace_path;
+  // euroc, 4seasons, kitti or tum: image_path is the root folder of such a
+  // recording, and gives everything that is not given here (dataset_layout.h).
+  std::string data_format;
+  std::string image_times_path;
+  std::string imu_path;
+  std::string wheel_path;
+  std::string sensors_path;
+  std::string ground_truth_path;
+};
+
+struct AutomaticReconstructionResult {
+  struct Step {
+    std::string name;
+    double seconds = 0.0;  // of the run that did it, this or an earlier one
+  };
+  std::vector<Step> steps;
+  std::string model_path;
+  std::string report_path;
+};
+
+// From a folder of photos, and sensor logs where there are any, to the model
+// and its report, in the workspace:
+//   1  features   cameras, keypoints, descriptors      database.db
+//   2  matching   pair selection, matches, geometries  database.db
+//   3  priors     sensor logs                          database.db
+//   4  coarse     coarse global SfM                    coarse/
+//   5  model      partitioned mapping                  sparse/0
+//   6  report     one page to look at                  report.html
+// steps.json records what is done, and with which inputs: the same call again
+// does what is missing, a call with other options starts at the first step that
+// they change. Interruption (core/interruption.h) by `progress` keeps what is
+// finished. A database in the workspace that this function did not make is an
+// error. Throws std::invalid_argument for invalid options.
+StatusOr<AutomaticReconstructionResult> ReconstructAutomatically(
+    const AutomaticReconstructionOptions& options,
+    const AutomaticReconstructionPaths& paths, const ProgressCallback& progress,
+    const MessageCallback& message);
+
+}  // namespace adasfm

@@ -1,0 +1,253 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "global/calibration/mount_observations.h"
+
+#include <Eigen/Cholesky>
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <utility>
+
+#include "core/so3.h"
+#include "global/two_view/translation_direction.h"
+
+namespace adasfm {
+namespace {
+
+using Matrix5d = Eigen::Matrix<double, 5, 5>;
+using Jacobian = Eigen::Matrix<double, 3, kNumMountUnknowns>;
+
+// Matches beyond these add little.
+constexpr size_t kMaxNumPairs = 2000;
+constexpr int kMaxNumMatches = 150;
+// Steps of the chain whose pairs share their errors.
+constexpr int kSpanSteps = 10;
+constexpr double kLossScalePx = 1.5;
+constexpr double kKeypointSigmaPx = 0.5;
+// Least error granted to a rotation, of vision or sensors.
+constexpr double kMinRotationSigmaRad = 5e-4;
+// Sensors know the direction of longer motions only.
+constexpr double kMinLengthM = 0.05;
+// Directions farther from the sensors' are not theirs.
+constexpr double kMaxDirectionErrorRad = 0.5;
+
+// The motion of a pair with its priors turned.
+struct TurnedMotion {
+  Eigen::Matrix3d rotation;
+  Eigen::Vector3d direction;
+  // Of the rotation, and of the direction as a vector.
+  Eigen::Matrix3d rotation_covariance;
+  Eigen::Matrix3d direction_covariance;
+  // Changes of the rotation (from the left) by all unknowns, as vision sees it
+  // from the sensors' but without vision's own offset.
+  Jacobian rotation_change = Jacobian::Zero();
+  bool has_direction = false;
+};
+
+TurnedMotion TurnMotion(const ChainMotion& motion,
+                        const Eigen::Quaterniond& turn, double seconds) {
+  TurnedMotion turned;
+  const Eigen::Matrix3d matrix = turn.toRotationMatrix();
+  const Eigen::Quaterniond rotation =
+      turn * motion.cam2_from_cam1.rotation * turn.conjugate();
+  turned.rotation = rotation.toRotationMatrix();
+  turned.rotation_covariance =
+      matrix * motion.covariance.topLeftCorner<3, 3>() * matrix.transpose();
+  turned.rotation_covariance.diagonal().array() +=
+      kMinRotationSigmaRad * kMinRotationSigmaRad;
+  // Exp(e) R Exp(-e) R^T = Exp((I - R) e); the mean turn of the frames in
+  // between is good enough for a few steps.
+  turned.rotation_change.leftCols<3>() =
+      Eigen::Matrix3d::Identity() - turned.rotation;
+  turned.rotation_change.middleCols<3>(3) =
+      seconds * ExpSo3(0.5 * LogSo3(rotation)).toRotationMatrix();
+  const Eigen::Vector3d& translation = motion.cam2_from_cam1.translation;
+  const double length = translation.norm();
+  turned.has_direction = motion.has_position && length > kMinLengthM;
+  if (!turned.has_direction) return turned;
+  turned.direction = matrix * translation / length;
+  turned.direction_covariance = matrix *
+                                motion.covariance.bottomRightCorner<3, 3>() *
+                                matrix.transpose() / (length * length);
+  return turned;
+}
+
+// Whitens `residual = jacobian * unknowns` of the first kRows rows.
+template <int kRows>
+MountObservation Whiten(
+    const MountPair& pair,
+    const Eigen::Matrix<double, kRows, kNumMountUnknowns>& jacobian,
+    const Eigen::Matrix<double, kRows, 1>& residual,
+    const Eigen::Matrix<double, kRows, kRows>& covariance) {
+  const Eigen::LLT<Eigen::Matrix<double, kRows, kRows>> root(covariance);
+  MountObservation observation;
+  observation.jacobian.setZero();
+  observation.residual.setZero();
+  observation.jacobian.template topRows<kRows>() =
+      root.matrixL().solve(jacobian);
+  observation.residual.template head<kRows>() = root.matrixL().solve(residual);
+  observation.num_dof = kRows;
+  observation.weight = 1.0 / pair.num_steps;
+  observation.span = pair.span;
+  return observation;
+}
+
+MountObservation ObserveRotation(const MountPair& pair,
+                                 const TurnedMotion& motion) {
+  Jacobian jacobian = motion.rotation_change;
+  jacobian.rightCols<3>().setIdentity();
+  const Eigen::Vector3d residual = LogSo3(
+      pair.last_from_first * Eigen::Quaterniond(motion.rotation).conjugate());
+  const double sigma = std::max(kMinRotationSigmaRad, pair.rotation_sigma_rad);
+  return Whiten<3>(
+      pair, jacobian, residual,
+      motion.rotation_covariance + sigma * sigma * Eigen::Matrix3d::Identity());
+}
+
+// The normal matrix of the matches' distances by (rotation, direction), in
+// units of the noise's variance.
+Matrix5d ComputeInformation(const TranslationProblem& problem,
+                            const Eigen::Vector3d& direction,
+                            const Eigen::Matrix<double, 3, 2>& basis) {
+  Matrix5d matrix = Matrix5d::Zero();
+  double sum_weights = 0.0;
+  double sum_weighted_squares = 0.0;
+  const EdgeBearings& bearings = problem.bearings;
+  for (size_t k = 0; k < bearings.bearings1.size(); ++k) {
+    const EpipolarResidual residual =
+        ComputeEpipolarResidual(*bearings.bearings1[k], *bearings.bearings2[k],
+                                problem.rotation, direction);
+    const double squared = residual.distance_px * residual.distance_px;
+    const double weight = 1.0 / (1.0 + squared / (kLossScalePx * kLossScalePx));
+    const Eigen::Matrix<double, 5, 1> jacobian = EpipolarJacobian(
+        *bearings.bearings1[k], *bearings.bearings2[k], problem.rotation,
+        direction, basis, residual.inverse_norm);
+    matrix.noalias() += weight * jacobian * jacobian.transpose();
+    sum_weights += weight;
+    sum_weighted_squares += weight * squared;
+  }
+  return matrix /
+         std::max(kKeypointSigmaPx * kKeypointSigmaPx,
+                  sum_weighted_squares / std::max(1.0, sum_weights - 2.0));
+}
+
+bool TellsTheMount(int max_num_steps, const OdometryChain& chain,
+                   const GlobalCorrespondences& correspondences,
+                   const ViewGraphEdge& edge) {
+  return edge.IsKept() && edge.has_rotation &&
+         edge.source != EdgeSource::kSensor &&
+         chain.IsConnected(edge.image_id1, edge.image_id2) &&
+         std::abs(chain.NumSteps(edge.image_id1, edge.image_id2)) <=
+             max_num_steps &&
+         chain.Motion(edge.image_id1, edge.image_id2).has_rotation &&
+         correspondences.matches.count(edge.Pair()) > 0;
+}
+
+// The sum of the steps' durations, by position in the chain; only differences
+// within a piece mean anything.
+std::map<int, double> SumSeconds(const OdometryChain& chain,
+                                 const std::vector<RelativePosePrior>& priors) {
+  std::map<int, double> seconds;
+  for (const RelativePosePrior& prior : priors) {
+    if (!chain.IsConnected(prior.image_id1, prior.image_id2)) continue;
+    if (chain.NumSteps(prior.image_id1, prior.image_id2) != 1) continue;
+    seconds.emplace(chain.Index(prior.image_id1), 0.0);
+    seconds[chain.Index(prior.image_id2)] = SecondsFromNs(prior.dt_ns);
+  }
+  double sum = 0.0;
+  for (auto& [index, value] : seconds) value = sum += value;
+  return seconds;
+}
+
+MountPair CreatePair(const OdometryChain& chain,
+                     const GlobalCorrespondences& correspondences,
+                     const ViewGraphEdge& edge) {
+  MountPair pair;
+  pair.first = edge.image_id1;
+  pair.last = edge.image_id2;
+  pair.last_from_first = edge.cam2_from_cam1.rotation;
+  pair.num_steps = chain.NumSteps(pair.first, pair.last);
+  pair.rotation_sigma_rad = edge.rotation_sigma_rad;
+  pair.bearings = SelectEdgeBearings(
+      correspondences.bearings.at(edge.image_id1),
+      correspondences.bearings.at(edge.image_id2),
+      correspondences.matches.at(edge.Pair()), kMaxNumMatches);
+  if (pair.num_steps < 0) {
+    pair.num_steps = -pair.num_steps;
+    std::swap(pair.first, pair.last);
+    std::swap(pair.bearings.bearings1, pair.bearings.bearings2);
+    pair.last_from_first = pair.last_from_first.conjugate();
+  }
+  pair.span = chain.Index(pair.first) / kSpanSteps;
+  return pair;
+}
+
+}  // namespace
+
+std::vector<MountPair> CollectMountPairs(
+    int max_num_steps, const OdometryChain& chain, const ViewGraph& graph,
+    const GlobalCorrespondences& correspondences,
+    const std::vector<RelativePosePrior>& priors) {
+  std::vector<const ViewGraphEdge*> edges;
+  for (const ViewGraphEdge& edge : graph.edges) {
+    if (TellsTheMount(max_num_steps, chain, correspondences, edge)) {
+      edges.push_back(&edge);
+    }
+  }
+  const std::map<int, double> seconds = SumSeconds(chain, priors);
+  std::vector<MountPair> pairs;
+  const size_t count = std::min(kMaxNumPairs, edges.size());
+  for (size_t k = 0; k < count; ++k) {
+    pairs.push_back(
+        CreatePair(chain, correspondences, *edges[k * edges.size() / count]));
+    pairs.back().seconds = seconds.at(chain.Index(pairs.back().last)) -
+                           seconds.at(chain.Index(pairs.back().first));
+  }
+  return pairs;
+}
+
+std::vector<MountObservation> ObserveMount(const OdometryChain& chain,
+                                           const Eigen::Quaterniond& turn,
+                                           const MountPair& pair) {
+  std::vector<MountObservation> observations;
+  const TurnedMotion motion =
+      TurnMotion(chain.Motion(pair.first, pair.last), turn, pair.seconds);
+  observations.push_back(ObserveRotation(pair, motion));
+  if (!motion.has_direction) return observations;
+
+  DirectionSearch search;
+  search.loss_scale_px = kLossScalePx;
+  search.search = false;
+  search.max_num_iterations = 8;
+  const TranslationProblem problem =
+      BuildTranslationProblem(pair.bearings, motion.rotation);
+  const Eigen::Vector3d direction =
+      EstimateTranslationDirection(search, problem, motion.direction).direction;
+  if (!(AngleBetweenRad(direction, motion.direction) < kMaxDirectionErrorRad) ||
+      !(direction.norm() > 0.5)) {
+    return observations;
+  }
+  const Eigen::Matrix<double, 3, 2> basis = TangentBasis(motion.direction);
+  const Matrix5d information = ComputeInformation(problem, direction, basis);
+  const Eigen::LLT<Eigen::Matrix2d> solver(
+      information.bottomRightCorner<2, 2>());
+  const Eigen::Matrix2d by_matches = solver.solve(Eigen::Matrix2d::Identity());
+  if (solver.info() != Eigen::Success || !by_matches.allFinite()) {
+    return observations;
+  }
+  // How the direction of least distances moves with the rotation that is held;
+  // it is held at the sensors', which is off by minus the change.
+  const Eigen::Matrix<double, 2, 3> by_rotation =
+      solver.solve(information.bottomLeftCorner<2, 3>());
+  Eigen::Matrix<double, 2, kNumMountUnknowns> jacobian =
+      by_rotation * motion.rotation_change;
+  jacobian.leftCols<3>() -= basis.transpose() * Hat(motion.direction);
+  observations.push_back(Whiten<2>(
+      pair, jacobian, basis.transpose() * direction,
+      by_matches +
+          by_rotation * motion.rotation_covariance * by_rotation.transpose() +
+          basis.transpose() * motion.direction_covariance * basis));
+  return observations;
+}
+
+}  // namespace adasfm

@@ -1,0 +1,91 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "global/odometry/edge_lengths.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+#include "global/odometry/length_propagation.h"
+
+namespace adasfm {
+namespace {
+
+// Starts every part of the graph that shares too few points with the others,
+// the edges with most matches first. Their units are tied by the depth of the
+// scene: its median is taken to be the same everywhere.
+void SeedParts(const EdgeLengthOptions& options, const ViewGraph& graph,
+               LengthPropagation* propagation) {
+  std::vector<int> order(graph.edges.size());
+  std::iota(order.begin(), order.end(), 0);
+  std::stable_sort(order.begin(), order.end(), [propagation](int a, int b) {
+    return propagation->NumMatches(a) > propagation->NumMatches(b);
+  });
+  for (const int e : order) {
+    if (propagation->NumMatches(e) < options.num_shared_reliable) break;
+    if (propagation->TouchesKnown(e)) continue;
+    propagation->Seed(e);
+    propagation->Spread(options.num_shared_reliable);
+  }
+}
+
+}  // namespace
+
+bool EdgeLengthOptions::IsValid(std::string* error) const {
+  if (!(min_parallax_deg > 0.0)) {
+    *error = "min_parallax_deg = " + std::to_string(min_parallax_deg) +
+             " must be > 0";
+    return false;
+  }
+  if (max_num_matches < 1 || min_num_shared < 1 ||
+      num_shared_reliable < min_num_shared || num_sweeps < 0 ||
+      !(max_log_sigma > 0.0)) {
+    *error = "max_num_matches = " + std::to_string(max_num_matches) +
+             " and min_num_shared = " + std::to_string(min_num_shared) +
+             " must be >= 1, num_shared_reliable >= min_num_shared, "
+             "max_log_sigma > 0, num_sweeps = " +
+             std::to_string(num_sweeps) + " >= 0";
+    return false;
+  }
+  return true;
+}
+
+EdgeLengths EstimateEdgeLengths(
+    const EdgeLengthOptions& options, const ViewGraph& graph,
+    const std::map<ImagePair, double>& known_lengths_m,
+    const GlobalCorrespondences& correspondences, const EdgeLengths& start) {
+  LengthPropagation propagation(options, graph, correspondences);
+  EdgeLengths result;
+  const size_t num_edges = graph.edges.size();
+  for (size_t e = 0; e < num_edges; ++e) {
+    const auto it = known_lengths_m.find(graph.edges[e].Pair());
+    if (it == known_lengths_m.end() || !(it->second > 0.0)) continue;
+    constexpr double kPriorLogSigma = 0.02;
+    propagation.Fix(e, std::log(it->second), kPriorLogSigma);
+    result.metric = true;
+  }
+  if (start.metric == result.metric) {
+    for (size_t e = 0; e < start.lengths.size() && e < num_edges; ++e) {
+      if (start.lengths[e].has_value()) propagation.Start(e, *start.lengths[e]);
+    }
+  }
+  propagation.Spread(options.num_shared_reliable);
+  if (result.metric) propagation.Spread(options.min_num_shared);
+  std::vector<bool> is_by_depth(num_edges, false);
+  for (size_t e = 0; result.metric && e < num_edges; ++e) {
+    is_by_depth[e] = !propagation.IsKnown(e) || (e < start.lengths.size() &&
+                                                 start.lengths[e].has_value() &&
+                                                 start.lengths[e]->is_by_depth);
+  }
+  SeedParts(options, graph, &propagation);
+  propagation.Spread(options.min_num_shared);
+  for (int i = 0; i < options.num_sweeps; ++i) propagation.Sweep();
+  result.lengths.resize(num_edges);
+  for (size_t e = 0; e < num_edges; ++e) {
+    if (!propagation.IsKnown(e)) continue;
+    result.lengths[e] = propagation.Get(e);
+    result.lengths[e]->is_by_depth = is_by_depth[e];
+  }
+  return result;
+}
+
+}  // namespace adasfm

@@ -1,0 +1,274 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "global/odometry/length_propagation.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+#include "core/parallel.h"
+#include "core/so3.h"
+#include "global/view_graph/epipolar.h"
+
+namespace adasfm {
+namespace {
+
+constexpr float kInfinity = std::numeric_limits<float>::infinity();
+
+}  // namespace
+
+LengthPropagation::LengthPropagation(
+    const EdgeLengthOptions& options, const ViewGraph& graph,
+    const GlobalCorrespondences& correspondences)
+    : options_(options), graph_(graph) {
+  keypoint_begin_.assign(graph.images.size() + 1, 0);
+  for (size_t i = 0; i < graph.images.size(); ++i) {
+    const auto it = correspondences.bearings.find(graph.images[i]);
+    keypoint_begin_[i + 1] =
+        keypoint_begin_[i] +
+        (it == correspondences.bearings.end() ? 0 : it->second.size());
+  }
+  const size_t num_edges = graph.edges.size();
+  std::vector<std::vector<Observation>> by_edge(num_edges);
+  ParallelFor(options.num_threads, num_edges, [&](size_t e) {
+    by_edge[e] = ObserveEdge(graph.edges[e], correspondences);
+    for (Observation& observation : by_edge[e]) observation.edge = e;
+  });
+  edge_begin_.assign(num_edges + 1, 0);
+  for (size_t e = 0; e < num_edges; ++e) {
+    edge_begin_[e + 1] = edge_begin_[e] + by_edge[e].size();
+  }
+  observations_.reserve(edge_begin_.back());
+  for (const auto& edge : by_edge) {
+    observations_.insert(observations_.end(), edge.begin(), edge.end());
+  }
+  LinkKeypoints(keypoint_begin_.back());
+  log_lengths_.assign(num_edges, 0.0);
+  log_sigmas_.assign(num_edges, 0.0);
+  is_known_.assign(num_edges, false);
+  is_fixed_.assign(num_edges, false);
+  has_known_.assign(graph.images.size(), false);
+}
+
+std::vector<LengthPropagation::Observation> LengthPropagation::ObserveEdge(
+    const ViewGraphEdge& edge,
+    const GlobalCorrespondences& correspondences) const {
+  // Beyond this parallax other errors than the keypoints' decide; without the
+  // bound, one wrong match of wide parallax would outweigh a hundred true ones.
+  constexpr double kSaturation = 0.05;
+  const auto matches = correspondences.matches.find(edge.Pair());
+  if (!edge.IsKept() || !edge.has_rotation || !edge.has_translation ||
+      !edge.has_baseline || edge.source == EdgeSource::kSensor ||
+      matches == correspondences.matches.end()) {
+    return {};
+  }
+  const auto& bearings1 = correspondences.bearings.at(edge.image_id1);
+  const auto& bearings2 = correspondences.bearings.at(edge.image_id2);
+  const int begin1 = keypoint_begin_[graph_.IndexOf(edge.image_id1)];
+  const int begin2 = keypoint_begin_[graph_.IndexOf(edge.image_id2)];
+  const Eigen::Matrix3d rotation =
+      edge.cam2_from_cam1.rotation.toRotationMatrix();
+  const Eigen::Vector3d translation =
+      edge.cam2_from_cam1.translation.normalized();
+  const double min_sin_parallax = std::sin(DegToRad(options_.min_parallax_deg));
+  using Candidate = std::pair<Observation, Observation>;
+  std::vector<Candidate> candidates;
+  for (const FeatureMatch& match : matches->second) {
+    double depth1, depth2, sin_parallax;
+    if (!ComputeRayDepths(bearings1.at(match.point2D_idx1).direction,
+                          bearings2.at(match.point2D_idx2).direction, rotation,
+                          translation, &depth1, &depth2, &sin_parallax)) {
+      continue;
+    }
+    if (depth1 <= 0.0 || depth2 <= 0.0 || sin_parallax < min_sin_parallax) {
+      continue;
+    }
+    const double squared = sin_parallax * sin_parallax;
+    const float weight = squared / (squared + kSaturation * kSaturation);
+    candidates.push_back(
+        {{begin1 + int(match.point2D_idx1), 0, float(std::log(depth1)), weight},
+         {begin2 + int(match.point2D_idx2), 0, float(std::log(depth2)),
+          weight}});
+  }
+  std::stable_sort(candidates.begin(), candidates.end(),
+                   [](const Candidate& a, const Candidate& b) {
+                     return a.first.weight > b.first.weight;
+                   });
+  if (candidates.size() > options_.max_num_matches) {
+    candidates.resize(options_.max_num_matches);
+  }
+  std::vector<Observation> observations;
+  observations.reserve(2 * candidates.size());
+  for (const Candidate& candidate : candidates) {
+    observations.push_back(candidate.first);
+    observations.push_back(candidate.second);
+  }
+  return observations;
+}
+
+void LengthPropagation::LinkKeypoints(int num_keypoints) {
+  link_begin_.assign(num_keypoints + 1, 0);
+  for (const Observation& observation : observations_) {
+    ++link_begin_[observation.keypoint + 1];
+  }
+  for (int k = 0; k < num_keypoints; ++k) link_begin_[k + 1] += link_begin_[k];
+  links_.resize(observations_.size());
+  std::vector<size_t> next(link_begin_.begin(), link_begin_.end() - 1);
+  for (size_t o = 0; o < observations_.size(); ++o) {
+    links_[next[observations_[o].keypoint]++] = o;
+  }
+  num_known_.assign(num_keypoints, 0);
+  num_known_at_depth_.assign(num_keypoints, 0);
+  log_depths_.assign(num_keypoints, 0.0);
+  predicted_.assign(observations_.size(), kInfinity);
+}
+
+void LengthPropagation::MarkKnown(int edge) {
+  if (is_known_[edge]) return;
+  is_known_[edge] = true;
+  has_known_[graph_.IndexOf(graph_.edges[edge].image_id1)] = true;
+  has_known_[graph_.IndexOf(graph_.edges[edge].image_id2)] = true;
+  for (size_t o = edge_begin_[edge]; o < edge_begin_[edge + 1]; ++o) {
+    ++num_known_[observations_[o].keypoint];
+  }
+}
+
+void LengthPropagation::Fix(int edge, double log_length, double log_sigma) {
+  log_lengths_[edge] = log_length;
+  log_sigmas_[edge] = log_sigma;
+  is_fixed_[edge] = true;
+  MarkKnown(edge);
+}
+
+void LengthPropagation::Start(int edge, const EdgeLength& length) {
+  if (is_known_[edge] || edge_begin_[edge] == edge_begin_[edge + 1]) return;
+  log_lengths_[edge] = std::log(length.length);
+  log_sigmas_[edge] = length.log_sigma;
+  MarkKnown(edge);
+}
+
+void LengthPropagation::Seed(int edge) {
+  std::vector<WeightedValue> log_depths;
+  for (size_t o = edge_begin_[edge]; o < edge_begin_[edge + 1]; o += 2) {
+    log_depths.push_back({observations_[o].offset, 1.0});
+  }
+  Fix(edge, SeedDepth() - WeightedMedian(&log_depths), options_.max_log_sigma);
+}
+
+double LengthPropagation::SeedDepth() {
+  if (!seed_log_depth_.has_value()) {
+    std::vector<WeightedValue> log_depths;
+    for (const Observation& observation : observations_) {
+      if (!is_known_[observation.edge]) continue;
+      log_depths.push_back(
+          {log_lengths_[observation.edge] + observation.offset, 1.0});
+    }
+    seed_log_depth_ = log_depths.empty() ? 0.0 : WeightedMedian(&log_depths);
+  }
+  return *seed_log_depth_;
+}
+
+bool LengthPropagation::TouchesKnown(int edge) const {
+  return has_known_[graph_.IndexOf(graph_.edges[edge].image_id1)] ||
+         has_known_[graph_.IndexOf(graph_.edges[edge].image_id2)];
+}
+
+EdgeLength LengthPropagation::Get(int edge) const {
+  return {std::exp(log_lengths_[edge]), log_sigmas_[edge]};
+}
+
+void LengthPropagation::Sweep() {
+  ParallelFor(options_.num_threads, num_known_.size(),
+              [this](size_t keypoint) { PredictDepths(keypoint); });
+  ParallelFor(options_.num_threads, graph_.edges.size(), [this](size_t e) {
+    if (!is_known_[e] || is_fixed_[e]) return;
+    std::vector<WeightedValue> values;
+    for (size_t o = edge_begin_[e]; o < edge_begin_[e + 1]; ++o) {
+      if (!std::isfinite(predicted_[o])) continue;
+      values.push_back(
+          {predicted_[o] - observations_[o].offset, observations_[o].weight});
+    }
+    EdgeLength learned;
+    if (!LearnLength(&values, &learned)) return;
+    log_lengths_[e] = learned.length;
+    log_sigmas_[e] = learned.log_sigma;
+  });
+}
+
+// For each edge the median of the others, from one sorted list.
+void LengthPropagation::PredictDepths(int keypoint) {
+  struct Entry {
+    double value;
+    double weight;
+    int observation;
+  };
+  std::vector<Entry> entries;
+  double sum = 0.0;
+  for (size_t k = link_begin_[keypoint]; k < link_begin_[keypoint + 1]; ++k) {
+    const Observation& link = observations_[links_[k]];
+    predicted_[links_[k]] = kInfinity;
+    if (!is_known_[link.edge]) continue;
+    entries.push_back(
+        {log_lengths_[link.edge] + link.offset, link.weight, links_[k]});
+    sum += link.weight;
+  }
+  if (entries.size() < 2) return;
+  std::sort(entries.begin(), entries.end(),
+            [](const Entry& a, const Entry& b) { return a.value < b.value; });
+  for (const Entry& own : entries) {
+    double half = 0.5 * (sum - own.weight);
+    for (const Entry& entry : entries) {
+      if (entry.observation == own.observation) continue;
+      predicted_[own.observation] = entry.value;
+      half -= entry.weight;
+      if (half <= 0.0) break;
+    }
+  }
+}
+
+// The logarithm of a length and its sigma.
+bool LengthPropagation::LearnLength(std::vector<WeightedValue>* values,
+                                    EdgeLength* log_length) const {
+  if (values->size() < options_.min_num_shared) return false;
+  log_length->length = WeightedMedian(values);
+  for (WeightedValue& value : *values) {
+    value.value = std::abs(value.value - log_length->length);
+  }
+  // 1.4826 takes a median deviation to a normal's sigma, sqrt(pi / 2) the
+  // mean's error to the median's.
+  log_length->log_sigma = 1.4826 * 1.2533 * WeightedMedian(values) /
+                          std::sqrt(static_cast<double>(values->size()));
+  return log_length->log_sigma <= options_.max_log_sigma;
+}
+
+// The first value at which half of the weight is reached; halves the range
+// around it while that pays.
+double LengthPropagation::WeightedMedian(std::vector<WeightedValue>* values) {
+  const auto is_less = [](const WeightedValue& a, const WeightedValue& b) {
+    return a.value < b.value;
+  };
+  double half = 0.0;
+  for (const WeightedValue& value : *values) half += 0.5 * value.weight;
+  auto begin = values->begin();
+  auto end = values->end();
+  while (end - begin > 16) {
+    const auto middle = begin + (end - begin) / 2;
+    std::nth_element(begin, middle, end, is_less);
+    double left = 0.0;
+    for (auto it = begin; it != middle; ++it) left += it->weight;
+    if (left >= half) {
+      end = middle;
+    } else {
+      half -= left;
+      begin = middle;
+    }
+  }
+  std::sort(begin, end, is_less);
+  for (; begin + 1 != end; ++begin) {
+    half -= begin->weight;
+    if (half <= 0.0) break;
+  }
+  return begin->value;
+}
+
+}  // namespace adasfm

@@ -1,0 +1,101 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <map>
+#include <string>
+#include <vector>
+
+#include "core/relative_pose_prior.h"
+#include "core/rigid3d.h"
+#include "core/types.h"
+
+namespace adasfm {
+
+// Errors that all steps of the chain share: they grow with the length of the
+// path, not with its root, and are what decides after kilometres.
+struct OdometryChainOptions {
+  // 1 sigma of the wheels' common scale error.
+  double scale_sigma = 0.01;
+  // 1 sigma of the gyro bias that is left, rad/s, per axis.
+  double gyro_bias_sigma_rad_s = 2e-4;
+  // The steps of a smoothed drive share the errors of its tilt and velocity:
+  // this many sigmas of their translations persist from step to step, besides
+  // the part that changes.
+  double persistent_translation_ratio = 1.0;
+  // 1 sigma, per step, of the change of scale from there on, as a ratio. Where
+  // vision alone makes the steps, nothing holds their scale.
+  double scale_drift_ratio = 0.0;
+
+  bool IsValid(std::string* error) const;
+};
+
+// The motion between any two images of the chain.
+struct ChainMotion {
+  // All steps between the images have the part in question. Only then are the
+  // values below meaningful.
+  bool has_rotation = false;
+  bool has_position = false;
+  Rigid3d cam2_from_cam1;
+  // As RelativePosePrior::covariance.
+  Eigen::Matrix<double, 6, 6> covariance;
+};
+
+// The priors of consecutive images composed, with their covariance
+// (docs/reference/global.md): every step's error is carried to the frame of the
+// chain's start, where errors of different steps simply add up; so one prefix
+// sum answers for any two images in constant time.
+class OdometryChain {
+ public:
+  OdometryChain() = default;
+  // Priors of consecutive images in any order; each image has at most one
+  // prior to a later and one from an earlier image (else the first by ids
+  // counts). Missing priors split the chain.
+  OdometryChain(const std::vector<RelativePosePrior>& priors,
+                const OdometryChainOptions& options);
+
+  bool empty() const { return nodes_.empty(); }
+  // Whether the chain leads from one image to the other.
+  bool IsConnected(image_t image_id1, image_t image_id2) const;
+  // Steps from image 1 to image 2, negative when image 2 is the earlier one.
+  // Both must be connected.
+  int NumSteps(image_t image_id1, image_t image_id2) const;
+  // Images must be connected; either order.
+  ChainMotion Motion(image_t image_id1, image_t image_id2) const;
+  // The position of an image in the whole sequence, pieces one after the
+  // other; -1 when it is in no piece.
+  int Index(image_t image_id) const;
+  int Piece(image_t image_id) const;  // -1 when absent
+  // Poses in the frame of the piece's first image.
+  Rigid3d CamFromStart(image_t image_id) const;
+
+ private:
+  using Matrix6d = Eigen::Matrix<double, 6, 6>;
+  // By the scale, the gyro bias and the persistent translation error.
+  using Systematic = Eigen::Matrix<double, 6, 7>;
+  struct Node {
+    image_t image_id = kInvalidImageId;
+    int piece = -1;
+    Rigid3d cam_from_start;
+    // Prefix sums over the piece's steps up to this node.
+    Matrix6d covariance = Matrix6d::Zero();
+    Systematic systematic = Systematic::Zero();
+    // Of the places where the scale may change: their number, sum and sum of
+    // outer products.
+    double num_places = 0.0;
+    Eigen::Vector3d place_sum = Eigen::Vector3d::Zero();
+    Eigen::Matrix3d place_square_sum = Eigen::Matrix3d::Zero();
+    int num_without_rotation = 0;
+    int num_without_position = 0;
+  };
+  static Eigen::Matrix3d SumOfScaleChanges(const Node& earlier,
+                                           const Node& later);
+  void AppendPiece(image_t first, const std::map<image_t, int>& next,
+                   const std::vector<RelativePosePrior>& priors);
+
+  OdometryChainOptions options_;
+  std::vector<Node> nodes_;
+  std::map<image_t, int> index_;
+  int num_pieces_ = 0;
+};
+
+}  // namespace adasfm

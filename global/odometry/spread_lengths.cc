@@ -1,0 +1,82 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <queue>
+#include <utility>
+#include <vector>
+
+#include "global/odometry/length_propagation.h"
+
+namespace adasfm {
+
+void LengthPropagation::Spread(int min_num_shared) {
+  // Shared keypoints, -edge.
+  std::priority_queue<std::pair<int, int>> queue;
+  std::vector<int> num_shared(graph_.edges.size(), 0);
+  std::vector<char> has_depth(num_known_.size(), false);
+  const auto announce = [&](int edge) {
+    for (size_t o = edge_begin_[edge]; o < edge_begin_[edge + 1]; ++o) {
+      const int keypoint = observations_[o].keypoint;
+      if (has_depth[keypoint]) continue;
+      has_depth[keypoint] = true;
+      for (size_t k = link_begin_[keypoint]; k < link_begin_[keypoint + 1];
+           ++k) {
+        const int other = observations_[links_[k]].edge;
+        if (is_known_[other]) continue;
+        if (++num_shared[other] >= min_num_shared) {
+          queue.emplace(num_shared[other], -other);
+        }
+      }
+    }
+  };
+  const int num_edges = graph_.edges.size();
+  for (int e = 0; e < num_edges; ++e) {
+    if (is_known_[e]) announce(e);
+  }
+  // How many keypoints an edge shared when it was last refused.
+  std::vector<int> num_refused(num_edges, 0);
+  while (!queue.empty()) {
+    const auto [count, negative] = queue.top();
+    queue.pop();
+    const int e = -negative;
+    if (is_known_[e] || count <= num_refused[e]) continue;
+    if (LearnFromStart(e)) {
+      announce(e);
+    } else {
+      num_refused[e] = num_shared[e];
+    }
+  }
+}
+
+// The depth of a keypoint by its known edges; found anew only when they have
+// become half as many again.
+double LengthPropagation::StartingDepth(int keypoint) {
+  if (2 * num_known_[keypoint] <= 3 * num_known_at_depth_[keypoint]) {
+    return log_depths_[keypoint];
+  }
+  std::vector<WeightedValue> values;
+  for (size_t k = link_begin_[keypoint]; k < link_begin_[keypoint + 1]; ++k) {
+    const Observation& link = observations_[links_[k]];
+    if (!is_known_[link.edge]) continue;
+    values.push_back({log_lengths_[link.edge] + link.offset, link.weight});
+  }
+  num_known_at_depth_[keypoint] = num_known_[keypoint];
+  log_depths_[keypoint] = WeightedMedian(&values);
+  return log_depths_[keypoint];
+}
+
+bool LengthPropagation::LearnFromStart(int edge) {
+  std::vector<WeightedValue> values;
+  for (size_t o = edge_begin_[edge]; o < edge_begin_[edge + 1]; ++o) {
+    const Observation& observation = observations_[o];
+    if (num_known_[observation.keypoint] == 0) continue;
+    values.push_back({StartingDepth(observation.keypoint) - observation.offset,
+                      observation.weight});
+  }
+  EdgeLength learned;
+  if (!LearnLength(&values, &learned)) return false;
+  log_lengths_[edge] = learned.length;
+  log_sigmas_[edge] = learned.log_sigma;
+  MarkKnown(edge);
+  return true;
+}
+
+}  // namespace adasfm

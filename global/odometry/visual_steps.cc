@@ -1,0 +1,258 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "global/odometry/visual_steps.h"
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+#include <set>
+#include <utility>
+
+#include "core/median.h"
+#include "core/so3.h"
+
+namespace adasfm {
+namespace {
+
+bool HasPosition(const RelativePosePrior& prior) {
+  return prior.HasDirection() && prior.HasLength();
+}
+
+int FindVisualEdge(const ViewGraph& graph, const ImagePair& pair) {
+  const int e = FindEdge(graph, pair);
+  if (e < 0) return -1;
+  const ViewGraphEdge& edge = graph.edges[e];
+  const bool is_visual =
+      edge.IsKept() && edge.has_rotation && edge.source != EdgeSource::kSensor;
+  return is_visual ? e : -1;
+}
+
+std::vector<image_t> InOrderOfCapture(const ViewGraph& graph) {
+  std::vector<std::pair<int64_t, image_t>> ranked;
+  for (size_t i = 0; i < graph.images.size(); ++i) {
+    ranked.emplace_back(graph.CaptureRank(i), graph.images[i]);
+  }
+  std::sort(ranked.begin(), ranked.end());
+  std::vector<image_t> images;
+  for (const auto& [rank, image_id] : ranked) images.push_back(image_id);
+  return images;
+}
+
+// Neighbours in the order of capture that share a pair, where one piece of the
+// chain ends and another begins. A step without anything, to be filled.
+std::vector<RelativePosePrior> ContinueChain(
+    const ViewGraph& graph, std::vector<RelativePosePrior> priors) {
+  std::set<image_t> has_next, has_previous;
+  for (const RelativePosePrior& prior : priors) {
+    has_next.insert(prior.image_id1);
+    has_previous.insert(prior.image_id2);
+  }
+  const std::vector<image_t> images = InOrderOfCapture(graph);
+  for (size_t k = 0; k + 1 < images.size(); ++k) {
+    RelativePosePrior step;
+    step.image_id1 = images[k];
+    step.image_id2 = images[k + 1];
+    if (has_next.count(step.image_id1) || has_previous.count(step.image_id2) ||
+        FindVisualEdge(graph, ImagePair(step.image_id1, step.image_id2)) < 0) {
+      continue;
+    }
+    priors.push_back(step);
+  }
+  return priors;
+}
+
+// Only the pairs of images that follow each other closely: look-alike places
+// must not tell how long the steps are.
+ViewGraph SequenceGraph(const ViewGraph& graph, const OdometryChain& chain,
+                        int max_num_steps) {
+  ViewGraph sequence = graph;
+  for (ViewGraphEdge& edge : sequence.edges) {
+    const bool is_near = chain.IsConnected(edge.image_id1, edge.image_id2) &&
+                         std::abs(chain.NumSteps(
+                             edge.image_id1, edge.image_id2)) <= max_num_steps;
+    if (!is_near) edge.removal = EdgeRemoval::kDisconnected;
+  }
+  return sequence;
+}
+
+void SetTranslation(const Eigen::Vector3d& translation,
+                    const Eigen::Matrix3d& covariance,
+                    RelativePosePrior* prior) {
+  prior->cam2_from_cam1.translation = translation;
+  prior->covariance.topRightCorner<3, 3>().setZero();
+  prior->covariance.bottomLeftCorner<3, 3>().setZero();
+  prior->covariance.bottomRightCorner<3, 3>() = covariance;
+  prior->flags |= kPriorDirection | kPriorLength;
+}
+
+// What the pair of the two images says, in the order of the prior.
+Rigid3d VisualMotion(const ViewGraphEdge& edge,
+                     const RelativePosePrior& prior) {
+  return edge.image_id1 == prior.image_id1 ? edge.cam2_from_cam1
+                                           : edge.cam2_from_cam1.Inverse();
+}
+
+void FillRotation(const VisualStepOptions& options, const ViewGraphEdge& edge,
+                  RelativePosePrior* prior) {
+  const double sigma_rad =
+      std::hypot(edge.rotation_sigma_rad, DegToRad(options.rotation_error_deg));
+  prior->cam2_from_cam1.rotation = VisualMotion(edge, *prior).rotation;
+  prior->covariance.setZero();
+  prior->covariance.topLeftCorner<3, 3>() =
+      sigma_rad * sigma_rad * Eigen::Matrix3d::Identity();
+  prior->flags |= kPriorRotation;
+}
+
+void FillPosition(const VisualStepOptions& options, const ViewGraphEdge& edge,
+                  const EdgeLength& length, RelativePosePrior* prior) {
+  const Eigen::Vector3d direction =
+      VisualMotion(edge, *prior).translation.normalized();
+  const double along =
+      length.length * std::hypot(length.log_sigma, options.length_error_ratio);
+  const double across =
+      length.length * std::hypot(edge.direction_sigma_rad,
+                                 DegToRad(options.direction_error_deg));
+  const Eigen::Matrix3d along_part = direction * direction.transpose();
+  SetTranslation(
+      length.length * direction,
+      along * along * along_part +
+          across * across * (Eigen::Matrix3d::Identity() - along_part),
+      prior);
+}
+
+// The steps in the order of the chain; neighbours in time follow each other.
+std::vector<RelativePosePrior*> InOrder(
+    const OdometryChain& chain, std::vector<RelativePosePrior>* priors) {
+  std::vector<RelativePosePrior*> steps;
+  for (RelativePosePrior& prior : *priors) {
+    if (chain.IsConnected(prior.image_id1, prior.image_id2)) {
+      steps.push_back(&prior);
+    }
+  }
+  std::sort(steps.begin(), steps.end(), [&chain](const auto* a, const auto* b) {
+    return chain.Index(a->image_id2) < chain.Index(b->image_id2);
+  });
+  return steps;
+}
+
+// In the camera's frame; none without a time.
+std::optional<Eigen::Vector3d> Velocity(const RelativePosePrior& step) {
+  if (!HasPosition(step) || step.dt_ns <= 0) return std::nullopt;
+  return step.cam2_from_cam1.translation / SecondsFromNs(step.dt_ns);
+}
+
+// Runs of steps without a position, between steps that have one: the motion
+// goes on with the mean of both velocities.
+int Coast(const VisualStepOptions& options,
+          const std::vector<RelativePosePrior*>& steps) {
+  int num_coasting = 0;
+  for (size_t begin = 1; begin < steps.size(); ++begin) {
+    if (HasPosition(*steps[begin])) continue;
+    size_t end = begin;
+    double seconds = 0.0;
+    for (; end < steps.size() && !HasPosition(*steps[end]); ++end) {
+      seconds += SecondsFromNs(steps[end]->dt_ns);
+    }
+    if (end == steps.size()) break;
+    const auto before = Velocity(*steps[begin - 1]);
+    const auto behind = Velocity(*steps[end]);
+    if (seconds <= options.max_coasting_s && before && behind) {
+      const Eigen::Vector3d velocity = 0.5 * (*before + *behind);
+      for (size_t k = begin; k < end; ++k) {
+        if (!steps[k]->HasRotation()) continue;
+        const Eigen::Vector3d way = SecondsFromNs(steps[k]->dt_ns) * velocity;
+        SetTranslation(way,
+                       std::pow(options.coasting_error_ratio, 2) *
+                           way.squaredNorm() * Eigen::Matrix3d::Identity(),
+                       steps[k]);
+        ++num_coasting;
+      }
+    }
+    begin = end;
+  }
+  return num_coasting;
+}
+
+double MedianLength(const std::vector<RelativePosePrior>& priors) {
+  std::vector<double> lengths;
+  for (const RelativePosePrior& prior : priors) {
+    const double length = prior.cam2_from_cam1.translation.norm();
+    if (HasPosition(prior) && length > 0.0) lengths.push_back(length);
+  }
+  return lengths.empty() ? 1.0 : UpperMedian(&lengths);
+}
+
+}  // namespace
+
+bool VisualStepOptions::IsValid(std::string* error) const {
+  if (max_num_steps < 1) {
+    *error = "max_num_steps = " + std::to_string(max_num_steps) +
+             " must be at least 1";
+    return false;
+  }
+  if (!(length_error_ratio > 0.0) || !(direction_error_deg > 0.0) ||
+      !(rotation_error_deg > 0.0) || !(coasting_error_ratio > 0.0) ||
+      !(max_coasting_s >= 0.0) || !(scale_drift_ratio >= 0.0)) {
+    *error =
+        "length_error_ratio, direction_error_deg, rotation_error_deg and "
+        "coasting_error_ratio must be > 0, max_coasting_s = " +
+        std::to_string(max_coasting_s) +
+        " and scale_drift_ratio = " + std::to_string(scale_drift_ratio) +
+        " >= 0";
+    return false;
+  }
+  if (!(max_contradicting_ratio >= 0.0 && max_contradicting_ratio <= 1.0)) {
+    *error =
+        "max_contradicting_ratio = " + std::to_string(max_contradicting_ratio) +
+        " must be in [0, 1]";
+    return false;
+  }
+  return true;
+}
+
+VisualSteps AddVisualSteps(const VisualStepOptions& options,
+                           const EdgeLengthOptions& length_options,
+                           const ViewGraph& graph,
+                           const GlobalCorrespondences& correspondences,
+                           const std::map<ImagePair, double>& known_lengths_m,
+                           const std::vector<RelativePosePrior>& priors) {
+  VisualSteps steps;
+  steps.priors = ContinueChain(graph, priors);
+  const OdometryChain chain(steps.priors, OdometryChainOptions());
+  const EdgeLengths lengths = EstimateEdgeLengths(
+      length_options, SequenceGraph(graph, chain, options.max_num_steps),
+      known_lengths_m, correspondences);
+
+  // 1. Steps that vision sees; a standstill's error is in terms of the others.
+  std::vector<RelativePosePrior*> standstills;
+  std::map<ImagePair, double> known_lengths = known_lengths_m;
+  for (RelativePosePrior& prior : steps.priors) {
+    if (prior.HasRotation() && HasPosition(prior)) continue;
+    const ImagePair pair(prior.image_id1, prior.image_id2);
+    const int e = FindVisualEdge(graph, pair);
+    if (e < 0) continue;
+    if (!prior.HasRotation()) FillRotation(options, graph.edges[e], &prior);
+    if (!graph.edges[e].has_baseline) {
+      standstills.push_back(&prior);
+      continue;
+    }
+    if (!graph.edges[e].has_translation || !lengths.lengths[e]) continue;
+    FillPosition(options, graph.edges[e], *lengths.lengths[e], &prior);
+    known_lengths[pair] = lengths.lengths[e]->length;
+    ++steps.num_by_vision;
+  }
+  const double sigma = options.length_error_ratio * MedianLength(steps.priors);
+  for (RelativePosePrior* prior : standstills) {
+    SetTranslation(Eigen::Vector3d::Zero(),
+                   sigma * sigma * Eigen::Matrix3d::Identity(), prior);
+    ++steps.num_by_vision;
+  }
+  // 2. Steps that nothing sees.
+  steps.num_coasting = Coast(options, InOrder(chain, &steps.priors));
+
+  if (!lengths.metric) steps.unit_m = MedianLength(steps.priors);
+  steps.lengths = EstimateEdgeLengths(length_options, graph, known_lengths,
+                                      correspondences);
+  return steps;
+}
+
+}  // namespace adasfm

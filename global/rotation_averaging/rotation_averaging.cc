@@ -1,0 +1,257 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "global/rotation_averaging/rotation_averaging.h"
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include "core/so3.h"
+#include "global/rotation_averaging/rotation_sdp.h"
+#include "global/rotation_averaging/rotation_spanning_tree.h"
+#include "global/view_graph/laplacian_solver.h"
+
+namespace adasfm {
+namespace {
+
+using Rotations = std::vector<Eigen::Matrix3d>;
+
+std::vector<RotationEdge> CollectEdges(const RotationAveragingOptions& options,
+                                       const ViewGraph& graph) {
+  std::vector<RotationEdge> edges;
+  for (const ViewGraphEdge& edge : graph.edges) {
+    if (!edge.IsKept() || !edge.has_rotation) continue;
+    edges.push_back(
+        {graph.IndexOf(edge.image_id1), graph.IndexOf(edge.image_id2),
+         edge.cam2_from_cam1.rotation.toRotationMatrix(),
+         std::max(edge.rotation_sigma_rad, options.min_rotation_sigma_rad)});
+  }
+  return edges;
+}
+
+// Log(R_j^T R_ij R_i) = omega_j - omega_i to first order, for R Exp(omega).
+Eigen::Vector3d Residual(const RotationEdge& edge, const Rotations& rotations) {
+  return LogSo3(Eigen::Quaterniond(Eigen::Matrix3d(
+      rotations[edge.j].transpose() * edge.rotation * rotations[edge.i])));
+}
+
+// Where the robust loss takes over for an edge.
+double LossScale(const RotationAveragingOptions& options,
+                 const RotationEdge& edge) {
+  constexpr double kNumSigmas = 3.0;
+  return std::max(DegToRad(options.loss_scale_deg),
+                  kNumSigmas * edge.sigma_rad);
+}
+
+// Robust without a scale, so that starts far from the optimum compare too.
+double SumOfAbsoluteErrors(const std::vector<RotationEdge>& edges,
+                           const Rotations& rotations) {
+  double sum = 0.0;
+  for (const RotationEdge& edge : edges) {
+    sum += Residual(edge, rotations).norm() / edge.sigma_rad;
+  }
+  return sum;
+}
+
+// The loss of one iteration: L1, or Geman-McClure that takes over at the edge's
+// scale times this factor.
+struct Loss {
+  bool is_l1 = true;
+  double scale_factor = 1.0;
+};
+
+double Weight(const RotationAveragingOptions& options, const Loss& loss,
+              const RotationEdge& edge, double residual) {
+  if (loss.is_l1) {
+    // Residuals below this weigh alike, which keeps the system well
+    // conditioned.
+    constexpr double kMinResidualRad = 1e-4;
+    return 1.0 / (edge.sigma_rad * std::max(residual, kMinResidualRad));
+  }
+  const double squared_scale =
+      std::pow(loss.scale_factor * LossScale(options, edge), 2);
+  return std::pow(squared_scale / (squared_scale + residual * residual), 2) /
+         (edge.sigma_rad * edge.sigma_rad);
+}
+
+// One iteration; returns the mean change in radians, or a negative number when
+// the system cannot be solved.
+double Iterate(const RotationAveragingOptions& options, const Loss& loss,
+               const std::vector<RotationEdge>& edges, LaplacianSolver* solver,
+               Rotations* rotations) {
+  LaplacianSolver::Vectors residuals(edges.size(), 3);
+  std::vector<double> weights(edges.size());
+  for (size_t e = 0; e < edges.size(); ++e) {
+    residuals.row(e) = Residual(edges[e], *rotations).transpose();
+    weights[e] = Weight(options, loss, edges[e], residuals.row(e).norm());
+  }
+  LaplacianSolver::Vectors changes;
+  if (!solver->Solve(weights, residuals, &changes)) return -1.0;
+  for (size_t i = 0; i < rotations->size(); ++i) {
+    (*rotations)[i] *= ExpSo3(changes.row(i).transpose()).toRotationMatrix();
+  }
+  return changes.rowwise().norm().mean();
+}
+
+void StartFromSdp(const RotationAveragingOptions& options,
+                  const std::vector<RotationEdge>& edges, Rotations* rotations,
+                  GlobalRotations* result) {
+  RotationSdpOptions sdp_options;
+  sdp_options.min_rank = options.min_rank;
+  sdp_options.max_rank = options.max_rank;
+  sdp_options.max_num_sweeps = options.max_num_sdp_sweeps;
+  sdp_options.tolerance = options.sdp_tolerance;
+  const RotationSdpSolution solution =
+      SolveRotationSdp(sdp_options, edges, *rotations);
+  result->sdp_rank = solution.rank;
+  result->sdp_optimality = solution.optimality;
+  // The relaxation is of plain squares: wrong edges may have bent it.
+  if (SumOfAbsoluteErrors(edges, solution.rotations) <
+      SumOfAbsoluteErrors(edges, *rotations)) {
+    *rotations = solution.rotations;
+  }
+}
+
+// The cost of a node's edges when it has this rotation.
+double NodeCost(const RotationAveragingOptions& options,
+                const std::vector<RotationEdge>& edges,
+                const std::vector<int>& node_edges, int node,
+                const Eigen::Matrix3d& rotation, const Rotations& rotations) {
+  double cost = 0.0;
+  for (const int e : node_edges) {
+    const RotationEdge& edge = edges[e];
+    const Eigen::Matrix3d predicted =
+        edge.j == node
+            ? Eigen::Matrix3d(edge.rotation * rotations[edge.i])
+            : Eigen::Matrix3d(edge.rotation.transpose() * rotations[edge.j]);
+    const double squared = LogSo3(Eigen::Quaterniond(Eigen::Matrix3d(
+                                      rotation.transpose() * predicted)))
+                               .squaredNorm();
+    const double squared_scale = std::pow(LossScale(options, edge), 2);
+    cost += squared * squared_scale / (squared_scale + squared) /
+            (edge.sigma_rad * edge.sigma_rad);
+  }
+  return cost;
+}
+
+// Nodes that most of their edges contradict may be caught in a wrong optimum:
+// each takes what one of its neighbours says, when that costs less.
+void RepairNodes(const RotationAveragingOptions& options,
+                 const std::vector<RotationEdge>& edges, Rotations* rotations) {
+  std::vector<std::vector<int>> edges_of(rotations->size());
+  std::vector<int> num_contradicting(rotations->size(), 0);
+  for (size_t e = 0; e < edges.size(); ++e) {
+    const bool contradicts =
+        Residual(edges[e], *rotations).norm() > LossScale(options, edges[e]);
+    for (const int node : {edges[e].i, edges[e].j}) {
+      edges_of[node].push_back(e);
+      num_contradicting[node] += contradicts;
+    }
+  }
+  for (size_t node = 0; node < rotations->size(); ++node) {
+    if (2 * num_contradicting[node] <= edges_of[node].size()) continue;
+    double best_cost = NodeCost(options, edges, edges_of[node], node,
+                                (*rotations)[node], *rotations);
+    for (const int e : edges_of[node]) {
+      const RotationEdge& edge = edges[e];
+      Eigen::Matrix3d candidate = edge.rotation * (*rotations)[edge.i];
+      if (edge.i == node) {
+        candidate = edge.rotation.transpose() * (*rotations)[edge.j];
+      }
+      const double cost =
+          NodeCost(options, edges, edges_of[node], node, candidate, *rotations);
+      if (cost < best_cost) {
+        best_cost = cost;
+        (*rotations)[node] = candidate;
+      }
+    }
+  }
+}
+
+// L1 steps, then Geman-McClure from wide to the loss scale, which follows the
+// rotations from far away without losing them to wrong edges.
+void RunIterations(const RotationAveragingOptions& options,
+                   const std::vector<RotationEdge>& edges,
+                   LaplacianSolver* solver, Rotations* rotations,
+                   GlobalRotations* result) {
+  Loss loss;
+  for (int k = 0; k < options.max_num_l1_iterations; ++k) {
+    const double change = Iterate(options, loss, edges, solver, rotations);
+    ++result->num_iterations;
+    if (change < options.convergence_rad) break;
+  }
+  constexpr double kWidestFactor = 16.0;
+  constexpr double kNarrowing = 0.7;
+  loss.is_l1 = false;
+  loss.scale_factor = kWidestFactor;
+  bool was_repaired = false;
+  for (int k = 0; k < options.max_num_irls_iterations; ++k) {
+    const double change = Iterate(options, loss, edges, solver, rotations);
+    ++result->num_iterations;
+    if (change < 0.0) return;
+    if (loss.scale_factor == 1.0 && !was_repaired) {
+      RepairNodes(options, edges, rotations);
+      was_repaired = true;
+    } else if (loss.scale_factor == 1.0 && change < options.convergence_rad) {
+      result->converged = true;
+      return;
+    }
+    loss.scale_factor = std::max(1.0, kNarrowing * loss.scale_factor);
+  }
+}
+
+}  // namespace
+
+bool RotationAveragingOptions::IsValid(std::string* error) const {
+  if (min_rank < 3 || max_rank < min_rank || max_rank > 12) {
+    *error = "min_rank = " + std::to_string(min_rank) +
+             " must be >= 3 and max_rank = " + std::to_string(max_rank) +
+             " in [min_rank, 12]";
+    return false;
+  }
+  if (max_num_sdp_sweeps < 1 || max_num_l1_iterations < 0 ||
+      max_num_irls_iterations < 1) {
+    *error =
+        "max_num_sdp_sweeps and max_num_irls_iterations must be >= 1, "
+        "max_num_l1_iterations >= 0";
+    return false;
+  }
+  if (!(loss_scale_deg > 0.0) || !(min_rotation_sigma_rad > 0.0) ||
+      !(convergence_rad > 0.0)) {
+    *error = "loss_scale_deg = " + std::to_string(loss_scale_deg) +
+             ", min_rotation_sigma_rad and convergence_rad must be > 0";
+    return false;
+  }
+  return true;
+}
+
+GlobalRotations EstimateGlobalRotations(const RotationAveragingOptions& options,
+                                        const ViewGraph& graph) {
+  GlobalRotations result;
+  const size_t num_nodes = graph.images.size();
+  const std::vector<RotationEdge> edges = CollectEdges(options, graph);
+  Rotations rotations;
+  if (num_nodes == 0 ||
+      !SpreadRotationsOverTree(edges, num_nodes, &rotations)) {
+    return result;
+  }
+  if (options.use_sdp_start) StartFromSdp(options, edges, &rotations, &result);
+
+  std::vector<std::pair<int, int>> node_pairs;
+  for (const RotationEdge& edge : edges) {
+    node_pairs.emplace_back(edge.i, edge.j);
+  }
+  LaplacianSolver solver(num_nodes, std::move(node_pairs));
+  RunIterations(options, edges, &solver, &rotations, &result);
+
+  const Eigen::Quaterniond first(rotations.front());
+  for (size_t i = 0; i < num_nodes; ++i) {
+    const Eigen::Quaterniond rotation =
+        Eigen::Quaterniond(rotations[i]) * first.conjugate();
+    if (!rotation.coeffs().allFinite()) return GlobalRotations();
+    result.cams_from_world[graph.images[i]] = rotation.normalized();
+  }
+  result.success = true;
+  return result;
+}
+
+}  // namespace adasfm

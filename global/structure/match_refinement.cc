@@ -1,0 +1,149 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "global/structure/match_refinement.h"
+
+#include <algorithm>
+#include <limits>
+#include <set>
+#include <utility>
+
+#include "core/parallel.h"
+#include "global/view_graph/epipolar.h"
+
+namespace adasfm {
+namespace {
+
+// d(u, E^T u') + d(u', E u) in px (paper, eq. 4), each measured in its own
+// image: |x2^T E x1| / |J^T n| with the line's normal n. Infinite behind a
+// camera.
+double EpipolarError(const Bearing& bearing1, const Bearing& bearing2,
+                     const Eigen::Matrix3d& rotation,
+                     const Eigen::Vector3d& translation) {
+  constexpr double kInfinity = std::numeric_limits<double>::infinity();
+  const Eigen::Vector3d n2 = translation.cross(rotation * bearing1.direction);
+  const Eigen::Vector3d n1 =
+      rotation.transpose() * bearing2.direction.cross(translation);
+  const double error = std::abs(bearing2.direction.dot(n2));
+  const double norm1 = (bearing1.jacobian.transpose() * n1).norm();
+  const double norm2 = (bearing2.jacobian.transpose() * n2).norm();
+  // At the epipole itself every line passes.
+  const double sum = (norm1 > 1e-15 ? error / norm1 : 0.0) +
+                     (norm2 > 1e-15 ? error / norm2 : 0.0);
+  double depth1, depth2, sin_parallax;
+  if (ComputeRayDepths(bearing1.direction, bearing2.direction, rotation,
+                       translation, &depth1, &depth2, &sin_parallax)) {
+    // A pixel of noise turns the depth's sign where the parallax is below what
+    // the allowed error subtends.
+    const double pixel_rad =
+        std::max(bearing1.jacobian.norm(), bearing2.jacobian.norm());
+    const bool is_certain = sin_parallax > 2.0 * pixel_rad;
+    if (is_certain && (depth1 <= 0.0 || depth2 <= 0.0)) return kInfinity;
+  }
+  return sum;
+}
+
+// Each keypoint's best match; ties by index.
+std::vector<FeatureMatch> KeepBestPerKeypoint(
+    std::vector<std::pair<double, FeatureMatch>> scored) {
+  std::sort(scored.begin(), scored.end());
+  std::set<point2D_t> used1;
+  std::set<point2D_t> used2;
+  std::vector<FeatureMatch> kept;
+  for (const auto& [error_px, match] : scored) {
+    if (used1.count(match.point2D_idx1) || used2.count(match.point2D_idx2)) {
+      continue;
+    }
+    used1.insert(match.point2D_idx1);
+    used2.insert(match.point2D_idx2);
+    kept.push_back(match);
+  }
+  std::sort(kept.begin(), kept.end());
+  return kept;
+}
+
+void RefinePair(const MatchRefinementOptions& options,
+                const std::vector<Bearing>& bearings1,
+                const std::vector<Bearing>& bearings2,
+                const std::vector<FeatureMatch>& candidates,
+                RefinedPair* pair) {
+  pair->num_candidates = candidates.size();
+  if (!options.enabled) {
+    pair->matches = candidates;
+    std::sort(pair->matches.begin(), pair->matches.end());
+    return;
+  }
+  const Eigen::Matrix3d rotation =
+      pair->cam2_from_cam1.rotation.toRotationMatrix();
+  // The distances do not depend on the baseline's length; without a baseline
+  // there are no epipolar lines.
+  const double baseline = pair->cam2_from_cam1.translation.norm();
+  std::vector<std::pair<double, FeatureMatch>> scored;
+  if (baseline > 0.0) {
+    const Eigen::Vector3d translation =
+        pair->cam2_from_cam1.translation / baseline;
+    for (const FeatureMatch& match : candidates) {
+      const double error_px = EpipolarError(bearings1.at(match.point2D_idx1),
+                                            bearings2.at(match.point2D_idx2),
+                                            rotation, translation);
+      if (error_px <= options.max_epipolar_error_px) {
+        scored.emplace_back(error_px, match);
+      }
+    }
+  }
+  pair->matches = KeepBestPerKeypoint(std::move(scored));
+  pair->removed = pair->matches.size() < options.min_num_matches;
+}
+
+}  // namespace
+
+bool MatchRefinementOptions::IsValid(std::string* error) const {
+  if (!(max_epipolar_error_px > 0.0)) {
+    *error =
+        "max_epipolar_error_px = " + std::to_string(max_epipolar_error_px) +
+        " must be > 0";
+    return false;
+  }
+  if (min_num_matches < 0) {
+    *error = "min_num_matches = " + std::to_string(min_num_matches) +
+             " must be >= 0";
+    return false;
+  }
+  return true;
+}
+
+MatchRefinementReport RefineMatches(
+    const MatchRefinementOptions& options,
+    const std::map<image_t, Rigid3d>& cams_from_world,
+    const std::map<image_t, std::vector<Bearing>>& bearings,
+    const std::map<ImagePair, std::vector<FeatureMatch>>& candidates) {
+  MatchRefinementReport report;
+  std::vector<const std::vector<FeatureMatch>*> pair_candidates;
+  for (const auto& [pair, matches] : candidates) {
+    const auto pose1 = cams_from_world.find(pair.image_id1);
+    const auto pose2 = cams_from_world.find(pair.image_id2);
+    if (pose1 == cams_from_world.end() || pose2 == cams_from_world.end()) {
+      ++report.num_skipped_pairs;
+      continue;
+    }
+    RefinedPair refined;
+    refined.pair = pair;
+    refined.cam2_from_cam1 = ComputeCam2FromCam1(pose1->second, pose2->second);
+    report.pairs.push_back(std::move(refined));
+    pair_candidates.push_back(&matches);
+  }
+  ParallelFor(options.num_threads, report.pairs.size(), [&](size_t k) {
+    RefinedPair& pair = report.pairs[k];
+    RefinePair(options, bearings.at(pair.pair.image_id1),
+               bearings.at(pair.pair.image_id2), *pair_candidates[k], &pair);
+  });
+  for (const RefinedPair& pair : report.pairs) {
+    report.num_candidates += pair.num_candidates;
+    if (pair.removed) {
+      ++report.num_removed_pairs;
+    } else {
+      report.num_kept += pair.matches.size();
+    }
+  }
+  return report;
+}
+
+}  // namespace adasfm

@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <set>
+#include <string>
+#include <vector>
+
+#include "core/relative_pose_prior.h"
+#include "core/types.h"
+#include "global/structure/tracks.h"
+
+namespace adasfm {
+
+// Neighbouring images of a drive see nearly the same. The cost of solving the
+// reduced camera system grows with the square of the number of images that see
+// a point, and where a drive comes back with more than the number of images; so
+// the first rounds of a large adjustment see points in every few images only,
+// and the priors carry the others along.
+struct KeyframeOptions {
+  // Smaller components keep all images: nothing is to be gained.
+  int min_num_images = 600;
+  // One image of so many is a keyframe; 1: all are.
+  int stride = 3;
+  // An image is passed over only if its neighbours have this many tracks in
+  // common.
+  int min_num_shared_tracks = 40;
+
+  bool IsValid(std::string* error) const;
+};
+
+// The images that see points. All others have priors of rotation, direction
+// and length from the image before and to the one after them.
+std::set<image_t> SelectKeyframes(const KeyframeOptions& options,
+                                  const std::set<image_t>& images,
+                                  const std::vector<Track>& tracks,
+                                  const std::vector<RelativePosePrior>& priors);
+
+}  // namespace adasfm

@@ -1,0 +1,76 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "global/translation_averaging/filter_edges_by_position.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/so3.h"
+
+namespace adasfm {
+namespace {
+
+bool FitsPositions(const PositionFilterOptions& options,
+                   const ViewGraphEdge& edge,
+                   const std::optional<EdgeLength>& length,
+                   const Eigen::Vector3d& direction_in_world,
+                   const Eigen::Vector3d& difference) {
+  const double distance = difference.norm();
+  if (length.has_value()) {
+    const double ratio = std::exp(options.max_num_sigmas * length->log_sigma) *
+                         options.max_length_ratio;
+    if (distance > ratio * length->length ||
+        distance < length->length / ratio) {
+      return false;
+    }
+  }
+  return AngleBetweenRad(difference, direction_in_world) <=
+         DegToRad(options.max_direction_discrepancy_deg) +
+             options.max_num_sigmas * edge.direction_sigma_rad;
+}
+
+}  // namespace
+
+bool PositionFilterOptions::IsValid(std::string* error) const {
+  if (!(max_direction_discrepancy_deg > 0.0) || !(max_num_sigmas >= 0.0)) {
+    *error =
+        "max_direction_discrepancy_deg = " +
+        std::to_string(max_direction_discrepancy_deg) +
+        " must be > 0 and max_num_sigmas = " + std::to_string(max_num_sigmas) +
+        " >= 0";
+    return false;
+  }
+  if (!(max_length_ratio > 1.0)) {
+    *error = "max_length_ratio = " + std::to_string(max_length_ratio) +
+             " must be > 1";
+    return false;
+  }
+  return true;
+}
+
+int FilterEdgesByPosition(
+    const PositionFilterOptions& options,
+    const std::map<image_t, Eigen::Quaterniond>& cams_from_world,
+    const std::map<image_t, Eigen::Vector3d>& centers,
+    const std::vector<std::optional<EdgeLength>>& lengths, ViewGraph* graph) {
+  int num_removed = 0;
+  for (size_t e = 0; e < graph->edges.size(); ++e) {
+    ViewGraphEdge& edge = graph->edges[e];
+    if (!edge.IsKept() || !edge.has_translation) continue;
+    if (edge.source != EdgeSource::kVisual) continue;
+    const Eigen::Vector3d direction_in_world =
+        cams_from_world.at(edge.image_id2).conjugate() *
+        -edge.cam2_from_cam1.translation;
+    const Eigen::Vector3d difference =
+        centers.at(edge.image_id2) - centers.at(edge.image_id1);
+    if (!FitsPositions(
+            options, edge,
+            e < lengths.size() ? lengths[e] : std::optional<EdgeLength>(),
+            direction_in_world, difference)) {
+      edge.removal = EdgeRemoval::kTranslation;
+      ++num_removed;
+    }
+  }
+  return num_removed;
+}
+
+}  // namespace adasfm

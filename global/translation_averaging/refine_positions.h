@@ -1,0 +1,42 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <Eigen/Core>
+#include <vector>
+
+#include "global/translation_averaging/translation_averaging.h"
+#include "global/view_graph/laplacian_solver.h"
+
+namespace adasfm {
+
+// What translation averaging knows of one edge between nodes i and j.
+struct PositionEdge {
+  enum Kind {
+    kFree,   // a direction
+    kSoft,   // and a length from shared points
+    kFixed,  // and a length in metres from sensors
+  };
+  int i = 0;
+  int j = 0;
+  Kind kind = kFree;
+  Eigen::Vector3d direction = Eigen::Vector3d::UnitZ();  // of C_j - C_i
+  double direction_sigma = 0.05;
+  double length = 1.0;
+  double length_sigma = 0.0;
+  // The length only helps to start; the refinement takes it for free.
+  bool is_redundant = false;
+};
+
+// Moves centres to the robust optimum of
+//   | across(C_j - C_i) |^2 / (length direction_sigma)^2
+//   + (along(C_j - C_i) - length)^2 / length_sigma^2
+// over all edges: across and along the edge's direction; edges without a length
+// take the present one, loosely. Gauss-Newton with Cauchy weights, a sparse
+// system of three unknowns per node; the first node stays. False when it does
+// not converge; centres stay finite.
+bool RefinePositions(const TranslationAveragingOptions& options,
+                     const std::vector<PositionEdge>& edges,
+                     LaplacianSolver::Vectors* centers,
+                     GlobalPositions* result);
+
+}  // namespace adasfm

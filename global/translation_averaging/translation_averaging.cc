@@ -1,0 +1,271 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "global/translation_averaging/translation_averaging.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numeric>
+
+#include "core/median.h"
+#include "core/so3.h"
+#include "global/translation_averaging/refine_positions.h"
+#include "global/view_graph/laplacian_solver.h"
+
+namespace adasfm {
+namespace {
+
+using Vectors = LaplacianSolver::Vectors;
+
+// Where sensors tie both ends of an edge together, its length from shared
+// points was derived from theirs: counting it again, with errors that all such
+// edges share, would let many weak lengths outvote the sensors' scale.
+void MarkRedundantLengths(int num_nodes, std::vector<PositionEdge>* edges) {
+  std::vector<int> parent(num_nodes);
+  std::iota(parent.begin(), parent.end(), 0);
+  const auto find = [&parent](int i) {
+    while (parent[i] != i) i = parent[i] = parent[parent[i]];
+    return i;
+  };
+  for (const PositionEdge& edge : *edges) {
+    if (edge.kind == PositionEdge::kFixed) parent[find(edge.i)] = find(edge.j);
+  }
+  for (PositionEdge& edge : *edges) {
+    edge.is_redundant =
+        edge.kind == PositionEdge::kSoft && find(edge.i) == find(edge.j);
+  }
+}
+
+std::vector<PositionEdge> CollectEdges(
+    const TranslationAveragingOptions& options, const ViewGraph& graph,
+    const std::map<image_t, Eigen::Quaterniond>& cams_from_world,
+    const std::vector<std::optional<EdgeLength>>& soft_lengths) {
+  std::vector<PositionEdge> edges;
+  for (size_t e = 0; e < graph.edges.size(); ++e) {
+    const ViewGraphEdge& edge = graph.edges[e];
+    if (!edge.IsKept() || !edge.has_translation) continue;
+    PositionEdge collected;
+    collected.i = graph.IndexOf(edge.image_id1);
+    collected.j = graph.IndexOf(edge.image_id2);
+    // C_j - C_i = -R_j^T t_ij.
+    const Eigen::Vector3d translation_in_world =
+        cams_from_world.at(edge.image_id2).conjugate() *
+        -edge.cam2_from_cam1.translation;
+    const double norm = translation_in_world.norm();
+    if (norm > 0.0) collected.direction = translation_in_world / norm;
+    collected.direction_sigma =
+        std::max(edge.direction_sigma_rad, options.min_sigma);
+    if (edge.length_m.has_value()) {
+      constexpr double kFallbackRatio = 0.05;
+      collected.kind = PositionEdge::kFixed;
+      collected.length = *edge.length_m;
+      collected.length_sigma = std::isfinite(edge.length_sigma_m)
+                                   ? edge.length_sigma_m
+                                   : kFallbackRatio * collected.length;
+    } else if (e < soft_lengths.size() && soft_lengths[e].has_value()) {
+      collected.kind = PositionEdge::kSoft;
+      collected.length = soft_lengths[e]->length;
+      collected.length_sigma =
+          collected.length *
+          std::max(soft_lengths[e]->log_sigma, options.min_soft_length_sigma);
+    }
+    edges.push_back(collected);
+  }
+  MarkRedundantLengths(graph.images.size(), &edges);
+  return edges;
+}
+
+bool IsConnected(const std::vector<PositionEdge>& edges, int num_nodes) {
+  std::vector<std::vector<int>> neighbours(num_nodes);
+  for (const PositionEdge& edge : edges) {
+    neighbours[edge.i].push_back(edge.j);
+    neighbours[edge.j].push_back(edge.i);
+  }
+  std::vector<bool> is_visited(num_nodes, false);
+  std::vector<int> stack = {0};
+  is_visited[0] = true;
+  int count = 1;
+  while (!stack.empty()) {
+    const int i = stack.back();
+    stack.pop_back();
+    for (const int j : neighbours[i]) {
+      if (is_visited[j]) continue;
+      is_visited[j] = true;
+      ++count;
+      stack.push_back(j);
+    }
+  }
+  return count == num_nodes;
+}
+
+class PositionSolver {
+ public:
+  PositionSolver(const TranslationAveragingOptions& options,
+                 const std::vector<PositionEdge>& edges, int num_nodes)
+      : options_(options), edges_(edges), solver_(num_nodes, Pairs(edges)) {
+    std::vector<double> lengths;
+    for (const PositionEdge& edge : edges) {
+      if (edge.kind != PositionEdge::kFree) lengths.push_back(edge.length);
+    }
+    unit_ = lengths.empty() ? 1.0 : UpperMedian(&lengths);
+    if (!(unit_ > 0.0)) unit_ = 1.0;
+  }
+
+  // IRLS until the centres rest. hold_soft: lengths of soft edges are fixed
+  // too. The number of iterations is added up in the result.
+  bool Run(bool hold_soft, Vectors* centers, GlobalPositions* result) {
+    result->converged = false;
+    for (int k = 0; k < options_.max_num_iterations; ++k) {
+      Vectors next;
+      if (!Iterate(hold_soft, *centers, &next)) return false;
+      result->last_change =
+          centers->rows() == next.rows()
+              ? (next - *centers).rowwise().norm().mean() / unit_
+              : std::numeric_limits<double>::infinity();
+      *centers = next;
+      ++result->num_iterations;
+      if (result->last_change < options_.convergence_ratio) {
+        result->converged = true;
+        break;
+      }
+    }
+    return true;
+  }
+
+ private:
+  static std::vector<std::pair<int, int>> Pairs(
+      const std::vector<PositionEdge>& edges) {
+    std::vector<std::pair<int, int>> pairs;
+    for (const PositionEdge& edge : edges) pairs.emplace_back(edge.i, edge.j);
+    return pairs;
+  }
+
+  // One reweighted solve from centers (none yet: the lengths alone).
+  bool Iterate(bool hold_soft, const Vectors& centers, Vectors* next) {
+    std::vector<double> weights(edges_.size());
+    Vectors differences(edges_.size(), 3);
+    const bool has_centers = centers.rows() > 0;
+    for (size_t e = 0; e < edges_.size(); ++e) {
+      const PositionEdge& edge = edges_[e];
+      const bool is_held =
+          edge.kind == PositionEdge::kFixed ||
+          (edge.kind == PositionEdge::kSoft && (hold_soft || !has_centers));
+      Eigen::Vector3d difference = Eigen::Vector3d::Zero();
+      if (has_centers) {
+        difference = (centers.row(edge.j) - centers.row(edge.i)).transpose();
+      }
+      double length = edge.length;
+      if (!is_held) length = FreeLength(edge, difference);
+      differences.row(e) = length * edge.direction.transpose();
+      // s_ij = 0: the centres are the wrong way round, and the edge is silent
+      // but for a trace that keeps the system regular.
+      constexpr double kSilent = 1e-6;
+      const double scale = std::max(length, 1e-2 * unit_);
+      double residual = 1.0;
+      if (has_centers) {
+        residual = (difference - length * edge.direction).norm() / scale;
+      }
+      const double sigma =
+          is_held ? std::max(edge.direction_sigma, edge.length_sigma / scale)
+                  : edge.direction_sigma;
+      const double weight =
+          1.0 /
+          (sigma * std::max(residual, options_.min_residual) * scale * scale);
+      const bool is_silent = !is_held && length == 0.0;
+      weights[e] = is_silent ? kSilent * weight : weight;
+    }
+    return solver_.Solve(weights, differences, next);
+  }
+
+  // 1 / s_ij at the best s_ij >= 0 for the present centres: the length at which
+  // the unit direction is hit, |difference|^2 / (direction . difference).
+  double FreeLength(const PositionEdge& edge,
+                    const Eigen::Vector3d& difference) const {
+    const double along = edge.direction.dot(difference);
+    const double squared = difference.squaredNorm();
+    if (squared == 0.0) return unit_;
+    if (!(along > 1e-3 * std::sqrt(squared))) return 0.0;
+    return squared / along;
+  }
+
+  const TranslationAveragingOptions& options_;
+  const std::vector<PositionEdge>& edges_;
+  LaplacianSolver solver_;
+  double unit_ = 1.0;
+};
+
+// Without metres the median length of the edges becomes 1.
+void NormalizeScale(const std::vector<PositionEdge>& edges, Vectors* centers) {
+  std::vector<double> lengths;
+  for (const PositionEdge& edge : edges) {
+    lengths.push_back((centers->row(edge.j) - centers->row(edge.i)).norm());
+  }
+  const double median = UpperMedian(&lengths);
+  if (median > 0.0) *centers /= median;
+}
+
+}  // namespace
+
+bool TranslationAveragingOptions::IsValid(std::string* error) const {
+  if (max_num_iterations < 1 || max_num_refine_iterations < 1) {
+    *error = "max_num_iterations = " + std::to_string(max_num_iterations) +
+             " and max_num_refine_iterations = " +
+             std::to_string(max_num_refine_iterations) + " must be >= 1";
+    return false;
+  }
+  if (!(convergence_ratio > 0.0) || !(min_sigma > 0.0) ||
+      !(min_residual > 0.0) || !(refine_loss_scale > 0.0) ||
+      !(min_soft_length_sigma > 0.0)) {
+    *error =
+        "convergence_ratio, min_sigma, min_residual, refine_loss_scale and "
+        "min_soft_length_sigma must be > 0";
+    return false;
+  }
+  return true;
+}
+
+GlobalPositions EstimateGlobalPositions(
+    const TranslationAveragingOptions& options, const ViewGraph& graph,
+    const std::map<image_t, Eigen::Quaterniond>& cams_from_world,
+    const std::vector<std::optional<EdgeLength>>& soft_lengths,
+    const std::map<image_t, Eigen::Vector3d>& initial_centers) {
+  GlobalPositions result;
+  const int num_nodes = graph.images.size();
+  const std::vector<PositionEdge> edges =
+      CollectEdges(options, graph, cams_from_world, soft_lengths);
+  if (num_nodes == 0 || !IsConnected(edges, num_nodes)) return result;
+  result.metric = std::any_of(edges.begin(), edges.end(), [](const auto& edge) {
+    return edge.kind == PositionEdge::kFixed;
+  });
+
+  Vectors centers;
+  if (initial_centers.size() == graph.images.size()) {
+    centers.resize(num_nodes, 3);
+    for (int i = 0; i < num_nodes; ++i) {
+      centers.row(i) = initial_centers.at(graph.images[i]).transpose();
+    }
+  }
+  PositionSolver solver(options, edges, num_nodes);
+  if (centers.rows() == 0 && !solver.Run(true, &centers, &result)) {
+    return result;
+  }
+  // Without metres, freeing all lengths at once lets weak parts of the graph
+  // shrink; the refinement frees them as far as their sigmas say.
+  if ((result.metric || !options.refine) &&
+      !solver.Run(false, &centers, &result)) {
+    return result;
+  }
+  if (options.refine) {
+    const bool converged = RefinePositions(options, edges, &centers, &result);
+    result.converged = converged;
+  }
+  if (!centers.allFinite()) return result;
+  if (!result.metric) NormalizeScale(edges, &centers);
+  for (int i = 0; i < num_nodes; ++i) {
+    result.centers[graph.images[i]] =
+        (centers.row(i) - centers.row(0)).transpose();
+  }
+  result.success = true;
+  return result;
+}
+
+}  // namespace adasfm

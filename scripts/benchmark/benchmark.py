@@ -1,0 +1,165 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: BSD-3-Clause
+"""Runs COLMAP's mappers and AdaSfM side by side on the same databases.
+
+Every figure of the README's tables comes from here. For each set it makes or
+copies a database and runs the methods in turn; with --repeats the methods
+alternate. Each run appends a JSON line to results.jsonl; results.md and the
+plots are drawn from all lines of that file, so a benchmark may be continued.
+Sets are made by `adasfm_synthesizer`; real sequences are used when a folder
+with them is given.
+"""
+
+import argparse
+import json
+import os
+import platform
+import re
+import subprocess
+import sys
+
+ROOT = os.path.abspath(os.path.join(os.path.dirname(__file__), '..', '..'))
+
+from benchmarking import sets, tables  # noqa: E402
+from benchmarking.methods import ABLATIONS, METHODS, run_method  # noqa: E402
+
+# Sets beyond this size are run with AdaSfM alone unless --methods says more.
+LARGEST_SET_OF_PEERS = 4000
+
+
+def parse_arguments():
+  parser = argparse.ArgumentParser(description=__doc__.split('\n')[0])
+  parser.add_argument('sets', nargs='*', default=['quick'],
+                      help='quick, full, or any of: %s; default: quick' %
+                      ', '.join(sets.REAL_SETS +
+                                [kind + '-IMAGES' for kind in sets.KINDS]))
+  parser.add_argument('--output_path', default='adasfm-benchmark',
+                      help='folder of databases, models and tables')
+  parser.add_argument('--data_path', default=os.path.join(ROOT, '..', 'shared',
+                                                          'data'),
+                      help='folder of the real sets')
+  parser.add_argument('--methods', default='',
+                      help='comma-separated, any of: %s; default: %s' %
+                      (', '.join(METHODS + list(ABLATIONS)),
+                       ','.join(METHODS)))
+  parser.add_argument('--repeats', type=int, default=1,
+                      help='runs of each method, alternating')
+  parser.add_argument('--timeout', type=float, default=3600,
+                      help='a command that takes longer is stopped [s]')
+  parser.add_argument('--peer', action='append', default=[],
+                      metavar='NAME=PATH:COMMAND',
+                      help='another colmap executable and its mapping command')
+  parser.add_argument('--colmap', default=os.path.join(ROOT, 'build', 'bin',
+                                                       'colmap'),
+                      help='our launcher')
+  parser.add_argument('--host_colmap', default='',
+                      help="the host's executable; default: through ours")
+  parser.add_argument('--max_num_images', type=int, default=0,
+                      help='worlds have no more than so many images (100 or '
+                      'more, as blackouts have a size), and real sets are '
+                      'left out: to see soon whether it all runs; 0: as named')
+  parser.add_argument('--seed', type=int, default=1, help='of the worlds')
+  args = parser.parse_args()
+  args.peers = {}
+  for peer in args.peer:
+    match = re.fullmatch(r'([^=]+)=(.+):([^:]+)', peer)
+    if not match:
+      parser.error('--peer takes NAME=PATH:COMMAND, not ' + peer)
+    args.peers[match.group(1)] = (match.group(2), match.group(3))
+  args.sets = expand_sets(args, parser)
+  for method in args.methods.split(',') if args.methods else []:
+    if method not in METHODS and method not in ABLATIONS:
+      parser.error('no such method: %s' % method)
+  return args
+
+
+def expand_sets(args, parser):
+  names = []
+  for name in args.sets:
+    if name in ('quick', 'full'):
+      names += sets.QUICK if name == 'quick' else sets.FULL
+      names += [s for s in sets.REAL_SETS
+                if (name == 'full' or s == 'world-alias-300') and
+                os.path.isdir(os.path.join(args.data_path, s))]
+    elif sets.is_world(name) or os.path.isdir(
+        os.path.join(args.data_path, name)):
+      names.append(name)
+    else:
+      parser.error('no such set: %s' % name)
+  if args.max_num_images:
+    names = [sets.shrink(name, args.max_num_images) for name in names
+             if sets.is_world(name)]
+  return list(dict.fromkeys(names))
+
+
+def methods_of(name, args):
+  if args.methods:
+    return args.methods.split(',') + list(args.peers)
+  if sets.is_world(name) and sets.size_of(name) > LARGEST_SET_OF_PEERS:
+    return ['adasfm']
+  return METHODS + list(args.peers)
+
+
+def describe_machine():
+  commit = subprocess.run(['git', '-C', ROOT, 'describe', '--always',
+                           '--dirty'], capture_output=True, text=True)
+  return {'commit': commit.stdout.strip(), 'cores': os.cpu_count(),
+          'machine': platform.machine(),
+          'load': round(os.getloadavg()[0], 1)}
+
+
+def read_records(path):
+  with open(path) as file:
+    return [json.loads(line) for line in file]
+
+
+def write_tables(records, folder):
+  present = tables.ordered(records, 'method')
+  wide = [m for m in ('mapper', 'hierarchical_mapper', 'adasfm_global',
+                      'adasfm') if m in present]
+  text = ''.join((
+      '# All runs\n\n', tables.long_table(records),
+      "\n# Structure (the form of the paper's Table 2)\n\n",
+      tables.reconstruction_table(records, wide),
+      "\n# Accuracy (the form of the paper's Table 3)\n\n",
+      tables.accuracy_table(records, wide)))
+  growth = tables.growth_table(records)
+  if growth:
+    text += '\n# Growth on the clean sets\n\n' + growth
+  ablations = tables.ablation_table(records)
+  if ablations:
+    text += '\n# Ablations: images, error after Sim3, CPU time\n\n' + ablations
+  with open(os.path.join(folder, 'results.md'), 'w') as file:
+    file.write(text)
+  try:
+    from benchmarking.plots import write_plots
+    write_plots(records, folder)
+  except ImportError:
+    print('no plots: matplotlib is missing (scripts/setup.sh installs it)',
+          file=sys.stderr)
+
+
+def main():
+  args = parse_arguments()
+  os.makedirs(args.output_path, exist_ok=True)
+  results_path = os.path.join(args.output_path, 'results.jsonl')
+  for name in args.sets:
+    folder = os.path.join(args.output_path, name)
+    os.makedirs(folder, exist_ok=True)
+    source = sets.make_database(name, folder, args)
+    for _ in range(args.repeats):
+      for method in methods_of(name, args):
+        print('%s: %s' % (name, method), file=sys.stderr, flush=True)
+        machine = describe_machine()
+        records = run_method(name, method, os.path.join(folder, method),
+                             source, args)
+        with open(results_path, 'a') as file:
+          for record in records:
+            file.write(json.dumps(dict(record, **machine)) + '\n')
+  records = read_records(results_path)
+  write_tables(records, args.output_path)
+  print(tables.long_table(records))
+
+
+if __name__ == '__main__':
+  main()

@@ -1,0 +1,20 @@
+#!/usr/bin/env bash
+# SPDX-License-Identifier: BSD-3-Clause
+# Fails when a source file is not as clang-format writes it, or lacks its
+# licence line. With --fix the format is mended.
+set -euo pipefail
+cd "$(dirname "${BASH_SOURCE[0]}")/../.."
+
+mapfile -t files < <(git ls-files '*.h' '*.cc')
+if [ "${1:-}" = --fix ]; then
+  clang-format -i "${files[@]}"
+  exit
+fi
+clang-format --dry-run --Werror "${files[@]}"
+missing=$(grep -L 'SPDX-License-Identifier: BSD-3-Clause' \
+  "${files[@]}" $(git ls-files '*.sh' '*.py' '*.cmake' '*CMakeLists.txt') || true)
+if [ -n "$missing" ]; then
+  printf 'no SPDX line: %s\n' $missing >&2
+  exit 1
+fi
+echo 'format: ok'

@@ -1,0 +1,137 @@
+#!/usr/bin/env bash
+# SPDX-License-Identifier: BSD-3-Clause
+# Fails when a room (a folder of sources) includes what it may not know, or when
+# a file outside colmap_ext/host/ includes a COLMAP header and is not in the
+# list of those that still do.
+#
+# The table below is the architecture: a room, and the rooms whose headers it
+# may include besides its own. A room with a trailing /... stands for all rooms of
+# that layer. A room stands below those that it may include, so the order of the
+# table is a proof that there is no cycle.
+set -euo pipefail
+cd "$(dirname "${BASH_SOURCE[0]}")/../.."
+
+rooms='
+core
+synthetic                      core
+partition                      core
+
+sensors/io                     core
+sensors/preintegration         core sensors/io
+sensors/smoother               core sensors/io sensors/preintegration
+sensors/calibration_check      core sensors/io
+sensors                        core sensors/...
+
+global/view_graph              core
+global/two_view                core global/view_graph
+global/odometry                core global/view_graph
+global/rotation_averaging      core global/view_graph
+global/structure               core global/view_graph
+global/calibration             core global/view_graph global/two_view global/odometry
+global/loop_closures           core global/view_graph global/odometry
+global/translation_averaging   core global/view_graph global/odometry
+global                         core global/...
+
+colmap_ext/io                  core
+colmap_ext/host                core colmap_ext/io
+colmap_ext/database            core colmap_ext/io colmap_ext/host global/calibration
+colmap_ext/bundle_adjustment   core colmap_ext/host
+colmap_ext/scene               core colmap_ext/io colmap_ext/host colmap_ext/database global/view_graph
+colmap_ext/priors              core colmap_ext/host colmap_ext/database colmap_ext/scene sensors sensors/... global/two_view
+colmap_ext/coarse              core colmap_ext/host colmap_ext/bundle_adjustment colmap_ext/scene global global/...
+colmap_ext/mapper              core colmap_ext/host colmap_ext/bundle_adjustment colmap_ext/scene partition
+colmap_ext/pairs               core colmap_ext/host colmap_ext/database colmap_ext/scene sensors/io
+colmap_ext/evaluation          core colmap_ext/host colmap_ext/scene sensors/io
+colmap_ext/datasets            core synthetic
+colmap_ext/mapper_stage        core colmap_ext/host colmap_ext/scene colmap_ext/mapper partition
+colmap_ext/report              core colmap_ext/io colmap_ext/host colmap_ext/database colmap_ext/evaluation
+colmap_ext                     core colmap_ext/io colmap_ext/host colmap_ext/database colmap_ext/priors colmap_ext/coarse colmap_ext/mapper_stage
+colmap_ext/workspace           core colmap_ext colmap_ext/io colmap_ext/host colmap_ext/coarse colmap_ext/pairs colmap_ext/datasets colmap_ext/report
+colmap_ext/commands            core synthetic sensors sensors/... global global/... partition colmap_ext colmap_ext/...
+'
+
+# Files outside colmap_ext/host/ with COLMAP headers. This list only shrinks.
+host_allowed='
+colmap_ext/bundle_adjustment/balance_priors.h
+colmap_ext/bundle_adjustment/bundle_adjustment.h
+colmap_ext/bundle_adjustment/create_reprojection_cost.cc
+colmap_ext/bundle_adjustment/create_reprojection_cost.h
+colmap_ext/bundle_adjustment/find_focal_length_error.h
+colmap_ext/coarse/coarse_structure.h
+colmap_ext/datasets/write_synthetic_world.cc
+colmap_ext/datasets/write_synthetic_world.h
+colmap_ext/evaluation/evaluation.cc
+colmap_ext/evaluation/evaluation.h
+colmap_ext/mapper/align_parts.h
+colmap_ext/mapper/local_mapper.h
+colmap_ext/mapper/local_mapper_scene.h
+colmap_ext/mapper/part_adjuster.h
+colmap_ext/mapper_stage/model_checkpoint.h
+colmap_ext/mapper_stage/part_checkpoint.h
+colmap_ext/report/report_input.h
+colmap_ext/report/report_scene.h
+colmap_ext/scene/align_to_gravity.h
+colmap_ext/scene/scene_bearings.h
+colmap_ext/scene/scene_data.h
+colmap_ext/scene/two_view_poses.cc
+'
+
+# COLMAP 3.8's unprefixed include folders, and the prefix of newer versions.
+host='(base|controllers|estimators|exe|feature|mvs|optim|retrieval|sfm|tools|ui|util|colmap)/'
+failed=0
+
+# fail MESSAGE LINES: reports the lines, if there are any.
+fail() {
+  [ -n "$2" ] || return 0
+  printf '%s\n%s\n' "$1" "$2" >&2
+  failed=1
+}
+
+# The includes of the sources right in a folder: FILE:"HEADER.
+includes() {
+  grep -HoE '^[[:space:]]*#[[:space:]]*include[[:space:]]*[<"][^>"]+' \
+    "$1"/*.h "$1"/*.cc 2> /dev/null | sed -E 's/:[^<"]*[<"]/:/' || true
+}
+
+known=
+while read -r room allowed; do
+  [ -n "$room" ] || continue
+  pattern="^$room/[^/]+$"
+  for other in $allowed; do
+    case $other in
+      */...) grep -q "^${other%...}" <<< "$known" ||
+        fail "$room: $other names no room above it in the table" "$other" ;;
+      *) grep -qx "$other" <<< "$known" ||
+        fail "$room: $other is not above it in the table" "$other" ;;
+    esac
+    case $other in
+      */...) pattern+="|^${other%/...}/[^/]+/[^/]+$" ;;
+      *) pattern+="|^$other/[^/]+$" ;;
+    esac
+  done
+  known+=$room$'\n'
+  own=$(includes "$room" |
+    grep -E ':(core|sensors|global|partition|synthetic|colmap_ext|tests)/' |
+    awk -F: -v pattern="$pattern" '$2 !~ pattern' || true)
+  fail "$room may not include (scripts/checks/check_layers.sh):" "$own"
+  case $room in
+    colmap_ext/host*) ;;
+    *)
+      fail "$room: COLMAP headers belong below colmap_ext/host/" \
+        "$(includes "$room" | grep -E ":$host" | cut -d: -f1 | sort -u |
+          grep -vxF "$host_allowed" || true)"
+      ;;
+  esac
+done <<< "$rooms"
+
+fail 'sources in folders that the table does not name' \
+  "$(git ls-files 'core/*' 'sensors/*' 'global/*' 'partition/*' 'synthetic/*' \
+    'colmap_ext/*' | grep -E '\.(h|cc)$' | xargs -n1 dirname | sort -u |
+    grep -vxF "$known" || true)"
+for file in $host_allowed; do
+  grep -qE "^#include <$host" "$file" 2> /dev/null ||
+    fail 'needs no permission for COLMAP headers any more' "$file"
+done
+
+[ "$failed" = 0 ] && echo 'layers: ok'
+exit "$failed"

@@ -1,0 +1,217 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "sensors/calibration_check/check_against_vision.h"
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+
+#include "sensors/calibration_check/calibration_mistakes.h"
+#include "sensors/calibration_check/rotation_comparison.h"
+#include "sensors/calibration_check/shift_search.h"
+#include "sensors/io/format_figures.h"
+
+namespace adasfm {
+namespace {
+
+// Another explanation must fit this much better than the calibration, and one
+// listed later this much better than one listed earlier.
+constexpr double kClearlyBetter = 0.7;
+constexpr double kTie = 0.9;
+// A refusal needs evidence. The best of some 10,000 wrong explanations (50 at
+// 200 shifts) is by chance e^9 times likelier than the right one; twice that.
+constexpr double kMinEvidence = 20.0;
+
+std::string Figures(const VisionCheck& check) {
+  return FormatFigures(
+      " (correlation of gyroscope and vision %.2f as calibrated, %.2f then)",
+      check.total_correlation, check.shifted_correlation);
+}
+
+class VisionComparer {
+ public:
+  VisionComparer(const std::vector<TimedRotation>& rotations,
+                 const std::vector<ImuSample>& imu,
+                 const SensorCalibration& calibration,
+                 const VisionCheckOptions& options)
+      : search_(rotations, imu, calibration.timeshift_cam_imu_s, options),
+        cam_from_imu_(calibration.cam_from_imu.rotation.toRotationMatrix()),
+        timeshift_s_(calibration.timeshift_cam_imu_s),
+        options_(options) {}
+
+  // Numbered steps; see there.
+  VisionCheck Run();
+
+ private:
+  bool FindBestShifts();
+  void CompareAsIs(VisionCheck* check);
+  // Whether there is one.
+  bool NameMistake(VisionCheck* check) const;
+  bool IsWorseThanNone() const;
+  void CheckTimeShift(VisionCheck* check) const;
+  GyroscopeFilter FindFilter();
+  // The first of the best explanations that beat the calibrated one.
+  const Explanation* FindBetter() const;
+  const Explanation& calibrated() const { return explanations_[0]; }
+
+  ShiftSearch search_;
+  Eigen::Matrix3d cam_from_imu_;
+  double timeshift_s_;
+  VisionCheckOptions options_;
+  // Each at its best time shift; the first one is the calibrated one.
+  std::vector<Explanation> explanations_;
+  double turning_deg_ = 0.0;
+  // The calibrated one, without a shift where the log covers that.
+  Explanation as_is_;
+  bool has_unshifted_ = false;
+};
+
+bool VisionComparer::FindBestShifts() {
+  const size_t min_num = options_.min_num_rotations;
+  if (search_.num_rotations() < min_num) return false;
+  for (const CalibrationMistake& mistake :
+       ListCalibrationMistakes(cam_from_imu_)) {
+    Explanation explanation;
+    explanation.mistake = mistake;
+    explanations_.push_back(explanation);
+  }
+  search_.SearchShifts(&explanations_);
+  if (!std::isfinite(calibrated().fit.cost)) return false;
+  search_.RefineShift(&explanations_[0]);
+  turning_deg_ = ComputeTurningDeg(search_.Compare(calibrated().shift_s));
+  return turning_deg_ >= options_.min_rotation_rms_deg;
+}
+
+void VisionComparer::CompareAsIs(VisionCheck* check) {
+  check->is_conclusive = true;
+  as_is_ = calibrated();
+  const RotationComparison unshifted = search_.Compare(0.0);
+  has_unshifted_ = unshifted.visual.size() >=
+                   static_cast<size_t>(options_.min_num_rotations);
+  if (has_unshifted_) {
+    as_is_.shift_s = 0.0;
+    as_is_.fit = ComputeRotationFit(unshifted, cam_from_imu_);
+    check->total_correlation = ComputeRotationCorrelation(
+        unshifted, cam_from_imu_, &check->correlation);
+  }
+  // The offset is that of the cameras' rotation, which turns against the body.
+  check->gyroscope_bias =
+      cam_from_imu_.transpose() * calibrated().fit.rate_offset;
+}
+
+const Explanation* VisionComparer::FindBetter() const {
+  const Explanation* best = &calibrated();
+  for (size_t i = 1; i < explanations_.size(); ++i) {
+    const Explanation& other = explanations_[i];
+    const double bar = best == &calibrated() ? kClearlyBetter : kTie;
+    if (other.fit.cost >= bar * best->fit.cost) continue;
+    if (search_.Evidence(calibrated(), other) < kMinEvidence) continue;
+    best = &other;
+  }
+  return best;
+}
+
+bool VisionComparer::NameMistake(VisionCheck* check) const {
+  const Explanation* best = FindBetter();
+  check->shifted_correlation = ComputeRotationCorrelation(
+      search_.Compare(best->shift_s), best->mistake.map, nullptr);
+  if (best != &calibrated() &&
+      check->shifted_correlation >= options_.min_correlation) {
+    check->best_axes = best->mistake.axes;
+    check->is_inverted = best->mistake.kind == CalibrationMistake::kInverted;
+    check->contradiction = DescribeMistake(best->mistake) + Figures(*check);
+    return true;
+  }
+  check->shifted_correlation = ComputeRotationCorrelation(
+      search_.Compare(calibrated().shift_s), cam_from_imu_, nullptr);
+  return false;
+}
+
+bool VisionComparer::IsWorseThanNone() const {
+  Explanation none = as_is_;
+  none.mistake.map.setZero();
+  none.fit =
+      ComputeRotationFit(search_.Compare(as_is_.shift_s), none.mistake.map);
+  return turning_deg_ >= options_.min_contradicting_rms_deg &&
+         search_.Evidence(as_is_, none) >= kMinEvidence;
+}
+
+void VisionComparer::CheckTimeShift(VisionCheck* check) const {
+  check->time_shift_correction_s = calibrated().shift_s;
+  const bool is_better = calibrated().fit.cost < kTie * as_is_.fit.cost &&
+                         search_.Evidence(as_is_, calibrated()) >= kMinEvidence;
+  if (std::abs(calibrated().shift_s) > options_.max_accepted_shift_s &&
+      (is_better || !has_unshifted_)) {
+    check->contradiction =
+        FormatFigures(
+            "images and IMU differ by %+.4f s more than timeshift_cam_imu "
+            "says: set it to %.4f or let it be estimated",
+            calibrated().shift_s, timeshift_s_ + calibrated().shift_s) +
+        Figures(*check);
+    check->contradiction_is_time_shift = true;
+  }
+}
+
+GyroscopeFilter VisionComparer::FindFilter() {
+  Explanation filtered = calibrated();
+  search_.RefineLag(&filtered);
+  GyroscopeFilter filter;
+  if (search_.Evidence(calibrated(), filtered) < kMinEvidence) return filter;
+  // The best shift without the lag depends on the interval then; priors are
+  // made from frame to frame.
+  search_.RefineShiftOfOneFrame(&explanations_[0]);
+  filter.lag_s = filtered.lag_s;
+  filter.delay_s = filtered.shift_s - calibrated().shift_s;
+  return filter;
+}
+
+VisionCheck VisionComparer::Run() {
+  VisionCheck check;
+  // 1. Every explanation at its best time shift.
+  if (!FindBestShifts()) return check;
+  // 2. How well the calibration fits as it is.
+  CompareAsIs(&check);
+  // 3. A mistake that explains vision better.
+  if (NameMistake(&check)) return check;
+  if (check.shifted_correlation < options_.min_correlation) {
+    if (check.total_correlation >= options_.min_correlation) return check;
+    // 4. Nothing fits: is the gyroscope worse than none?
+    if (!IsWorseThanNone()) return VisionCheck();
+    check.contradiction =
+        "vision and gyroscope contradict each other: check T_cam_imu, the "
+        "clocks and whether log and images belong together" +
+        Figures(check);
+    return check;
+  }
+  // 5. What no time shift explains.
+  check.filter = FindFilter();
+  // 6. The time shift.
+  CheckTimeShift(&check);
+  return check;
+}
+
+}  // namespace
+
+bool VisionCheckOptions::IsValid(std::string* error) const {
+  if (max_time_shift_s > 0.0 && min_rotation_rms_deg > 0.0 &&
+      min_contradicting_rms_deg > 0.0 && min_num_rotations > 1 &&
+      min_correlation > 0.0 && min_correlation < 1.0 &&
+      max_accepted_shift_s > 0.0) {
+    return true;
+  }
+  *error =
+      "AdaSfmVisionCheck: every option must be positive and "
+      "min_correlation below 1";
+  return false;
+}
+
+VisionCheck CheckAgainstVision(const std::vector<TimedRotation>& rotations,
+                               const std::vector<ImuSample>& imu,
+                               const SensorCalibration& calibration,
+                               const VisionCheckOptions& options) {
+  std::string error;
+  if (!options.IsValid(&error)) throw std::invalid_argument(error);
+  if (imu.size() < 2) return VisionCheck();
+  return VisionComparer(rotations, imu, calibration, options).Run();
+}
+
+}  // namespace adasfm

@@ -1,0 +1,73 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <Eigen/Core>
+#include <string>
+#include <vector>
+
+#include "core/sensor_log.h"
+#include "core/status.h"
+#include "core/types.h"
+#include "sensors/calibration_check/gyroscope_filter.h"
+#include "sensors/io/calibration.h"
+
+namespace adasfm {
+
+// A rotation seen by the cameras between two times of the camera's clock.
+struct TimedRotation {
+  timestamp_t start_ns = 0;
+  timestamp_t end_ns = 0;
+  Eigen::Quaterniond cam2_from_cam1 = Eigen::Quaterniond::Identity();
+  double weight = 1.0;
+};
+
+struct VisionCheckOptions {
+  // Time shifts tried about the calibration's.
+  double max_time_shift_s = 2.0;
+  // Below this the cameras hardly turn and nothing can be said.
+  double min_rotation_rms_deg = 0.15;
+  // Cameras that turn this much and fit the gyroscope in no way contradict it;
+  // below it may be the noise of two-view geometries.
+  double min_contradicting_rms_deg = 1.0;
+  int min_num_rotations = 10;
+  // Correlation from which axes count as agreeing, and below which, when
+  // other axes agree, the calibration is refused.
+  double min_correlation = 0.8;
+  // A shift beyond this is refused unless it is to be estimated.
+  double max_accepted_shift_s = 0.03;
+
+  bool IsValid(std::string* error) const;
+};
+
+struct VisionCheck {
+  // False: too little turning to say anything; nothing else is set.
+  bool is_conclusive = false;
+  // Of rotation vectors, in the camera frame, as calibrated.
+  Eigen::Vector3d correlation = Eigen::Vector3d::Zero();
+  double total_correlation = 0.0;
+  // To be added to timeshift_cam_imu_s; sub-frame.
+  double time_shift_correction_s = 0.0;
+  double shifted_correlation = 0.0;
+  // The axes that fit best: cam_from_imu as a signed permutation of the
+  // calibrated one; identity when the calibration is right.
+  Eigen::Matrix3d best_axes = Eigen::Matrix3d::Identity();
+  bool is_inverted = false;  // imu_from_cam in place of cam_from_imu
+  Eigen::Vector3d gyroscope_bias = Eigen::Vector3d::Zero();
+  // On the IMU's clock as shifted by the correction above; without a lag unless
+  // vision is clearly better explained with one.
+  GyroscopeFilter filter;
+  // The only mistake is the time shift.
+  bool contradiction_is_time_shift = false;
+  // Empty when vision and gyroscope agree; else one line that names the
+  // mistake and what to do.
+  std::string contradiction;
+};
+
+// Hand-eye check: the gyroscope's rotations, moved into the camera frame,
+// against the cameras' own.
+VisionCheck CheckAgainstVision(const std::vector<TimedRotation>& rotations,
+                               const std::vector<ImuSample>& imu,
+                               const SensorCalibration& calibration,
+                               const VisionCheckOptions& options);
+
+}  // namespace adasfm

@@ -1,0 +1,197 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "sensors/io/calibration.h"
+
+#include <yaml-cpp/yaml.h>
+
+#include <Eigen/LU>
+#include <cctype>
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <map>
+#include <stdexcept>
+
+#include "sensors/io/log_file.h"
+
+namespace adasfm {
+namespace {
+
+// Calibrations are printed with a few digits only.
+constexpr double kRotationTolerance = 1e-2;
+
+// yaml-cpp quotes what it could not read, and scalars may span lines.
+std::string OneLine(std::string text) {
+  for (char& c : text) {
+    if (std::iscntrl(static_cast<unsigned char>(c))) c = ' ';
+  }
+  return text;
+}
+
+// Reads keys of one YAML file; what is wrong is thrown as one line and becomes
+// a Status in ReadSensorCalibration.
+class CalibrationReader {
+ public:
+  explicit CalibrationReader(const std::string& path) : path_(path) {}
+
+  [[noreturn]] void Fail(const std::string& key, const std::string& why) const {
+    throw std::runtime_error(path_ + ": " + key + " " + why);
+  }
+
+  // A finite number. Parsed by us: yaml-cpp's own follow the global locale.
+  double Number(const YAML::Node& section, const std::string& name) const {
+    const YAML::Node node = section[name];
+    if (!node) Fail(name, "is missing; add it (docs/reference/sensors.md)");
+    double value = 0.0;
+    if (!node.IsScalar() || !ParseDouble(node.Scalar(), &value)) {
+      Fail(name, "is not a number");
+    }
+    return value;
+  }
+
+  double NumberOr(const YAML::Node& section, const std::string& name,
+                  double fallback) const {
+    return section[name] ? Number(section, name) : fallback;
+  }
+
+  double Positive(const YAML::Node& section, const std::string& name) const {
+    const double value = Number(section, name);
+    if (value <= 0.0) Fail(name, "must be positive");
+    return value;
+  }
+
+  Rigid3d Transform(const YAML::Node& section, const std::string& name) const {
+    const YAML::Node node = section[name];
+    if (!node)
+      Fail(name, "is missing; add the 4x4 matrix (docs/reference/sensors.md)");
+    Eigen::Matrix4d matrix;
+    if (!node.IsSequence() || node.size() != 4) Fail(name, "is not 4x4");
+    for (int row = 0; row < 4; ++row) {
+      if (!node[row].IsSequence() || node[row].size() != 4) {
+        Fail(name, "is not 4x4: row " + std::to_string(row + 1) +
+                       " does not have 4 numbers");
+      }
+      for (int column = 0; column < 4; ++column) {
+        const YAML::Node entry = node[row][column];
+        if (!entry.IsScalar() ||
+            !ParseDouble(entry.Scalar(), &matrix(row, column))) {
+          Fail(name, "holds something that is not a number");
+        }
+      }
+    }
+    return CheckTransform(name, matrix);
+  }
+
+ private:
+  Rigid3d CheckTransform(const std::string& name,
+                         const Eigen::Matrix4d& matrix) const {
+    const Eigen::Matrix3d rotation = matrix.topLeftCorner<3, 3>();
+    const double error =
+        (rotation * rotation.transpose() - Eigen::Matrix3d::Identity()).norm();
+    if (error > kRotationTolerance) {
+      Fail(name,
+           "is not a rotation in its upper left 3x3 (rows are not unit and "
+           "orthogonal); copy all digits, row by row");
+    }
+    if (rotation.determinant() < 0.0) {
+      Fail(name,
+           "mirrors (determinant -1): two axes are swapped or one sign "
+           "is wrong");
+    }
+    const Eigen::RowVector4d last_row(0.0, 0.0, 0.0, 1.0);
+    if ((matrix.row(3) - last_row).norm() > 1e-6) {
+      Fail(name, "does not end in the row [0, 0, 0, 1]");
+    }
+    return Rigid3d(rotation, matrix.topRightCorner<3, 1>());
+  }
+
+  std::string path_;
+};
+
+void ReadImuSection(const CalibrationReader& reader, const YAML::Node& imu,
+                    SensorCalibration* calibration) {
+  calibration->has_imu = true;
+  calibration->imu_rate_hz = reader.Positive(imu, "update_rate");
+  ImuNoise& noise = calibration->imu_noise;
+  noise.gyroscope_noise_density =
+      reader.Positive(imu, "gyroscope_noise_density");
+  noise.gyroscope_random_walk = reader.Positive(imu, "gyroscope_random_walk");
+  noise.accelerometer_noise_density =
+      reader.Positive(imu, "accelerometer_noise_density");
+  noise.accelerometer_random_walk =
+      reader.Positive(imu, "accelerometer_random_walk");
+}
+
+void ReadWheelSection(const CalibrationReader& reader, const YAML::Node& wheel,
+                      SensorCalibration* calibration) {
+  static const std::map<std::string, WheelType> kTypes = {
+      {"differential", WheelType::kDifferential},
+      {"velocity", WheelType::kVelocity},
+      {"speed", WheelType::kSpeed},
+      {"ticks", WheelType::kTicks},
+      {"odometry", WheelType::kOdometry}};
+  calibration->has_wheel = true;
+  if (!wheel["type"] || !wheel["type"].IsScalar()) {
+    reader.Fail("wheel0/type", "is missing; add the kind of wheel log");
+  }
+  const auto type = kTypes.find(wheel["type"].Scalar());
+  if (type == kTypes.end()) {
+    reader.Fail("wheel0/type",
+                "is '" + wheel["type"].Scalar() +
+                    "'; differential, velocity, speed, ticks or odometry are "
+                    "known");
+  }
+  calibration->wheel_type = type->second;
+  if (type->second == WheelType::kDifferential ||
+      type->second == WheelType::kTicks) {
+    calibration->track_width_m = reader.Positive(wheel, "track_width");
+  }
+  if (type->second == WheelType::kTicks) {
+    calibration->metres_per_tick = reader.Positive(wheel, "metres_per_tick");
+  }
+  calibration->wheel_speed_noise = reader.Positive(wheel, "speed_noise");
+  calibration->wheel_yaw_rate_noise = reader.NumberOr(
+      wheel, "yaw_rate_noise", calibration->wheel_yaw_rate_noise);
+  if (calibration->wheel_yaw_rate_noise <= 0.0) {
+    reader.Fail("yaw_rate_noise", "must be positive");
+  }
+  calibration->imu_from_wheel = reader.Transform(wheel, "T_imu_wheel");
+}
+
+}  // namespace
+
+StatusOr<SensorCalibration> ReadSensorCalibration(const std::string& path) {
+  std::error_code error;
+  if (!std::filesystem::is_regular_file(path, error)) {
+    return Status::Error(path + ": no such file; check the path");
+  }
+  try {
+    std::ifstream stream(path);
+    const YAML::Node root = YAML::Load(stream);
+    const CalibrationReader reader(path);
+    if (!root.IsMap()) reader.Fail("the file", "holds no YAML keys");
+    SensorCalibration calibration;
+    if (!root["cam0"] || !root["cam0"].IsMap()) {
+      reader.Fail("cam0",
+                  "is missing; add T_cam_imu (docs/reference/sensors.md)");
+    }
+    calibration.cam_from_imu = reader.Transform(root["cam0"], "T_cam_imu");
+    calibration.timeshift_cam_imu_s =
+        reader.NumberOr(root["cam0"], "timeshift_cam_imu", 0.0);
+    if (root["imu0"] && root["imu0"].IsMap()) {
+      ReadImuSection(reader, root["imu0"], &calibration);
+    }
+    if (root["wheel0"] && root["wheel0"].IsMap()) {
+      ReadWheelSection(reader, root["wheel0"], &calibration);
+    }
+    return calibration;
+  } catch (const YAML::Exception& exception) {
+    return Status::Error(path + ", line " +
+                         std::to_string(exception.mark.line + 1) +
+                         ": not readable as YAML (" + OneLine(exception.msg) +
+                         "); check indentation and brackets");
+  } catch (const std::runtime_error& exception) {
+    return Status::Error(OneLine(exception.what()));
+  }
+}
+
+}  // namespace adasfm

@@ -1,0 +1,61 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "sensors/io/read_imu.h"
+
+#include <filesystem>
+
+#include "sensors/io/log_checks.h"
+#include "sensors/io/log_file.h"
+#include "sensors/io/read_kitti_oxts.h"
+#include "sensors/io/read_rosbag.h"
+
+namespace adasfm {
+
+StatusOr<std::vector<ImuSample>> ReadImu(const std::string& path,
+                                         std::vector<std::string>* warnings) {
+  LogOrigin origin;
+  origin.path = path;
+  std::vector<ImuSample> samples;
+  std::vector<timestamp_t> times;
+  std::error_code error;
+  if (IsRosbagPath(path)) {
+    StatusOr<std::vector<ImuSample>> bag = ReadRosbagImu(path);
+    if (!bag.ok()) return bag.status();
+    samples = std::move(*bag);
+    origin = LogOrigin::Numbered(path, samples.size(), "message");
+  } else if (std::filesystem::is_directory(path, error)) {
+    StatusOr<std::vector<ImuSample>> oxts = ReadKittiOxts(path);
+    if (!oxts.ok()) return oxts.status();
+    samples = std::move(*oxts);
+    origin =
+        LogOrigin::Numbered(path + "/timestamps.txt", samples.size(), "line");
+  } else {
+    StatusOr<LogFile> file = LogFile::Read(path);
+    if (!file.ok()) return file.status();
+    for (size_t i = 0; i < file->num_lines(); ++i) {
+      const LogLine line = file->Line(i);
+      Status status =
+          CheckNumFields(*file, line, 7, "ns, wx, wy, wz, ax, ay, az");
+      if (!status.ok()) return status;
+      ImuSample sample;
+      if (!ParseNanoseconds(line.fields[0], &sample.timestamp_ns)) {
+        return file->Error(line.number,
+                           "column 1 is '" + std::string(line.fields[0]) +
+                               "', not a time in whole nanoseconds");
+      }
+      double values[6];
+      status = ParseNumbers(*file, line, 1, 6, values);
+      if (!status.ok()) return status;
+      sample.angular_velocity << values[0], values[1], values[2];
+      sample.specific_force << values[3], values[4], values[5];
+      samples.push_back(sample);
+      origin.line_numbers.push_back(line.number);
+    }
+  }
+  for (const ImuSample& sample : samples) times.push_back(sample.timestamp_ns);
+  Status status = CheckLogTimes(times, origin, warnings);
+  if (status.ok()) status = CheckImuUnits(samples, origin);
+  if (!status.ok()) return status;
+  return samples;
+}
+
+}  // namespace adasfm

@@ -1,0 +1,218 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "sensors/io/read_wheel.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "sensors/io/log_checks.h"
+#include "sensors/io/log_file.h"
+#include "sensors/io/read_rosbag.h"
+
+namespace adasfm {
+namespace {
+
+std::string TypeName(WheelType type) {
+  switch (type) {
+    case WheelType::kDifferential:
+      return "differential";
+    case WheelType::kVelocity:
+      return "velocity";
+    case WheelType::kSpeed:
+      return "speed";
+    case WheelType::kTicks:
+      return "ticks";
+    case WheelType::kOdometry:
+      return "odometry";
+  }
+  return "unknown";
+}
+
+// The name of a header's column without its unit: "v_left [m s^-1]" -> v_left.
+std::string ColumnName(std::string_view column) {
+  const size_t begin = column.find_first_not_of(" \t");
+  if (begin == std::string_view::npos) return "";
+  column.remove_prefix(begin);
+  return std::string(column.substr(0, column.find_first_of(" \t[\r")));
+}
+
+std::vector<std::string> ColumnNames(std::string_view header) {
+  std::vector<std::string> names;
+  while (true) {
+    const size_t end = header.find(',');
+    names.push_back(ColumnName(header.substr(0, end)));
+    if (end == std::string_view::npos) return names;
+    header.remove_prefix(end + 1);
+  }
+}
+
+StatusOr<WheelType> FindType(const LogFile& file) {
+  const std::vector<std::string> names = ColumnNames(file.header());
+  if (names.size() == 3) {
+    if (names[1] == "v_left" && names[2] == "v_right") {
+      return WheelType::kDifferential;
+    }
+    if (names[1] == "v" && names[2] == "omega") return WheelType::kVelocity;
+    if (names[1] == "ticks_left" && names[2] == "ticks_right") {
+      return WheelType::kTicks;
+    }
+  }
+  if (names.size() == 2 && names[1] == "v") return WheelType::kSpeed;
+  if (!file.has_commas() && file.Line(0).fields.size() == 8) {
+    return WheelType::kOdometry;
+  }
+  return Status::Error(
+      file.path() + ", line 1: the header '" + file.header().substr(0, 80) +
+      "' is none of '#timestamp [ns],v_left [m s^-1],v_right [m s^-1]', "
+      "'...,v [m s^-1],omega [rad s^-1]', '...,v [m s^-1]', "
+      "'...,ticks_left,ticks_right'; nor is the file a TUM trajectory");
+}
+
+// Faster than any machine with photos to match: km/h or mm/s were logged.
+constexpr double kMaxSpeed = 120.0;
+constexpr double kMaxYawRate = 20.0;
+
+Status CheckSpeeds(const std::vector<WheelSample>& samples, WheelType type,
+                   const LogOrigin& origin) {
+  if (type == WheelType::kTicks) return Status::Ok();
+  const bool has_two_speeds = type == WheelType::kDifferential;
+  for (size_t i = 0; i < samples.size(); ++i) {
+    const WheelSample& sample = samples[i];
+    const double speed = std::max(
+        std::abs(sample.first), has_two_speeds ? std::abs(sample.second) : 0.0);
+    if (speed > kMaxSpeed) {
+      return Status::Error(origin.Locate(i) + ": a speed of " +
+                           std::to_string(speed) +
+                           " m/s; the log seems to be in km/h or mm/s (m/s "
+                           "are expected)");
+    }
+    if (type == WheelType::kVelocity && std::abs(sample.second) > kMaxYawRate) {
+      return Status::Error(origin.Locate(i) + ": a yaw rate of " +
+                           std::to_string(sample.second) +
+                           " rad/s; the log seems to be in deg/s (rad/s are "
+                           "expected)");
+    }
+  }
+  return Status::Ok();
+}
+
+// 4Seasons' times are whole nanoseconds, TUM's are decimal seconds.
+bool ParseTumTime(std::string_view field, timestamp_t* timestamp_ns) {
+  if (field.size() >= 15 && field.find('.') == std::string_view::npos) {
+    return ParseNanoseconds(field, timestamp_ns);
+  }
+  return ParseSeconds(field, timestamp_ns);
+}
+
+Status ParsePose(const LogFile& file, const LogLine& line, OdometryPose* pose) {
+  Status status =
+      CheckNumFields(file, line, 8, "t, tx, ty, tz, qx, qy, qz, qw");
+  if (!status.ok()) return status;
+  if (!ParseTumTime(line.fields[0], &pose->timestamp_ns)) {
+    return file.Error(line.number, "column 1 is '" +
+                                       std::string(line.fields[0]) +
+                                       "', not a time in seconds");
+  }
+  double values[7];
+  status = ParseNumbers(file, line, 1, 7, values);
+  if (!status.ok()) return status;
+  const Eigen::Quaterniond rotation(values[6], values[3], values[4], values[5]);
+  if (std::abs(rotation.norm() - 1.0) > 0.01) {
+    return file.Error(line.number, "columns 5 to 8 are no unit quaternion");
+  }
+  pose->world_from_body =
+      Rigid3d(rotation, Eigen::Vector3d(values[0], values[1], values[2]));
+  return Status::Ok();
+}
+
+StatusOr<std::vector<OdometryPose>> CheckPoseTimes(
+    std::vector<OdometryPose> poses, const LogOrigin& origin,
+    std::vector<std::string>* warnings) {
+  std::vector<timestamp_t> times;
+  for (const OdometryPose& pose : poses) times.push_back(pose.timestamp_ns);
+  const Status status = CheckLogTimes(times, origin, warnings);
+  if (!status.ok()) return status;
+  return poses;
+}
+
+}  // namespace
+
+StatusOr<WheelType> ReadWheelType(const std::string& path) {
+  if (IsRosbagPath(path)) return WheelType::kOdometry;
+  const StatusOr<LogFile> file = LogFile::Read(path);
+  if (!file.ok()) return file.status();
+  return FindType(*file);
+}
+
+StatusOr<std::vector<WheelSample>> ReadWheel(
+    const std::string& path, WheelType expected_type,
+    std::vector<std::string>* warnings) {
+  if (IsRosbagPath(path)) {
+    return Status::Error(path + ": a ROS bag holds nav_msgs/Odometry; set " +
+                         "wheel0/type to odometry in the calibration");
+  }
+  const StatusOr<LogFile> file = LogFile::Read(path);
+  if (!file.ok()) return file.status();
+  const StatusOr<WheelType> type = FindType(*file);
+  if (!type.ok()) return type.status();
+  if (*type != expected_type || *type == WheelType::kOdometry) {
+    return Status::Error(path + ", line 1: the log is of type " +
+                         TypeName(*type) + " where the calibration says " +
+                         TypeName(expected_type) +
+                         "; set wheel0/type in the calibration");
+  }
+  const bool is_speed = *type == WheelType::kSpeed;
+  LogOrigin origin;
+  origin.path = path;
+  std::vector<WheelSample> samples;
+  std::vector<timestamp_t> times;
+  for (size_t i = 0; i < file->num_lines(); ++i) {
+    const LogLine line = file->Line(i);
+    Status status =
+        CheckNumFields(*file, line, is_speed ? 2 : 3, "as its header says");
+    if (!status.ok()) return status;
+    WheelSample sample;
+    if (!ParseNanoseconds(line.fields[0], &sample.timestamp_ns)) {
+      return file->Error(line.number, "column 1 is '" +
+                                          std::string(line.fields[0]) +
+                                          "', not a time in whole nanoseconds");
+    }
+    double values[2] = {0.0, 0.0};
+    status = ParseNumbers(*file, line, 1, is_speed ? 1 : 2, values);
+    if (!status.ok()) return status;
+    sample.first = values[0];
+    sample.second = values[1];
+    samples.push_back(sample);
+    times.push_back(sample.timestamp_ns);
+    origin.line_numbers.push_back(line.number);
+  }
+  Status status = CheckLogTimes(times, origin, warnings);
+  if (status.ok()) status = CheckSpeeds(samples, *type, origin);
+  if (!status.ok()) return status;
+  return samples;
+}
+
+StatusOr<std::vector<OdometryPose>> ReadOdometry(
+    const std::string& path, std::vector<std::string>* warnings) {
+  if (IsRosbagPath(path)) {
+    StatusOr<std::vector<OdometryPose>> bag = ReadRosbagOdometry(path);
+    if (!bag.ok()) return bag.status();
+    const LogOrigin origin = LogOrigin::Numbered(path, bag->size(), "message");
+    return CheckPoseTimes(std::move(*bag), origin, warnings);
+  }
+  const StatusOr<LogFile> file = LogFile::Read(path);
+  if (!file.ok()) return file.status();
+  LogOrigin origin;
+  origin.path = path;
+  std::vector<OdometryPose> poses;
+  for (size_t i = 0; i < file->num_lines(); ++i) {
+    const LogLine line = file->Line(i);
+    OdometryPose pose;
+    const Status status = ParsePose(*file, line, &pose);
+    if (!status.ok()) return status;
+    poses.push_back(pose);
+    origin.line_numbers.push_back(line.number);
+  }
+  return CheckPoseTimes(std::move(poses), origin, warnings);
+}
+
+}  // namespace adasfm

@@ -1,0 +1,28 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "core/sensor_log.h"
+#include "core/status.h"
+
+namespace adasfm {
+
+// What the log says it is: by its header line (docs/reference/sensors.md), or
+// kOdometry for eight columns separated by spaces.
+StatusOr<WheelType> ReadWheelType(const std::string& path);
+
+// Reads a log of every type but kOdometry. When expected_type is not what the
+// header says, that is an error. Errors and warnings as for ReadImu.
+StatusOr<std::vector<WheelSample>> ReadWheel(
+    const std::string& path, WheelType expected_type,
+    std::vector<std::string>* warnings = nullptr);
+
+// Reads a trajectory of lines "t tx ty tz qx qy qz qw", t in seconds (TUM) or
+// nanoseconds (4Seasons' result.txt), or a ROS 1 bag
+// (sensors/io/read_rosbag.h).
+StatusOr<std::vector<OdometryPose>> ReadOdometry(
+    const std::string& path, std::vector<std::string>* warnings = nullptr);
+
+}  // namespace adasfm

@@ -1,0 +1,60 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <Eigen/Core>
+
+#include "sensors/smoother/odometry_fusion.h"
+
+namespace adasfm {
+
+// The unknowns of one time, in the order of their 15 tangent coordinates.
+// Everything but the heading is local to the machine, so that a drift of
+// kilometres or turns never enters the equations (docs/reference/sensors.md).
+struct ChainState {
+  enum Offset {
+    kRotation = 0,
+    kVelocity = 3,
+    kGyro = 6,
+    kAccel = 9,
+    kStep = 12
+  };
+  static constexpr int kSize = 15;
+
+  OdometryState state;
+  // From the previous state's position to this one's, in the previous frame.
+  Eigen::Vector3d step_in_previous = Eigen::Vector3d::Zero();
+
+  // R <- Exp_z(d_z) Exp((d_x, d_y, 0)) R; the rest is added.
+  void Retract(const Eigen::Matrix<double, kSize, 1>& delta);
+};
+
+// The unknowns of all times.
+struct ChainGlobals {
+  enum Offset {
+    kLoggedLength = 0,
+    kLoggedYaw,
+    kCurvature,
+    kMountYaw,
+    kMountPitch,
+    kVisualTurn
+  };
+  static constexpr int kSize = 6;
+  using Vector = Eigen::Matrix<double, kSize, 1>;
+
+  // Logged length = first * true length, logged yaw = second * true yaw -
+  // third * distance; the forward direction is turned by the mount angles;
+  // two-view rotation vectors are the last times the true ones (a wrong focal
+  // length).
+  // Factors stand with what is estimated, not with what was logged: a factor
+  // of noisy readings would come out too small, the smaller the noise is then.
+  Vector values = (Vector() << 1.0, 1.0, 0.0, 0.0, 0.0, 1.0).finished();
+
+  static Vector PriorMeans() { return ChainGlobals().values; }
+  static Vector PriorSigmas(const OdometryFusionOptions& options);
+  // The direction of driving: unit vector in the body frame, and its derivative
+  // by (yaw, pitch).
+  Eigen::Vector3d Forward(const Eigen::Quaterniond& imu_from_wheel,
+                          Eigen::Matrix<double, 3, 2>* jacobian) const;
+};
+
+}  // namespace adasfm

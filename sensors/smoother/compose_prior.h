@@ -1,0 +1,17 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include "core/relative_pose_prior.h"
+#include "sensors/smoother/odometry_fusion.h"
+
+namespace adasfm {
+
+// The cameras' motion over links first, ..., last - 1, with its covariance and
+// the flags of what the links' sensors observe; images and dt are left open.
+// The links' errors are alike (one speed, one bias), so n of them count n times
+// the sum of their covariances.
+RelativePosePrior ComposePrior(const OdometryFusionProblem& problem,
+                               const OdometryFusionResult& fused, size_t first,
+                               size_t last, const Rigid3d& cam_from_imu);
+
+}  // namespace adasfm

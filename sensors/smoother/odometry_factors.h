@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <Eigen/Core>
+#include <vector>
+
+#include "sensors/smoother/chain_state.h"
+#include "sensors/smoother/odometry_fusion.h"
+
+namespace adasfm {
+
+// Tangent coordinates of one link: (state k, state k + 1, globals).
+inline constexpr int kLinkSize = 2 * ChainState::kSize + ChainGlobals::kSize;
+
+// Residuals of one link, each divided by its sigma, and their derivatives by
+// the link's tangent coordinates. With A = R_k^T R_k+1, G gravity in the world:
+//   IMU       Log(dR^T A), A v_k+1 - v_k - R_k^T G dt - dv,
+//             u - v_k dt - R_k^T G dt^2 / 2 - dp      (joint 9x9 covariance)
+//   biases    b_k+1 - b_k                             (random walk)
+//   wheels    q (u + A l - l) - (M d + N (phi x d))   (3x3 / weight)
+//   yaw       q' z . Log(A) - curvature * distance - yaw
+//   vision    Log(Exp(Log(V) / s)^T A)                (sigma / weight)
+//   rest      Log(A), u, v_k, v_k+1                   (at a standstill)
+// plus weak priors where a link has no sensor for a coordinate.
+struct LinkResiduals {
+  Eigen::VectorXd values;
+  Eigen::Matrix<double, Eigen::Dynamic, kLinkSize> jacobian;
+  // Squared norm of the wheels' residuals, before their weight.
+  double wheel_chi2 = 0.0;
+  double vision_chi2 = 0.0;  // the same for vision
+};
+
+// What a link's sensors count for: 1, less where they contradict the rest.
+struct LinkWeights {
+  double wheel = 1.0;
+  double vision = 1.0;
+};
+
+struct LinkContext {
+  const OdometryFusionProblem* problem = nullptr;
+  const OdometryFusionOptions* options = nullptr;
+};
+
+LinkResiduals ComputeLinkResiduals(const LinkContext& context,
+                                   const OdometryLink& link,
+                                   const ChainState& first,
+                                   const ChainState& second,
+                                   const ChainGlobals& globals,
+                                   const LinkWeights& weights);
+
+}  // namespace adasfm

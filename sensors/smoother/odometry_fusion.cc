@@ -1,0 +1,284 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "sensors/smoother/odometry_fusion.h"
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+
+#include "core/so3.h"
+#include "sensors/smoother/chain_elimination.h"
+#include "sensors/smoother/odometry_factors.h"
+#include "sensors/smoother/wheel_slips.h"
+
+namespace adasfm {
+namespace {
+
+// Priors of the first state: the heading is free to choose, the rest is open.
+constexpr double kFirstTiltSigma = 1.0;    // rad
+constexpr double kFirstSpeedSigma = 50.0;  // m/s
+// Slip thresholds start high and come down, so that links are judged by a
+// solution that is nearly right already.
+constexpr double kFirstThresholdFactor = 8.0;
+// What wheels that are slipping or stuck at the start begin with.
+constexpr double kFirstSlipWeight = 1e-4;
+constexpr double kConvergedStep = 1e-5;  // of a sigma-free unit: rad, m/s, m
+
+// 1 up to the threshold, then falling faster than the residual grows.
+double RobustWeight(double chi2, double threshold_sigma) {
+  const double ratio =
+      threshold_sigma * threshold_sigma / std::max(chi2, 1e-12);
+  return ratio >= 1.0 ? 1.0 : std::max(1e-6, ratio * ratio);
+}
+
+class Smoother {
+ public:
+  Smoother(const OdometryFusionProblem& problem,
+           const OdometryFusionOptions& options)
+      : problem_(problem), options_(options), weights_(problem.links.size()) {
+    context_ = {&problem_, &options_};
+    states_.resize(problem.initial_states.size());
+    for (size_t k = 0; k < states_.size(); ++k) {
+      states_[k].state = problem.initial_states[k];
+    }
+    for (size_t k = 0; k < problem.links.size(); ++k) {
+      states_[k + 1].step_in_previous = InitialStep(k);
+    }
+  }
+
+  OdometryFusionResult Run();
+
+ private:
+  Eigen::Vector3d InitialStep(size_t k) const;
+  LinkResiduals Residuals(size_t k) const {
+    return ComputeLinkResiduals(context_, problem_.links[k], states_[k],
+                                states_[k + 1], globals_, weights_[k]);
+  }
+  LinkEquations Equations(size_t k) const;
+  ChainMessage FirstMessage() const;
+  double Cost() const;
+  // One damped Gauss-Newton step; returns the largest coordinate's change.
+  double Step();
+  // Thresholds are the options' times factor.
+  void UpdateWeights(double factor);
+  OdometryMotion Motion(size_t k, const LinkCovariance& covariance) const;
+  std::vector<std::pair<size_t, double>> FindSlippingLinks() const;
+  void FillResult(OdometryFusionResult* result) const;
+
+  const OdometryFusionProblem& problem_;
+  const OdometryFusionOptions& options_;
+  LinkContext context_;
+  std::vector<LinkWeights> weights_;
+  std::vector<ChainState> states_;
+  ChainGlobals globals_;
+  double damping_ = 0.0;
+};
+
+Eigen::Vector3d Smoother::InitialStep(size_t k) const {
+  const OdometryLink& link = problem_.links[k];
+  if (!link.has_wheel) return link.dt_s * states_[k].state.velocity_in_imu;
+  const Eigen::Vector3d& lever = problem_.imu_from_wheel.translation;
+  const Eigen::Vector3d forward =
+      globals_.Forward(problem_.imu_from_wheel.rotation, nullptr);
+  return link.wheel.displacement_map * forward + lever -
+         link.wheel.profile_rotation * lever;
+}
+
+LinkEquations Smoother::Equations(size_t k) const {
+  const LinkResiduals residuals = Residuals(k);
+  LinkEquations equations;
+  equations.h.setZero();
+  equations.h.selfadjointView<Eigen::Lower>().rankUpdate(
+      residuals.jacobian.transpose());
+  equations.h.triangularView<Eigen::StrictlyUpper>() = equations.h.transpose();
+  equations.g.noalias() = residuals.jacobian.transpose() * residuals.values;
+  return equations;
+}
+
+ChainMessage Smoother::FirstMessage() const {
+  constexpr int kGlobals = ChainState::kSize;
+  ChainMessage message;
+  Eigen::Matrix<double, ChainMessage::kSize, 1> error, sigma;
+  error.setZero();
+  sigma.setConstant(1.0);
+  const OdometryState& state = states_[0].state;
+  sigma.segment<3>(ChainState::kRotation).setConstant(kFirstTiltSigma);
+  error.segment<3>(ChainState::kVelocity) = state.velocity_in_imu;
+  sigma.segment<3>(ChainState::kVelocity).setConstant(kFirstSpeedSigma);
+  error.segment<3>(ChainState::kGyro) =
+      state.bias.gyroscope - problem_.prior_gyroscope_bias;
+  sigma.segment<3>(ChainState::kGyro)
+      .setConstant(problem_.prior_gyroscope_bias_sigma > 0.0
+                       ? problem_.prior_gyroscope_bias_sigma
+                       : options_.gyroscope_bias_sigma);
+  error.segment<3>(ChainState::kAccel) = state.bias.accelerometer;
+  sigma.segment<3>(ChainState::kAccel)
+      .setConstant(options_.accelerometer_bias_sigma);
+  error.tail<ChainGlobals::kSize>() =
+      globals_.values - ChainGlobals::PriorMeans();
+  sigma.segment<ChainGlobals::kSize>(kGlobals) =
+      ChainGlobals::PriorSigmas(options_);
+  const auto information = sigma.cwiseAbs2().cwiseInverse().eval();
+  message.h = information.asDiagonal();
+  message.g = information.cwiseProduct(error);
+  return message;
+}
+
+double Smoother::Cost() const {
+  const ChainMessage first = FirstMessage();
+  double cost = first.g.cwiseAbs2().cwiseQuotient(first.h.diagonal()).sum();
+  for (size_t k = 0; k < problem_.links.size(); ++k) {
+    cost += Residuals(k).values.squaredNorm();
+  }
+  return 0.5 * cost;
+}
+
+double Smoother::Step() {
+  const double old_cost = Cost();
+  const std::vector<ChainState> old_states = states_;
+  const ChainGlobals old_globals = globals_;
+  // A failed step is repeated with more damping; eight decades are enough to
+  // tell that there is nothing to gain.
+  for (int attempt = 0; attempt < 8; ++attempt) {
+    const ChainSolution solution = SolveChain(
+        problem_.links.size(), FirstMessage(),
+        [this](size_t k) { return Equations(k); }, damping_);
+    double largest = solution.globals.cwiseAbs().maxCoeff();
+    for (size_t k = 0; k < states_.size(); ++k) {
+      // The heading has no bearing on anything: it may drift freely.
+      Eigen::Matrix<double, ChainState::kSize, 1> local = solution.states[k];
+      local[ChainState::kRotation + 2] = 0.0;
+      largest = std::max(largest, local.cwiseAbs().maxCoeff());
+      states_[k].Retract(solution.states[k]);
+    }
+    globals_.values += solution.globals;
+    const double cost = Cost();
+    if (std::isfinite(cost) && cost <= old_cost * (1.0 + 1e-9) + 1e-12) {
+      damping_ = damping_ < 1e-7 ? 0.0 : 0.1 * damping_;
+      return largest;
+    }
+    states_ = old_states;
+    globals_ = old_globals;
+    damping_ = damping_ == 0.0 ? 1e-6 : 10.0 * damping_;
+  }
+  return 0.0;
+}
+
+void Smoother::UpdateWeights(double factor) {
+  const double wheel_threshold = factor * options_.slip_threshold_sigma;
+  const double vision_threshold = factor * options_.vision_threshold_sigma;
+  for (size_t k = 0; k < problem_.links.size(); ++k) {
+    const OdometryLink& link = problem_.links[k];
+    // Without the IMU there is nothing that they could contradict.
+    if (!link.has_imu || !(link.has_wheel || link.has_vision)) continue;
+    const LinkResiduals residuals = Residuals(k);
+    if (link.has_wheel) {
+      weights_[k].wheel = RobustWeight(residuals.wheel_chi2, wheel_threshold);
+    }
+    if (link.has_vision) {
+      weights_[k].vision =
+          RobustWeight(residuals.vision_chi2, vision_threshold);
+    }
+  }
+}
+
+OdometryMotion Smoother::Motion(size_t k,
+                                const LinkCovariance& covariance) const {
+  OdometryMotion motion;
+  const Eigen::Matrix3d r2_transposed =
+      states_[k + 1].state.world_from_imu.toRotationMatrix().transpose();
+  const Eigen::Quaterniond r21 =
+      states_[k + 1].state.world_from_imu.conjugate() *
+      states_[k].state.world_from_imu;
+  const Eigen::Vector3d& step = states_[k + 1].step_in_previous;
+  motion.body2_from_body1 = Rigid3d(r21, r21 * -step);
+  motion.wheel_weight = weights_[k].wheel;
+  // dtheta = R2^T (d1 - d2), dt = [R21 u]x dtheta - R21 du.
+  Eigen::Matrix<double, 6, kLinkSize> map;
+  map.setZero();
+  map.block<3, 3>(0, ChainState::kRotation) = r2_transposed;
+  map.block<3, 3>(0, ChainState::kSize + ChainState::kRotation) =
+      -r2_transposed;
+  map.bottomRows<3>() = Hat(r21 * step) * map.topRows<3>();
+  map.block<3, 3>(3, ChainState::kSize + ChainState::kStep) -=
+      r21.toRotationMatrix();
+  motion.covariance = map * covariance * map.transpose();
+  return motion;
+}
+
+std::vector<std::pair<size_t, double>> Smoother::FindSlippingLinks() const {
+  std::vector<std::pair<size_t, double>> links;
+  for (size_t k = 0; k < problem_.links.size(); ++k) {
+    const OdometryLink& link = problem_.links[k];
+    if (!link.has_wheel || weights_[k].wheel > kSlipWeight) continue;
+    const double speed_error = ComputeWheelSpeedError(problem_, k, states_[k],
+                                                      states_[k + 1], globals_);
+    if (std::abs(speed_error) >= options_.slip_min_speed_m_s) {
+      links.emplace_back(k, speed_error);
+    }
+  }
+  return links;
+}
+
+void Smoother::FillResult(OdometryFusionResult* result) const {
+  constexpr int kLength = 2 * ChainState::kSize + ChainGlobals::kLoggedLength;
+  constexpr int kMount = 2 * ChainState::kSize + ChainGlobals::kMountYaw;
+  const double length = globals_.values[ChainGlobals::kLoggedLength];
+  const size_t num_links = problem_.links.size();
+  result->motions.resize(num_links);
+  double gyro_variance = 0.0, accel_variance = 0.0;
+  ComputeChainCovariances(
+      num_links, FirstMessage(), [this](size_t k) { return Equations(k); },
+      [&](size_t k, const LinkCovariance& covariance) {
+        result->motions[k] = Motion(k, covariance);
+        const auto variances = covariance.diagonal();
+        gyro_variance += variances.segment<3>(ChainState::kGyro).mean();
+        accel_variance += variances.segment<3>(ChainState::kAccel).mean();
+        result->wheel_scale_sigma =
+            std::sqrt(covariance(kLength, kLength)) / (length * length);
+        result->wheel_mount_sigma = variances.segment<2>(kMount).cwiseSqrt();
+      });
+  result->wheel_scale = 1.0 / length;
+  result->wheel_mount = globals_.values.segment<2>(ChainGlobals::kMountYaw);
+  if (num_links > 0) {
+    result->gyroscope_bias_sigma = std::sqrt(gyro_variance / num_links);
+    result->accelerometer_bias_sigma = std::sqrt(accel_variance / num_links);
+  }
+  for (const ChainState& state : states_) result->states.push_back(state.state);
+  result->slipping_links = FindSlippingLinks();
+}
+
+OdometryFusionResult Smoother::Run() {
+  OdometryFusionResult result;
+  double factor = kFirstThresholdFactor;
+  for (const size_t k : FindSuspectWheels(problem_, options_.gravity_m_s2)) {
+    weights_[k].wheel = kFirstSlipWeight;
+  }
+  while (result.num_iterations < options_.max_num_iterations) {
+    ++result.num_iterations;
+    const double change = Step();
+    if (factor == 1.0 && change < kConvergedStep) {
+      result.converged = true;
+      break;
+    }
+    // The threshold comes down once the solution has settled at it.
+    if (change < 1e-2) factor = std::max(1.0, 0.5 * factor);
+    UpdateWeights(factor);
+  }
+  FillResult(&result);
+  return result;
+}
+
+}  // namespace
+
+OdometryFusionResult FuseOdometry(const OdometryFusionProblem& problem,
+                                  const OdometryFusionOptions& options) {
+  std::string error;
+  if (!options.IsValid(&error)) throw std::invalid_argument(error);
+  if (problem.initial_states.size() != problem.links.size() + 1) {
+    throw std::invalid_argument(
+        "FuseOdometry: one initial state more than links is needed");
+  }
+  return Smoother(problem, options).Run();
+}
+
+}  // namespace adasfm

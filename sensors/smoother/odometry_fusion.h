@@ -1,0 +1,143 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <Eigen/Core>
+#include <string>
+#include <vector>
+
+#include "core/rigid3d.h"
+#include "core/types.h"
+#include "sensors/preintegration/imu_preintegration.h"
+#include "sensors/preintegration/wheel_odometry.h"
+
+namespace adasfm {
+
+struct OdometryFusionOptions {
+  // The Earth's pull varies by 0.5 %; the accelerometer bias takes the rest.
+  double gravity_m_s2 = 9.81;
+  // What is believed of biases before any data: MEMS with a factory
+  // calibration.
+  double gyroscope_bias_sigma = 0.005;    // rad/s
+  double accelerometer_bias_sigma = 0.3;  // m/s^2
+  // Tyres wear, loads change: the wheels' scale before any data.
+  double wheel_scale_sigma = 0.01;
+  // The same for the effective track width (skid steering changes it much)
+  // and for the difference of the wheels, as a curvature in 1/m.
+  double wheel_track_sigma = 0.1;
+  double wheel_curvature_sigma = 0.01;
+  // The direction of driving against T_imu_wheel: mounts are rarely measured
+  // better. 0 trusts T_imu_wheel.
+  double wheel_mount_sigma_deg = 2.0;
+  // Sideways and vertical speed of the wheel frame, m/s/sqrt(Hz).
+  // (vertical is larger: springs, and slopes that T_imu_wheel does not follow).
+  double lateral_speed_noise = 0.05;
+  double vertical_speed_noise = 0.2;
+  // Roll and pitch of a machine without IMU, rad/sqrt(s).
+  double planar_rotation_noise = 0.03;
+  // A wheel interval further than this from the IMU (in sigmas) loses weight.
+  double slip_threshold_sigma = 4.0;
+  // The same for a two-view rotation.
+  double vision_threshold_sigma = 3.0;
+  // Two-view rotations may all be too large or too small by this share: a wrong
+  // focal length.
+  double visual_turn_sigma = 0.01;
+  // Reported as slip when also the speed is off by more than this.
+  double slip_min_speed_m_s = 0.2;
+  // A machine at rest moves no more than this.
+  double standstill_speed_sigma = 0.005;  // m/s
+  double standstill_rate_sigma = 1e-4;    // rad/s
+  // Speeds of an IMU without wheels stay within this: all that is known.
+  double unaided_speed_sigma = 15.0;  // m/s
+  int max_num_iterations = 30;
+
+  bool IsValid(std::string* error) const;
+};
+
+// The machine's state at a time; world is z-up with an arbitrary heading.
+struct OdometryState {
+  Eigen::Quaterniond world_from_imu = Eigen::Quaterniond::Identity();
+  Eigen::Vector3d velocity_in_imu = Eigen::Vector3d::Zero();
+  ImuBias bias;
+};
+
+enum class StandstillKind {
+  kNone,
+  kNoTurn,  // it may rock, but keeps its attitude
+  kAtRest,
+};
+
+// What is known between two successive states.
+struct OdometryLink {
+  double dt_s = 0.0;
+  bool has_imu = false;
+  ImuPreintegration imu;
+  bool has_wheel = false;
+  WheelMotion wheel;
+  // The wheels see no turn (WheelType::kSpeed).
+  bool has_wheel_yaw = false;
+  StandstillKind standstill = StandstillKind::kNone;
+  // The body's rotation over the link (first_from_second) as cameras saw it.
+  bool has_vision = false;
+  Eigen::Quaterniond visual_rotation = Eigen::Quaterniond::Identity();
+  double visual_sigma_rad = 0.0;
+};
+
+struct OdometryFusionProblem {
+  // link k joins states k and k + 1: one less than states.
+  std::vector<OdometryLink> links;
+  Rigid3d imu_from_wheel;
+  ImuNoise imu_noise;
+  // What else is known of the gyroscope's bias at the first state, e.g. from
+  // vision; a sigma of 0 takes the options'.
+  Eigen::Vector3d prior_gyroscope_bias = Eigen::Vector3d::Zero();
+  double prior_gyroscope_bias_sigma = 0.0;
+  // First values, e.g. from EstimateInitialOdometry; one more than links.
+  std::vector<OdometryState> initial_states;
+};
+
+// Motion of the body over one link, with covariance of (rotation,
+// translation): R_true = Exp(dtheta) R, t_true = t + dt in the frame of state
+// k + 1, as core/relative_pose_prior.h has it.
+struct OdometryMotion {
+  Rigid3d body2_from_body1;
+  Eigen::Matrix<double, 6, 6> covariance =
+      Eigen::Matrix<double, 6, 6>::Identity();
+  double wheel_weight = 1.0;  // < 1: the wheels contradicted the IMU
+};
+
+// Wheels that weigh less than this slip.
+inline constexpr double kSlipWeight = 0.3;
+
+struct WheelSlip {
+  timestamp_t start_ns = 0;
+  timestamp_t end_ns = 0;
+  double speed_error_m_s = 0.0;  // logged minus true, the largest
+};
+
+struct OdometryFusionResult {
+  std::vector<OdometryState> states;
+  std::vector<OdometryMotion> motions;  // one a link
+  // Links whose wheels contradict the IMU, with logged minus fused speed.
+  std::vector<std::pair<size_t, double>> slipping_links;
+  double wheel_scale = 1.0;
+  double wheel_scale_sigma = 0.0;
+  // How the direction of driving is turned against T_imu_wheel: about its z
+  // (to the left) and its y axis (down), rad.
+  Eigen::Vector2d wheel_mount = Eigen::Vector2d::Zero();
+  Eigen::Vector2d wheel_mount_sigma = Eigen::Vector2d::Zero();
+  double gyroscope_bias_sigma = 0.0;      // mean of states and axes
+  double accelerometer_bias_sigma = 0.0;  // mean of states and axes
+  int num_iterations = 0;
+  bool converged = false;
+};
+
+// One least-squares estimate of all states, biases, the wheels' scale and
+// their mounting from all links at once. The normal equations are block
+// tridiagonal with a narrow border: time and memory are linear in the number
+// of links, and the covariances are the exact marginals of the linearised
+// problem (docs/reference/sensors.md). Throws std::invalid_argument when sizes
+// disagree.
+OdometryFusionResult FuseOdometry(const OdometryFusionProblem& problem,
+                                  const OdometryFusionOptions& options);
+
+}  // namespace adasfm

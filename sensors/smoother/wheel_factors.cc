@@ -1,0 +1,78 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <algorithm>
+#include <cmath>
+
+#include "sensors/smoother/link_builder.h"
+
+namespace adasfm {
+
+void LinkBuilder::AddWheel(double weight) {
+  const WheelMotion& wheel = link_.wheel;
+  const Eigen::Vector3d& lever = context_.problem->imu_from_wheel.translation;
+  Eigen::Matrix<double, 3, 2> forward_by_mount;
+  const Eigen::Vector3d forward = globals_.Forward(
+      context_.problem->imu_from_wheel.rotation, &forward_by_mount);
+  const double logged_per_true = globals_.values[ChainGlobals::kLoggedLength];
+  const Eigen::Vector3d phi =
+      LogSo3(wheel.profile_rotation.conjugate() * a_rotation_);
+  const Eigen::Matrix3d map =
+      wheel.displacement_map + wheel.rotation_moment * Hat(phi);
+  // What the wheel frame's origin moves by.
+  const Eigen::Vector3d moved = second_.step_in_previous + a_ * lever - lever;
+  const int row = num_rows_;
+  values_.segment<3>(row) = logged_per_true * moved - map * forward;
+  jacobian_.block<3, 3>(row, kSecond + ChainState::kStep) =
+      logged_per_true * Eigen::Matrix3d::Identity();
+  AddRelativeRotation<3>(row, -logged_per_true * a_ * Hat(lever) +
+                                  wheel.rotation_moment * Hat(forward) *
+                                      RightJacobianInverseSo3(phi));
+  jacobian_.block<3, 1>(row, kGlobals + ChainGlobals::kLoggedLength) = moved;
+  jacobian_.block<3, 2>(row, kGlobals + ChainGlobals::kMountYaw) =
+      -map * forward_by_mount;
+  Whiten<3>(wheel.covariance / weight);
+  wheel_chi2_ +=
+      weight > 0.0 ? values_.segment<3>(row).squaredNorm() / weight : 0.0;
+  if (wheel.has_rotation) {
+    AddRotationResidual(wheel.rotation, wheel.rotation_covariance / weight);
+    wheel_chi2_ += values_.segment<3>(row + 3).squaredNorm() / weight;
+    return;
+  }
+  if (link_.has_wheel_yaw) AddWheelYaw(weight);
+  if (!link_.has_imu) AddPlanarRotation();
+}
+
+void LinkBuilder::AddWheelYaw(double weight) {
+  const WheelMotion& wheel = link_.wheel;
+  const Eigen::Vector3d up =
+      context_.problem->imu_from_wheel.rotation * Eigen::Vector3d::UnitZ();
+  const Eigen::Vector3d turn = LogSo3(a_rotation_);
+  const double root_weight = std::sqrt(weight / wheel.yaw_variance);
+  const int row = num_rows_++;
+  const double logged_per_true = globals_.values[ChainGlobals::kLoggedYaw];
+  values_[row] = root_weight *
+                 (logged_per_true * up.dot(turn) -
+                  globals_.values[ChainGlobals::kCurvature] * wheel.distance_m -
+                  wheel.yaw_rad);
+  AddRelativeRotation<1>(row, root_weight * logged_per_true * up.transpose() *
+                                  RightJacobianInverseSo3(turn));
+  jacobian_(row, kGlobals + ChainGlobals::kLoggedYaw) =
+      root_weight * up.dot(turn);
+  jacobian_(row, kGlobals + ChainGlobals::kCurvature) =
+      -root_weight * wheel.distance_m;
+  wheel_chi2_ += values_[row] * values_[row] / weight;
+}
+
+void LinkBuilder::AddPlanarRotation() {
+  const Eigen::Matrix3d wheel_from_imu =
+      context_.problem->imu_from_wheel.rotation.toRotationMatrix().transpose();
+  const Eigen::Vector3d turn = LogSo3(a_rotation_);
+  const double sigma = context_.options->planar_rotation_noise *
+                       std::sqrt(std::max(link_.dt_s, 1e-6));
+  const Eigen::Matrix<double, 2, 3> by_turn =
+      wheel_from_imu.topRows<2>() * RightJacobianInverseSo3(turn) / sigma;
+  values_.segment<2>(num_rows_) = wheel_from_imu.topRows<2>() * turn / sigma;
+  AddRelativeRotation<2>(num_rows_, by_turn);
+  num_rows_ += 2;
+}
+
+}  // namespace adasfm

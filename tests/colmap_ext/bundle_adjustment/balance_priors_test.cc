@@ -1,0 +1,118 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "colmap_ext/bundle_adjustment/balance_priors.h"
+
+#include <gtest/gtest.h>
+
+#include "colmap_ext/mapper/local_mapper.h"
+#include "tests/testing/colmap_ext/mapper_world.h"
+
+namespace adasfm {
+namespace {
+
+MapperWorld BuildDrive(uint64_t seed) {
+  MapperWorldOptions options;
+  options.world.num_images = 120;
+  options.world.seed = seed;
+  return BuildMapperWorld(options);
+}
+
+// A model of the drive by vision alone, in the frame of the coarse poses.
+colmap::Reconstruction Reconstruct(const MapperWorld& world) {
+  std::set<image_t> images;
+  for (const auto& image : world.data.images) images.insert(image.first);
+  return ReconstructLocally({}, world.data, world.coarse_poses, images)
+      .reconstruction;
+}
+
+PriorBundleAdjustmentProblem ProblemOf(
+    const MapperWorld& world, const colmap::Reconstruction& reconstruction) {
+  PriorBundleAdjustmentProblem problem;
+  problem.images = {reconstruction.RegImageIds().begin(),
+                    reconstruction.RegImageIds().end()};
+  for (const RelativePosePrior& prior : world.data.priors) {
+    problem.priors.push_back(PosePriorEdgeFromPrior(prior));
+  }
+  return problem;
+}
+
+TEST(ComputePriorChi2PerDof, IsZeroAtThePriorsAndCapsWhatIsWild) {
+  const MapperWorld world = BuildDrive(1);
+  colmap::Reconstruction model = Reconstruct(world);
+  std::vector<PosePriorEdge> priors = ProblemOf(world, model).priors;
+  for (PosePriorEdge& edge : priors) {
+    edge.cam2_from_cam1 =
+        ComputeCam2FromCam1(CamFromWorld(model.Image(edge.image_id1)),
+                            CamFromWorld(model.Image(edge.image_id2)));
+  }
+  EXPECT_NEAR(ComputePriorChi2PerDof(priors, model), 0.0, 1e-9);
+  // Two sigmas of length on every edge: a mean square of four.
+  std::vector<PosePriorEdge> longer = priors;
+  for (PosePriorEdge& edge : longer) {
+    Eigen::Vector3d& t = edge.cam2_from_cam1.translation;
+    t *= 1.0 + 2.0 * edge.length_sigma_m / t.norm();
+  }
+  EXPECT_NEAR(ComputePriorChi2PerDof(longer, model), 4.0, 1e-6);
+  // One edge of n a thousand sigmas off counts 25 / n.
+  std::vector<PosePriorEdge> wild = priors;
+  wild[5].cam2_from_cam1.translation *= 1e3;
+  EXPECT_NEAR(ComputePriorChi2PerDof(wild, model), 25.0 / priors.size(), 1e-6);
+  EXPECT_EQ(CountTornPriors(priors, model), 0);
+  EXPECT_EQ(CountTornPriors(longer, model), 0);
+  EXPECT_EQ(CountTornPriors(wild, model), 1);
+  EXPECT_EQ(ComputePriorChi2PerDof({}, model), 0.0);
+}
+
+TEST(AdjustBundleInBalance, LeavesIndependentNoiseAlone) {
+  for (uint64_t seed = 1; seed <= 3; ++seed) {
+    const MapperWorld world = BuildDrive(seed);
+    colmap::Reconstruction model = Reconstruct(world);
+    double factor = 1.0;
+    EXPECT_TRUE(
+        AdjustBundleInBalance({}, {}, ProblemOf(world, model), &model, &factor)
+            .success);
+    EXPECT_EQ(factor, 1.0) << "seed " << seed;
+  }
+}
+
+// Vision with an error that all keypoints share: the camera's focal length is
+// 5 % off, so that turns and lengths do not fit each other.
+TEST(AdjustBundleInBalance, BelievesPriorsWhereKeypointsShareAnError) {
+  for (uint64_t seed = 1; seed <= 3; ++seed) {
+    MapperWorld world = BuildDrive(seed);
+    world.data.cameras.at(1).SetFocalLengthX(
+        1.05 * world.data.cameras.at(1).FocalLengthX());
+    const colmap::Reconstruction start = Reconstruct(world);
+    const PriorBundleAdjustmentProblem problem = ProblemOf(world, start);
+    PriorBalanceOptions balance;
+
+    colmap::Reconstruction balanced = start;
+    double factor = 1.0;
+    AdjustBundleInBalance(balance, {}, problem, &balanced, &factor);
+    balance.enabled = false;
+    colmap::Reconstruction plain = start;
+    double plain_factor = 1.0;
+    AdjustBundleInBalance(balance, {}, problem, &plain, &plain_factor);
+
+    EXPECT_EQ(plain_factor, 1.0);
+    const double plain_chi2 = ComputePriorChi2PerDof(problem.priors, plain);
+    EXPECT_GT(plain_chi2, balance.max_chi2_per_dof) << "seed " << seed;
+    EXPECT_GT(factor, 1.0) << "seed " << seed;
+    EXPECT_LE(factor, balance.max_sigma_factor);
+    const double chi2 = ComputePriorChi2PerDof(problem.priors, balanced);
+    EXPECT_LT(chi2, plain_chi2) << "seed " << seed;
+    EXPECT_TRUE(chi2 <= balance.max_chi2_per_dof ||
+                factor == balance.max_sigma_factor);
+  }
+}
+
+TEST(PriorBalanceOptions, RefusesWhatMakesNoSense) {
+  PriorBalanceOptions options;
+  std::string error;
+  EXPECT_TRUE(options.IsValid(&error));
+  options.max_chi2_per_dof = 0.5;
+  EXPECT_FALSE(options.IsValid(&error));
+  EXPECT_NE(error.find("max_chi2_per_dof"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace adasfm

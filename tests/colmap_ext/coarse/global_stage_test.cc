@@ -1,0 +1,303 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "colmap_ext/coarse/global_stage.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+#include "colmap_ext/coarse/global_report.h"
+#include "tests/testing/colmap_ext/synthetic_scene.h"
+
+namespace adasfm {
+namespace {
+
+SyntheticWorldOptions SmallWorld() {
+  SyntheticWorldOptions options;
+  options.num_images = 60;
+  return options;
+}
+
+GlobalStageResult RunStage(const SceneData& scene,
+                           const GlobalStageOptions& options = {}) {
+  StatusOr<GlobalStageResult> result = RunGlobalStage(options, scene);
+  EXPECT_TRUE(result.ok()) << result.status().message();
+  return std::move(result).value();
+}
+
+TEST(RunGlobalStageTest, FindsAMetricUprightModel) {
+  for (const uint64_t seed : {1, 2}) {
+    SyntheticWorldOptions options = SmallWorld();
+    options.seed = seed;
+    const SyntheticWorld world = BuildSyntheticWorld(options);
+    const GlobalStageResult result =
+        RunStage(BuildSyntheticScene(world, SyntheticPriorOptions()));
+    ASSERT_EQ(result.models.size(), 1);
+    EXPECT_TRUE(result.models[0].metric);
+    EXPECT_TRUE(result.models[0].gravity_aligned);
+    EXPECT_EQ(result.models[0].reconstruction.NumRegImages(), 60);
+    const PoseErrors errors =
+        ComparePoses(world, result.models[0].reconstruction);
+    EXPECT_LT(errors.rmse_m, 0.3) << seed;
+    EXPECT_NEAR(errors.scale, 1.0, 0.01) << seed;
+  }
+}
+
+TEST(RunGlobalStageTest, FisheyeToo) {
+  SyntheticWorldOptions options = SmallWorld();
+  options.camera_model = SyntheticCameraModel::kFisheye;
+  const SyntheticWorld world = BuildSyntheticWorld(options);
+  const GlobalStageResult result =
+      RunStage(BuildSyntheticScene(world, SyntheticPriorOptions()));
+  ASSERT_EQ(result.models.size(), 1);
+  EXPECT_LT(ComparePoses(world, result.models[0].reconstruction).rmse_m, 0.3);
+}
+
+TEST(RunGlobalStageTest, WithoutSensorsTheScaleIsOpen) {
+  const SyntheticWorld world = BuildSyntheticWorld(SmallWorld());
+  SyntheticPriorOptions priors;
+  priors.enabled = false;
+  const GlobalStageResult result = RunStage(BuildSyntheticScene(world, priors));
+  ASSERT_GE(result.models.size(), 1);
+  EXPECT_FALSE(result.models[0].metric);
+  EXPECT_FALSE(result.models[0].gravity_aligned);
+  EXPECT_EQ(result.models[0].reconstruction.NumRegImages(), 60);
+  EXPECT_LT(ComparePoses(world, result.models[0].reconstruction).rmse_m, 0.3);
+}
+
+TEST(RunGlobalStageTest, RefinedMatchesAreTrueOnes) {
+  SyntheticWorldOptions options = SmallWorld();
+  options.num_images = 200;
+  options.alias_pair_ratio = 0.05;
+  const SyntheticWorld world = BuildSyntheticWorld(options);
+  const SceneData scene = BuildSyntheticScene(world, SyntheticPriorOptions());
+  const GlobalStageResult result = RunStage(scene);
+  size_t num_matches = 0, num_true = 0, num_true_raw = 0;
+  const auto is_true = [&](const ImagePair& pair, const FeatureMatch& match) {
+    return world.images[pair.image_id1 - 1].landmark_ids[match.point2D_idx1] ==
+           world.images[pair.image_id2 - 1].landmark_ids[match.point2D_idx2];
+  };
+  for (const NewTwoViewGeometry& geometry : result.geometries) {
+    for (const FeatureMatch& match : geometry.inlier_matches) {
+      num_matches += 1;
+      num_true += is_true(geometry.pair, match);
+    }
+  }
+  for (const ScenePair& pair : scene.pairs) {
+    for (const FeatureMatch& match : pair.raw_matches) {
+      num_true_raw += is_true({pair.image_id1, pair.image_id2}, match);
+    }
+  }
+  EXPECT_GT(num_true, 0.98 * num_matches);
+  EXPECT_GT(num_true, 0.9 * num_true_raw);
+  // Every pair is accounted for once.
+  EXPECT_EQ(result.geometries.size() + result.removed_pairs.size() +
+                result.refinement.num_skipped_pairs,
+            scene.pairs.size());
+}
+
+TEST(RunGlobalStageTest, SameResultOnAnyNumberOfThreads) {
+  const SyntheticWorld world = BuildSyntheticWorld(SmallWorld());
+  const SceneData scene = BuildSyntheticScene(world, SyntheticPriorOptions());
+  GlobalStageOptions options;
+  options.num_threads = 1;
+  const GlobalStageResult single = RunStage(scene, options);
+  options.num_threads = 2;
+  const GlobalStageResult several = RunStage(scene, options);
+  for (const auto& [image_id, pose] :
+       CamsFromWorld(single.models[0].reconstruction)) {
+    EXPECT_EQ(several.models[0].reconstruction.Image(image_id).Tvec(),
+              pose.translation);
+  }
+  EXPECT_EQ(single.geometries.size(), several.geometries.size());
+}
+
+// A focal length that is 3 % too long bends the epipolar lines; once the
+// adjustment has found the right one, the matches are judged by that.
+TEST(RunGlobalStageTest, MatchesAreRefinedUnderRefinedCameras) {
+  for (const uint64_t seed : {1, 2}) {
+    SyntheticWorldOptions world_options = SmallWorld();
+    world_options.seed = seed;
+    const SyntheticWorld world = BuildSyntheticWorld(world_options);
+    SceneData scene = BuildSyntheticScene(world, SyntheticPriorOptions());
+    const auto set_focal_length = [&](double focal_px) {
+      scene.cameras.at(1).InitializeWithName(
+          "SIMPLE_PINHOLE", focal_px, world.camera.width, world.camera.height);
+      scene.cameras.at(1).SetCameraId(1);
+    };
+    set_focal_length(world.camera.focal_px);
+    const GlobalStageResult right = RunStage(scene);
+    set_focal_length(1.03 * world.camera.focal_px);
+    GlobalStageOptions options;
+    options.structure.bundle.refine_focal_length = true;
+    const GlobalStageResult refined = RunStage(scene, options);
+    ASSERT_EQ(refined.models.size(), 1);
+    EXPECT_NEAR(refined.models[0].reconstruction.Camera(1).FocalLength() /
+                    world.camera.focal_px,
+                1.0, 0.003);
+    EXPECT_NEAR(refined.refinement.num_kept, right.refinement.num_kept,
+                0.005 * right.refinement.num_kept)
+        << seed;
+  }
+}
+
+// A camera that is mounted 3 deg off what the calibration says: no weights
+// bring vision and sensors together, unless the mount is corrected.
+TEST(RunGlobalStageTest, CorrectsTheMountOrWarnsOfTheContradiction) {
+  const SyntheticWorld world = BuildSyntheticWorld(SmallWorld());
+  SceneData scene = BuildSyntheticScene(world, SyntheticPriorOptions());
+  EXPECT_TRUE(ListGlobalWarnings(scene, RunStage(scene)).empty());
+  const Eigen::Quaterniond turn =
+      ExpSo3(DegToRad(3.0) * Eigen::Vector3d::UnitY());
+  for (RelativePosePrior& prior : scene.priors) TurnPrior(turn, &prior);
+  GlobalStageOptions options;
+  options.poses.camera_mount.enabled = false;
+  const GlobalStageResult left = RunStage(scene, options);
+  EXPECT_FALSE(left.models[0].priors_agree);
+  std::vector<std::string> warnings = ListGlobalWarnings(scene, left);
+  ASSERT_EQ(warnings.size(), 1);
+  EXPECT_NE(warnings[0].find("T_cam_imu"), std::string::npos);
+
+  const GlobalStageResult corrected = RunStage(scene);
+  EXPECT_TRUE(corrected.models[0].priors_agree);
+  EXPECT_TRUE(corrected.poses.camera_mount.corrected);
+  const CameraMountReport& mount = corrected.poses.camera_mount;
+  EXPECT_NEAR(mount.turn_rad.y(), -DegToRad(3.0), 4.0 * mount.sigma_rad);
+  // 90 m turn little, which tells the roll; it is left where it is uncertain.
+  EXPECT_LT(AngleBetweenRad(ExpSo3(mount.turn_rad) * turn,
+                            Eigen::Quaterniond::Identity()),
+            DegToRad(0.6));
+  warnings = ListGlobalWarnings(scene, corrected);
+  ASSERT_EQ(warnings.size(), 1);
+  EXPECT_NE(warnings[0].find("mount"), std::string::npos);
+}
+
+void ScaleFocalLength(double ratio, SceneData* scene) {
+  for (const size_t i : scene->cameras.at(1).FocalLengthIdxs()) {
+    scene->cameras.at(1).Params(i) *= ratio;
+  }
+}
+
+// 90 m of road that turns by 93 deg.
+SyntheticWorldOptions TurningWorld() {
+  SyntheticWorldOptions options = SmallWorld();
+  options.seed = 2;
+  return options;
+}
+
+TEST(RunGlobalStageTest, WarnsOfAWrongFocalLength) {
+  for (const double ratio : {0.9, 0.97, 1.0, 1.03}) {
+    const SyntheticWorld world = BuildSyntheticWorld(TurningWorld());
+    SceneData scene = BuildSyntheticScene(world, SyntheticPriorOptions());
+    ScaleFocalLength(ratio, &scene);
+    scene.cameras.at(1).SetPriorFocalLength(true);
+    const GlobalStageResult result = RunStage(scene);
+    const auto& error = result.models[0].focal_length_error;
+    ASSERT_EQ(error.has_value(), ratio != 1.0) << ratio;
+    if (!error) continue;
+    EXPECT_NEAR(error->ratio, 1.0 / ratio, 0.01);
+    EXPECT_NEAR(error->ratio, 1.0 / ratio, 4.0 * error->sigma);
+    const std::vector<std::string> warnings = ListGlobalWarnings(scene, result);
+    ASSERT_FALSE(warnings.empty());
+    EXPECT_NE(warnings[0].find(ratio > 1.0 ? "shorter" : "longer"),
+              std::string::npos);
+    // The cameras are the user's: told, not changed.
+    EXPECT_FALSE(result.models[0].cameras_refined);
+    EXPECT_EQ(result.models[0].reconstruction.Camera(1).Params(),
+              scene.cameras.at(1).Params());
+  }
+}
+
+// Straight on, the errors that priors share pass for a focal length.
+TEST(RunGlobalStageTest, SaysNothingOfFocalLengthsOnStraightRoads) {
+  SyntheticWorldOptions options = SmallWorld();
+  options.trajectory = SyntheticTrajectory::kStraight;
+  const SyntheticWorld world = BuildSyntheticWorld(options);
+  SceneData scene = BuildSyntheticScene(world, SyntheticPriorOptions());
+  ScaleFocalLength(1.1, &scene);
+  EXPECT_FALSE(RunStage(scene).models[0].focal_length_error.has_value());
+}
+
+TEST(RunGlobalStageTest, RefinesAFocalLengthThatNobodyKnows) {
+  const SyntheticWorld world = BuildSyntheticWorld(TurningWorld());
+  SceneData scene = BuildSyntheticScene(world, SyntheticPriorOptions());
+  const double focal_px = scene.cameras.at(1).MeanFocalLength();
+  const GlobalStageResult right = RunStage(scene);
+  ScaleFocalLength(1.05, &scene);
+  scene.cameras.at(1).SetPriorFocalLength(false);
+  const GlobalStageResult refined = RunStage(scene);
+  EXPECT_TRUE(refined.models[0].cameras_refined);
+  EXPECT_NEAR(refined.refinement.num_kept, right.refinement.num_kept,
+              0.005 * right.refinement.num_kept);
+  GlobalStageOptions options;
+  options.structure.refine_unknown_focal_length = false;
+  const GlobalStageResult left = RunStage(scene, options);
+  EXPECT_FALSE(left.models[0].cameras_refined);
+  ASSERT_TRUE(left.models[0].focal_length_error.has_value());
+  const double sigma = left.models[0].focal_length_error->sigma;
+  EXPECT_LT(sigma, 0.003);
+  EXPECT_NEAR(
+      refined.models[0].reconstruction.Camera(1).MeanFocalLength() / focal_px,
+      1.0, 3.0 * sigma);
+  EXPECT_LT(ComparePoses(world, refined.models[0].reconstruction).rmse_m,
+            ComparePoses(world, left.models[0].reconstruction).rmse_m);
+}
+
+TEST(RunGlobalStageTest, SwitchesOffMatchRefinement) {
+  const SyntheticWorld world = BuildSyntheticWorld(SmallWorld());
+  GlobalStageOptions options;
+  options.refinement.enabled = false;
+  const GlobalStageResult result =
+      RunStage(BuildSyntheticScene(world, SyntheticPriorOptions()), options);
+  EXPECT_TRUE(result.geometries.empty());
+  EXPECT_TRUE(result.removed_pairs.empty());
+}
+
+TEST(RunGlobalStageTest, AnEmptySceneIsAnError) {
+  const StatusOr<GlobalStageResult> result =
+      RunGlobalStage(GlobalStageOptions(), SceneData());
+  EXPECT_FALSE(result.ok());
+  EXPECT_FALSE(result.status().message().empty());
+}
+
+TEST(RunGlobalStageTest, ReportsEveryStep) {
+  const SyntheticWorld world = BuildSyntheticWorld(SmallWorld());
+  const SceneData scene = BuildSyntheticScene(world, SyntheticPriorOptions());
+  GlobalStageResult result = RunStage(scene);
+  EXPECT_TRUE(ListGlobalWarnings(scene, result).empty());
+  const std::string json = FormatGlobalReportJson(scene, result, 1.0);
+  for (const StepReport& step : result.steps) {
+    EXPECT_NE(json.find("\"" + step.name + "\""), std::string::npos);
+  }
+  for (const char* figure :
+       {"direction_agreement", "least_direction_agreement",
+        "rotation_optimality", "max_track_bytes", "rotation_rates"}) {
+    EXPECT_NE(json.find("\"" + std::string(figure) + "\""), std::string::npos)
+        << figure;
+  }
+  const std::string text = FormatGlobalReportText(result, 1.0);
+  EXPECT_NE(text.find("60 images"), std::string::npos);
+  EXPECT_NE(text.find("directions agree to"), std::string::npos);
+  result.poses.components[0].positions_converged = false;
+  const std::vector<std::string> warnings = ListGlobalWarnings(scene, result);
+  ASSERT_EQ(warnings.size(), 1);
+  EXPECT_NE(warnings[0].find("did not converge"), std::string::npos);
+  EXPECT_NE(FormatGlobalReportJson(scene, result, 1.0).find(warnings[0]),
+            std::string::npos);
+}
+
+TEST(RunGlobalStageTest, StatesTheMemoryOfTracksBeforeItIsUsed) {
+  const SyntheticWorld world = BuildSyntheticWorld(SmallWorld());
+  std::vector<std::string> names;
+  ASSERT_TRUE(
+      RunGlobalStage(
+          GlobalStageOptions(),
+          BuildSyntheticScene(world, SyntheticPriorOptions()),
+          [&](const std::string& name, double) { names.push_back(name); })
+          .ok());
+  EXPECT_TRUE(std::any_of(names.begin(), names.end(), [](const auto& name) {
+    return name.find("tracks take at most") != std::string::npos;
+  }));
+}
+
+}  // namespace
+}  // namespace adasfm

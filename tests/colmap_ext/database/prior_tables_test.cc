@@ -1,0 +1,174 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "colmap_ext/database/prior_tables.h"
+
+#include <gtest/gtest.h>
+
+#include <limits>
+
+#include "colmap_ext/datasets/write_synthetic_world.h"
+#include "colmap_ext/scene/scene_data.h"
+#include "core/random.h"
+#include "tests/testing/colmap_ext/temporary_folder.h"
+
+namespace adasfm {
+namespace {
+
+class PriorTablesTest : public testing::Test {
+ protected:
+  PriorTablesTest() {
+    SyntheticWorldOptions options;
+    options.num_images = 6;
+    options.num_keypoints_per_image = 50;
+    world_ = BuildSyntheticWorld(options);
+    EXPECT_TRUE(WriteSyntheticDatabase(world_, path_).ok());
+  }
+
+  PriorTables MakeTables(uint64_t seed) const {
+    Random random(seed);
+    PriorTables tables;
+    for (const SyntheticImage& image : world_.images) {
+      tables.image_times.push_back({image.image_id, image.timestamp_ns});
+      tables.gravity.push_back({image.image_id, random.UnitVector()});
+    }
+    for (size_t i = 1; i < world_.images.size(); ++i) {
+      RelativePosePrior prior;
+      prior.image_id1 = world_.images[i - 1].image_id;
+      prior.image_id2 = world_.images[i].image_id;
+      prior.dt_ns =
+          world_.images[i].timestamp_ns - world_.images[i - 1].timestamp_ns;
+      prior.cam2_from_cam1 = ComputeCam2FromCam1(
+          world_.images[i - 1].cam_from_world, world_.images[i].cam_from_world);
+      const Eigen::Matrix<double, 6, 6> root =
+          Eigen::Matrix<double, 6, 6>::NullaryExpr(
+              [&random]() { return random.Gaussian(0.1); });
+      prior.covariance = root * root.transpose();
+      prior.flags = kPriorRotation | kPriorDirection | kPriorLength;
+      tables.priors.push_back(prior);
+    }
+    // The last one has seen no translation.
+    RelativePosePrior& last = tables.priors.back();
+    last.flags = kPriorRotation;
+    last.covariance.bottomRows<3>().setZero();
+    last.covariance.rightCols<3>().setZero();
+    last.covariance.diagonal().tail<3>().setConstant(
+        std::numeric_limits<double>::infinity());
+    return tables;
+  }
+
+  void Execute(const std::string& sql) {
+    SqliteConnection(path_, SqliteConnection::Mode::kWrite).Execute(sql);
+  }
+
+  TemporaryFolder folder_;
+  std::string path_ = folder_.File("database.db");
+  SyntheticWorld world_;
+};
+
+void ExpectEqual(const PriorTables& a, const PriorTables& b) {
+  ASSERT_EQ(a.image_times.size(), b.image_times.size());
+  for (size_t i = 0; i < a.image_times.size(); ++i) {
+    EXPECT_EQ(a.image_times[i].image_id, b.image_times[i].image_id);
+    EXPECT_EQ(a.image_times[i].timestamp_ns, b.image_times[i].timestamp_ns);
+  }
+  ASSERT_EQ(a.priors.size(), b.priors.size());
+  for (size_t i = 0; i < a.priors.size(); ++i) {
+    EXPECT_EQ(a.priors[i].image_id1, b.priors[i].image_id1);
+    EXPECT_EQ(a.priors[i].image_id2, b.priors[i].image_id2);
+    EXPECT_EQ(a.priors[i].dt_ns, b.priors[i].dt_ns);
+    EXPECT_EQ(a.priors[i].flags, b.priors[i].flags);
+    EXPECT_EQ(a.priors[i].covariance, b.priors[i].covariance);
+    EXPECT_EQ(a.priors[i].cam2_from_cam1.translation,
+              b.priors[i].cam2_from_cam1.translation);
+    EXPECT_LT((a.priors[i].cam2_from_cam1.rotation.coeffs() -
+               b.priors[i].cam2_from_cam1.rotation.coeffs())
+                  .norm(),
+              1e-15);
+  }
+  ASSERT_EQ(a.gravity.size(), b.gravity.size());
+  for (size_t i = 0; i < a.gravity.size(); ++i) {
+    EXPECT_EQ(a.gravity[i].image_id, b.gravity[i].image_id);
+    EXPECT_EQ(a.gravity[i].gravity_in_cam, b.gravity[i].gravity_in_cam);
+  }
+}
+
+TEST_F(PriorTablesTest, WithoutTablesThereIsNothing) {
+  const StatusOr<LoadedPriorTables> loaded = ReadPriorTables(path_);
+  ASSERT_TRUE(loaded.ok());
+  EXPECT_TRUE(loaded->tables.priors.empty());
+  EXPECT_TRUE(loaded->tables.image_times.empty());
+}
+
+TEST_F(PriorTablesTest, ReadsWhatWasWrittenLast) {
+  for (const uint64_t seed : {1, 2, 3}) {
+    const PriorTables tables = MakeTables(seed);
+    const Status written = WritePriorTables(path_, tables);
+    ASSERT_TRUE(written.ok()) << written.message();
+    const StatusOr<LoadedPriorTables> loaded = ReadPriorTables(path_);
+    ASSERT_TRUE(loaded.ok()) << loaded.status().message();
+    EXPECT_EQ(loaded->num_ignored_rows, 0);
+    ExpectEqual(loaded->tables, tables);
+  }
+  const StatusOr<SceneData> scene = ReadSceneData(path_, SceneDataOptions());
+  ASSERT_TRUE(scene.ok());
+  EXPECT_EQ(scene->priors.size(), 5);
+  EXPECT_EQ(scene->images.at(2).timestamp_ns, world_.images[1].timestamp_ns);
+  EXPECT_TRUE(scene->images.at(2).gravity_in_cam.has_value());
+}
+
+TEST_F(PriorTablesTest, UserVersionStays) {
+  Execute("PRAGMA user_version = 3800;");
+  ASSERT_TRUE(WritePriorTables(path_, MakeTables(1)).ok());
+  SqliteConnection database(path_, SqliteConnection::Mode::kRead);
+  SqliteStatement statement(&database, "PRAGMA user_version");
+  ASSERT_TRUE(statement.Step());
+  EXPECT_EQ(statement.Int(0), 3800);
+}
+
+TEST_F(PriorTablesTest, UnknownImageLeavesTheDatabaseAsItWas) {
+  PriorTables tables = MakeTables(1);
+  ASSERT_TRUE(WritePriorTables(path_, tables).ok());
+  const std::string before = ReadBytes(path_);
+  tables.gravity.back().image_id = 77;
+  EXPECT_FALSE(WritePriorTables(path_, tables).ok());
+  EXPECT_EQ(ReadBytes(path_), before);
+}
+
+TEST_F(PriorTablesTest, NamesDecideWhenIdsChange) {
+  ASSERT_TRUE(WritePriorTables(path_, MakeTables(1)).ok());
+  // As after a merge: image 3 has become 103, image 6 is gone.
+  Execute(
+      "PRAGMA foreign_keys = OFF;"
+      "UPDATE images SET image_id = 103 WHERE image_id = 3;"
+      "DELETE FROM images WHERE image_id = 6;");
+  const StatusOr<LoadedPriorTables> loaded = ReadPriorTables(path_);
+  ASSERT_TRUE(loaded.ok()) << loaded.status().message();
+  // Its time, its gravity and one prior.
+  EXPECT_EQ(loaded->num_ignored_rows, 3);
+  ASSERT_EQ(loaded->tables.priors.size(), 4);
+  EXPECT_EQ(loaded->tables.priors[1].image_id2, 103);
+  EXPECT_EQ(loaded->tables.priors[2].image_id1, 103);
+  EXPECT_EQ(loaded->tables.image_times[2].image_id, 103);
+}
+
+TEST_F(PriorTablesTest, RefusesRowsItCouldNotHaveWritten) {
+  const char* statements[] = {
+      "UPDATE adasfm_meta SET value = '2';",
+      "UPDATE adasfm_relative_pose_priors SET qvec = zeroblob(32);",
+      "UPDATE adasfm_relative_pose_priors SET tvec = zeroblob(23);",
+      "UPDATE adasfm_relative_pose_priors SET flags = 1024;",
+      "UPDATE adasfm_relative_pose_priors SET dt_ns = -1;",
+      "UPDATE adasfm_gravity SET gravity_in_cam = zeroblob(24);",
+      "DELETE FROM adasfm_image_times WHERE image_id = 2;",
+  };
+  ASSERT_TRUE(WritePriorTables(path_, MakeTables(1)).ok());
+  const std::string original = ReadBytes(path_);
+  for (const char* statement : statements) {
+    folder_.Write("database.db", original);
+    Execute(statement);
+    EXPECT_FALSE(ReadPriorTables(path_).ok()) << statement;
+    EXPECT_FALSE(ReadSceneData(path_, SceneDataOptions()).ok()) << statement;
+  }
+}
+
+}  // namespace
+}  // namespace adasfm

@@ -1,0 +1,161 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "colmap_ext/database/two_view_geometry_backup.h"
+
+#include <base/database.h>
+#include <gtest/gtest.h>
+
+#include "colmap_ext/datasets/write_synthetic_world.h"
+#include "colmap_ext/scene/scene_data.h"
+#include "core/so3.h"
+#include "tests/testing/colmap_ext/temporary_folder.h"
+
+namespace adasfm {
+namespace {
+
+class TwoViewGeometryBackupTest : public testing::Test {
+ protected:
+  TwoViewGeometryBackupTest() {
+    SyntheticWorldOptions options;
+    options.num_images = 8;
+    options.num_keypoints_per_image = 60;
+    world_ = BuildSyntheticWorld(options);
+    EXPECT_TRUE(WriteSyntheticDatabase(world_, path_).ok());
+    // Both kinds of "none" that COLMAP writes, which must come back as they
+    // were.
+    Execute(
+        "UPDATE two_view_geometries SET H = NULL, F = X'' WHERE pair_id = "
+        "(SELECT min(pair_id) FROM two_view_geometries);");
+    for (const SyntheticPair& pair : world_.pairs) {
+      const ImagePair ids(pair.image_id1, pair.image_id2);
+      if (pair.inlier_matches.size() < 20) {
+        removed_.push_back(ids);
+      } else if (rows_.size() < 10) {
+        NewTwoViewGeometry row{ids, pair.inlier_matches, pair.cam2_from_cam1};
+        row.inlier_matches.resize(18);
+        rows_.push_back(row);
+      } else {
+        removed_.push_back(ids);
+      }
+    }
+  }
+
+  void Execute(const std::string& sql) {
+    SqliteConnection(path_, SqliteConnection::Mode::kWrite).Execute(sql);
+  }
+
+  // Every byte and type of a table, as text.
+  std::string Dump(const std::string& table) {
+    SqliteConnection database(path_, SqliteConnection::Mode::kRead);
+    SqliteStatement statement(
+        &database,
+        "SELECT pair_id, rows, cols, quote(data), config, quote(F), quote(E), "
+        "quote(H), quote(qvec), quote(tvec) FROM " +
+            table + " ORDER BY pair_id");
+    std::string text;
+    while (statement.Step()) {
+      for (int i = 0; i < 10; ++i) text += statement.Text(i) + "|";
+      text += "\n";
+    }
+    return text;
+  }
+
+  TemporaryFolder folder_;
+  std::string path_ = folder_.File("database.db");
+  SyntheticWorld world_;
+  std::vector<NewTwoViewGeometry> rows_;
+  std::vector<ImagePair> removed_;
+};
+
+TEST_F(TwoViewGeometryBackupTest, RestoresEveryByte) {
+  const std::string original = Dump("two_view_geometries");
+  const Status rewritten = RewriteTwoViewGeometries(path_, rows_, removed_);
+  ASSERT_TRUE(rewritten.ok()) << rewritten.message();
+  EXPECT_NE(Dump("two_view_geometries"), original);
+  const StatusOr<RestoreSummary> restored = RestoreTwoViewGeometries(path_);
+  ASSERT_TRUE(restored.ok()) << restored.status().message();
+  EXPECT_EQ(restored->num_restored, rows_.size() + removed_.size());
+  EXPECT_EQ(restored->num_outdated, 0);
+  EXPECT_EQ(Dump("two_view_geometries"), original);
+  // Nothing is left to restore.
+  const std::string bytes = ReadBytes(path_);
+  EXPECT_EQ(RestoreTwoViewGeometries(path_)->num_restored, 0);
+  EXPECT_EQ(ReadBytes(path_), bytes);
+}
+
+TEST_F(TwoViewGeometryBackupTest, TwiceEqualsOnce) {
+  ASSERT_TRUE(RewriteTwoViewGeometries(path_, rows_, removed_).ok());
+  const std::string once = Dump("two_view_geometries");
+  const std::string kept_once = Dump(kTwoViewGeometryBackupTable);
+  ASSERT_TRUE(RewriteTwoViewGeometries(path_, rows_, removed_).ok());
+  EXPECT_EQ(Dump("two_view_geometries"), once);
+  EXPECT_EQ(Dump(kTwoViewGeometryBackupTable), kept_once);
+  // Another choice starts from the originals too.
+  const std::vector<NewTwoViewGeometry> fewer(rows_.begin(), rows_.begin() + 2);
+  ASSERT_TRUE(RewriteTwoViewGeometries(path_, fewer, {}).ok());
+  ASSERT_TRUE(RewriteTwoViewGeometries(path_, rows_, removed_).ok());
+  EXPECT_EQ(Dump("two_view_geometries"), once);
+}
+
+TEST_F(TwoViewGeometryBackupTest, OriginalsCanBeRead) {
+  SceneDataOptions options;
+  options.min_num_matches = 0;
+  const StatusOr<SceneData> before = ReadSceneData(path_, options);
+  ASSERT_TRUE(RewriteTwoViewGeometries(path_, rows_, removed_).ok());
+  EXPECT_EQ(ReadSceneData(path_, options)->pairs.size(), rows_.size());
+  options.use_original_two_view_geometries = true;
+  const StatusOr<SceneData> after = ReadSceneData(path_, options);
+  ASSERT_EQ(after->pairs.size(), before->pairs.size());
+  for (size_t i = 0; i < after->pairs.size(); ++i) {
+    EXPECT_EQ(after->pairs[i].inlier_matches, before->pairs[i].inlier_matches);
+  }
+}
+
+TEST_F(TwoViewGeometryBackupTest, ColmapReadsTheNewRows) {
+  ASSERT_TRUE(RewriteTwoViewGeometries(path_, rows_, removed_).ok());
+  colmap::Database database(path_);
+  EXPECT_EQ(database.NumVerifiedImagePairs(), rows_.size());
+  for (const NewTwoViewGeometry& row : rows_) {
+    const colmap::TwoViewGeometry read =
+        database.ReadTwoViewGeometry(row.pair.image_id1, row.pair.image_id2);
+    EXPECT_EQ(read.config, colmap::TwoViewGeometry::CALIBRATED);
+    ASSERT_EQ(read.inlier_matches.size(), row.inlier_matches.size());
+    EXPECT_EQ(read.inlier_matches[3].point2D_idx2,
+              row.inlier_matches[3].point2D_idx2);
+    const Eigen::Vector3d direction =
+        row.cam2_from_cam1.translation.normalized();
+    EXPECT_LT((read.tvec - direction).norm(), 1e-12);
+    const Eigen::Matrix3d E =
+        Hat(direction) * row.cam2_from_cam1.rotation.toRotationMatrix();
+    EXPECT_LT((read.E - E).norm(), 1e-12);
+    // F joins pixels as E joins rays.
+    const Eigen::Matrix3d K = database.ReadCamera(1).CalibrationMatrix();
+    EXPECT_LT((K.transpose() * read.F * K - E).norm(), 1e-9);
+  }
+}
+
+TEST_F(TwoViewGeometryBackupTest, RowsThatColmapWroteSinceStay) {
+  ASSERT_TRUE(RewriteTwoViewGeometries(path_, rows_, removed_).ok());
+  // COLMAP verified one replaced and one removed pair anew.
+  const std::string pair1 = std::to_string(PairIdFromImagePair(rows_[0].pair));
+  const std::string pair2 = std::to_string(PairIdFromImagePair(removed_[0]));
+  Execute("UPDATE two_view_geometries SET config = 3 WHERE pair_id = " + pair1 +
+          "; INSERT INTO two_view_geometries VALUES (" + pair2 +
+          ", 0, 2, X'', 1, X'', X'', X'', X'', X'');");
+  const StatusOr<RestoreSummary> restored = RestoreTwoViewGeometries(path_);
+  ASSERT_TRUE(restored.ok());
+  EXPECT_EQ(restored->num_outdated, 2);
+  EXPECT_EQ(restored->num_restored, rows_.size() + removed_.size() - 2);
+  const std::string dump = Dump("two_view_geometries");
+  EXPECT_NE(dump.find(pair2 + "|0|2|X''|1|"), std::string::npos);
+}
+
+TEST_F(TwoViewGeometryBackupTest, ErrorLeavesTheDatabaseAsItWas) {
+  const std::string before = ReadBytes(path_);
+  std::vector<ImagePair> removed = removed_;
+  removed.emplace_back(1, 99);
+  EXPECT_FALSE(RewriteTwoViewGeometries(path_, rows_, removed).ok());
+  EXPECT_EQ(ReadBytes(path_), before);
+}
+
+}  // namespace
+}  // namespace adasfm

@@ -1,0 +1,188 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "colmap_ext/host/database.h"
+
+#include <gtest/gtest.h>
+
+#include "colmap_ext/datasets/write_synthetic_world.h"
+#include "colmap_ext/io/sqlite.h"
+#include "colmap_ext/scene/scene_data.h"
+#include "tests/testing/colmap_ext/temporary_folder.h"
+
+namespace adasfm {
+namespace {
+
+SyntheticWorld BuildSmallWorld() {
+  SyntheticWorldOptions options;
+  options.num_images = 12;
+  options.num_keypoints_per_image = 80;
+  return BuildSyntheticWorld(options);
+}
+
+class DatabaseTest : public testing::Test {
+ protected:
+  DatabaseTest() {
+    const Status status = WriteSyntheticDatabase(world_, path_);
+    EXPECT_TRUE(status.ok()) << status.message();
+  }
+
+  void Execute(const std::string& sql) {
+    SqliteConnection(path_, SqliteConnection::Mode::kWrite).Execute(sql);
+  }
+
+  // The file is refused with this in the message, and stays as it is.
+  void ExpectRefused(const std::string& path, const std::string& message) {
+    const std::string before = ReadBytes(path);
+    const Status status = CheckDatabase(path);
+    ASSERT_FALSE(status.ok());
+    EXPECT_NE(status.message().find(message), std::string::npos)
+        << status.message();
+    EXPECT_NE(status.message().find(path), std::string::npos);
+    EXPECT_EQ(status.message().find('\n'), std::string::npos);
+    EXPECT_FALSE(ReadSceneData(path, SceneDataOptions()).ok());
+    EXPECT_EQ(ReadBytes(path), before);
+  }
+
+  TemporaryFolder folder_;
+  std::string path_ = folder_.File("database.db");
+  SyntheticWorld world_ = BuildSmallWorld();
+};
+
+TEST_F(DatabaseTest, RefusesWhatIsNotADatabase) {
+  ExpectRefused(folder_.File("missing.db"), "does not exist");
+  EXPECT_FALSE(std::filesystem::exists(folder_.File("missing.db")));
+  EXPECT_FALSE(CheckDatabase(folder_.Path()).ok());
+  ExpectRefused(folder_.Write("empty.db", ""), "is empty");
+  ExpectRefused(folder_.Write("text.db", "This is a text, not a database."),
+                "not a database");
+  ExpectRefused(folder_.Write("cut.db", ReadBytes(path_).substr(0, 5000)),
+                "not a database of COLMAP");
+}
+
+TEST_F(DatabaseTest, RefusesOtherSqliteFiles) {
+  Execute("ALTER TABLE matches RENAME TO other;");
+  ExpectRefused(path_, "table matches is missing");
+}
+
+TEST_F(DatabaseTest, RefusesANewerSchema) {
+  Execute("CREATE TABLE frames (frame_id INTEGER);");
+  ExpectRefused(path_, "newer COLMAP");
+}
+
+TEST_F(DatabaseTest, ReadsTheSceneAndChangesNothing) {
+  const std::string before = ReadBytes(path_);
+  SceneDataOptions options;
+  options.read_raw_matches = true;
+  options.min_num_matches = 0;
+  const StatusOr<SceneData> scene = ReadSceneData(path_, options);
+  ASSERT_TRUE(scene.ok()) << scene.status().message();
+  EXPECT_EQ(ReadBytes(path_), before);
+  EXPECT_FALSE(std::filesystem::exists(path_ + "-wal"));
+  EXPECT_FALSE(std::filesystem::exists(path_ + "-shm"));
+
+  ASSERT_EQ(scene->images.size(), world_.images.size());
+  for (const SyntheticImage& image : world_.images) {
+    const SceneImage& read = scene->images.at(image.image_id);
+    EXPECT_EQ(read.name, image.name);
+    ASSERT_EQ(read.keypoints.size(), image.keypoints.size());
+    for (size_t i = 0; i < read.keypoints.size(); ++i) {
+      // The table holds floats.
+      EXPECT_LT((read.keypoints[i] - image.keypoints[i]).norm(), 1e-3);
+    }
+    EXPECT_FALSE(read.timestamp_ns.has_value());
+  }
+  ASSERT_EQ(scene->pairs.size(), world_.pairs.size());
+  for (size_t i = 0; i < world_.pairs.size(); ++i) {
+    EXPECT_EQ(scene->pairs[i].image_id1, world_.pairs[i].image_id1);
+    EXPECT_EQ(scene->pairs[i].image_id2, world_.pairs[i].image_id2);
+    EXPECT_EQ(scene->pairs[i].inlier_matches, world_.pairs[i].inlier_matches);
+    EXPECT_EQ(scene->pairs[i].raw_matches, world_.pairs[i].raw_matches);
+  }
+  EXPECT_TRUE(scene->priors.empty());
+}
+
+TEST_F(DatabaseTest, LeavesOutPairsWithFewMatches) {
+  SceneDataOptions options;
+  options.min_num_matches = 30;
+  const StatusOr<SceneData> scene = ReadSceneData(path_, options);
+  ASSERT_TRUE(scene.ok());
+  size_t num_expected = 0;
+  for (const SyntheticPair& pair : world_.pairs) {
+    num_expected += pair.inlier_matches.size() >= 30;
+  }
+  EXPECT_EQ(scene->pairs.size(), num_expected);
+  for (const ScenePair& pair : scene->pairs) {
+    EXPECT_GE(pair.inlier_matches.size(), 30);
+    EXPECT_TRUE(pair.raw_matches.empty());
+  }
+}
+
+TEST_F(DatabaseTest, ZeroPoseMeansNoPose) {
+  Execute(
+      "UPDATE two_view_geometries SET tvec = zeroblob(24), E = zeroblob(72);");
+  const StatusOr<SceneData> scene = ReadSceneData(path_, SceneDataOptions());
+  ASSERT_TRUE(scene.ok());
+  ASSERT_FALSE(scene->pairs.empty());
+  for (const ScenePair& pair : scene->pairs) {
+    EXPECT_FALSE(pair.cam2_from_cam1.has_value());
+    EXPECT_FALSE(pair.essential_matrix.has_value());
+  }
+}
+
+TEST_F(DatabaseTest, RefusesRowsThatContradictEachOther) {
+  const char* statements[] = {
+      "UPDATE keypoints SET rows = rows + 1 WHERE image_id = 3;",
+      "UPDATE two_view_geometries SET data = zeroblob(9);",
+      "UPDATE two_view_geometries SET E = zeroblob(8);",
+      "UPDATE cameras SET model = 99;",
+      "UPDATE cameras SET params = zeroblob(8);",
+      "UPDATE images SET camera_id = 7 WHERE image_id = 2;",
+      "DELETE FROM keypoints WHERE image_id = 2;",
+  };
+  const std::string original = ReadBytes(path_);
+  for (const char* statement : statements) {
+    folder_.Write("database.db", original);
+    Execute(std::string("PRAGMA foreign_keys = OFF;") + statement);
+    const StatusOr<SceneData> scene = ReadSceneData(path_, SceneDataOptions());
+    EXPECT_FALSE(scene.ok()) << statement;
+    EXPECT_EQ(scene.status().message().find('\n'), std::string::npos);
+  }
+}
+
+TEST_F(DatabaseTest, IgnoresPairsOfDeletedImages) {
+  Execute(
+      "DELETE FROM keypoints WHERE image_id = 4;"
+      "DELETE FROM images WHERE image_id = 4;");
+  const StatusOr<SceneData> scene = ReadSceneData(path_, SceneDataOptions());
+  ASSERT_TRUE(scene.ok()) << scene.status().message();
+  for (const ScenePair& pair : scene->pairs) {
+    EXPECT_NE(pair.image_id1, 4);
+    EXPECT_NE(pair.image_id2, 4);
+  }
+}
+
+TEST_F(DatabaseTest, ReadsSinglePairsAndImagesAsAll) {
+  SqliteConnection database(path_, SqliteConnection::Mode::kRead);
+  std::map<ImagePair, int64_t> counts;
+  CountMatches(&database, "matches", 1,
+               [&counts](const ImagePair& pair, int64_t count) {
+                 counts[pair] = count;
+               });
+  int num_pairs = 0;
+  ReadMatches(
+      &database, [&](const ImagePair& pair, std::vector<FeatureMatch> matches) {
+        ++num_pairs;
+        EXPECT_EQ(counts[pair], matches.size());
+        EXPECT_EQ(ReadMatchesOfPair(&database, "matches", pair), matches);
+      });
+  EXPECT_GT(num_pairs, 0);
+  EXPECT_EQ(counts.size(), num_pairs);
+  for (const auto& [image_id, points] : ReadKeypoints(&database)) {
+    EXPECT_EQ(ReadKeypointsOfImage(&database, image_id), points);
+  }
+  EXPECT_TRUE(ReadKeypointsOfImage(&database, 999).empty());
+  EXPECT_TRUE(
+      ReadMatchesOfPair(&database, "matches", ImagePair(1, 999)).empty());
+}
+
+}  // namespace
+}  // namespace adasfm

@@ -1,0 +1,66 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "colmap_ext/io/step_journal.h"
+
+#include <gtest/gtest.h>
+
+#include "tests/testing/colmap_ext/temporary_folder.h"
+
+namespace adasfm {
+namespace {
+
+using State = StepJournal::State;
+
+StepJournal ReadOrDie(const std::string& path) {
+  StatusOr<StepJournal> journal = StepJournal::Read(path);
+  EXPECT_TRUE(journal.ok()) << journal.status().message();
+  return std::move(journal).value();
+}
+
+TEST(StepJournal, RemembersAcrossRuns) {
+  const TemporaryFolder folder;
+  const std::string path = folder.File("steps.json");
+  const StepInputs inputs = {{"a", "1"}, {"b", "x"}};
+  {
+    StepJournal journal = ReadOrDie(path);
+    EXPECT_EQ(journal.GetState("first", inputs), State::kNew);
+    ASSERT_TRUE(journal.Begin("first", inputs).ok());
+  }
+  {
+    StepJournal journal = ReadOrDie(path);
+    EXPECT_EQ(journal.GetState("first", inputs), State::kBegun);
+    ASSERT_TRUE(journal.Finish("first", 2.0).ok());
+  }
+  const StepJournal journal = ReadOrDie(path);
+  EXPECT_EQ(journal.GetState("first", inputs), State::kDone);
+  EXPECT_EQ(journal.GetState("first", {{"a", "2"}, {"b", "x"}}),
+            State::kChanged);
+  EXPECT_EQ(journal.DescribeChange("first", {{"a", "2"}, {"b", "x"}}),
+            "a is '2', was '1'");
+  EXPECT_EQ(journal.Steps()[0].seconds, 2.0);
+}
+
+TEST(StepJournal, BeginningForgetsWhatFollows) {
+  const TemporaryFolder folder;
+  StepJournal journal = ReadOrDie(folder.File("steps.json"));
+  for (const char* name : {"1", "2", "3"}) {
+    ASSERT_TRUE(journal.Begin(name, {}).ok());
+    ASSERT_TRUE(journal.Finish(name, 1.0).ok());
+  }
+  ASSERT_TRUE(journal.Begin("2", {{"changed", "yes"}}).ok());
+  EXPECT_EQ(journal.GetState("1", {}), State::kDone);
+  EXPECT_EQ(journal.GetState("2", {{"changed", "yes"}}), State::kBegun);
+  EXPECT_EQ(journal.GetState("3", {}), State::kNew);
+}
+
+TEST(StepJournal, DamagedFileIsAnError) {
+  const TemporaryFolder folder;
+  for (const char* text : {"", "{", "[1]", "[{\"name\": \"x\"}]"}) {
+    const StatusOr<StepJournal> journal =
+        StepJournal::Read(folder.Write("steps.json", text));
+    ASSERT_FALSE(journal.ok()) << text;
+    EXPECT_NE(journal.status().message().find("steps.json"), std::string::npos);
+  }
+}
+
+}  // namespace
+}  // namespace adasfm

@@ -1,0 +1,133 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "colmap_ext/mapper/local_mapper.h"
+
+#include <gtest/gtest.h>
+
+#include "colmap_ext/host/pose_conversion.h"
+#include "colmap_ext/mapper/prior_support.h"
+#include "colmap_ext/mapper/register_image.h"
+#include "tests/testing/colmap_ext/mapper_world.h"
+#include "tests/testing/matchers.h"
+
+namespace adasfm {
+namespace {
+
+std::set<image_t> AllImages(const MapperWorld& world) {
+  std::set<image_t> images;
+  for (const auto& [image_id, image] : world.data.images) {
+    images.insert(image_id);
+  }
+  return images;
+}
+
+MapperWorldOptions SmallWorld(uint64_t seed) {
+  MapperWorldOptions options;
+  options.world.num_images = 30;
+  options.world.seed = seed;
+  return options;
+}
+
+TEST(InitialPair, HasTheParallaxAskedFor) {
+  for (uint64_t seed = 1; seed <= 3; ++seed) {
+    const MapperWorld world = BuildMapperWorld(SmallWorld(seed));
+    const auto scene =
+        BuildMapperScene(world.data, world.coarse_poses, AllImages(world));
+    const auto pairs = FindInitialPairs({}, *scene, 3);
+    ASSERT_FALSE(pairs.empty());
+    EXPECT_LE(pairs.size(), 3);
+    for (size_t i = 0; i < pairs.size(); ++i) {
+      EXPECT_GE(pairs[i].num_points, InitialPairOptions().min_num_points);
+      if (i > 0) {
+        EXPECT_LE(pairs[i].num_points, pairs[i - 1].num_points);
+      }
+    }
+    // Of matches that the poses do not explain there are none.
+    InitialPairOptions strict;
+    strict.max_epipolar_error_px = 1e-9;
+    EXPECT_TRUE(FindInitialPairs(strict, *scene, 3).empty());
+  }
+}
+
+// P_gb between registered images in another frame is the true pose there when
+// the coarse motions are true.
+TEST(GlobalCandidate, FollowsTheLocalFrame) {
+  for (uint64_t seed = 1; seed <= 3; ++seed) {
+    MapperWorldOptions options = SmallWorld(seed);
+    options.center_sigma_m = 0.0;
+    options.rotation_sigma_rad = 0.0;
+    const MapperWorld world = BuildMapperWorld(options);
+    const auto scene =
+        BuildMapperScene(world.data, world.coarse_poses, AllImages(world));
+    Random random(seed);
+    const Sim3d local_from_coarse(random.Uniform(0.5, 2.0),
+                                  ExpSo3(random.UnitVector()),
+                                  random.GaussianVector(10.0));
+    EXPECT_FALSE(ComputeGlobalCandidate(*scene, 15).has_value());
+    for (image_t image_id = 5; image_id < 15; ++image_id) {
+      Rigid3d pose = TransformCamFromWorld(local_from_coarse,
+                                           world.coarse_poses.at(image_id));
+      // One wrong neighbour moves no median.
+      if (image_id == 8) pose.translation.x() += 50.0;
+      SetCamFromWorld(pose, &scene->reconstruction.Image(image_id));
+      scene->reconstruction.RegisterImage(image_id);
+    }
+    const auto candidate = ComputeGlobalCandidate(*scene, 15);
+    ASSERT_TRUE(candidate.has_value());
+    EXPECT_TRUE(PosesNear(
+        *candidate,
+        TransformCamFromWorld(local_from_coarse, world.coarse_poses.at(15)),
+        1e-3, 1e-2));
+  }
+}
+
+TEST(LocalMapper, GlobalCandidateCanBeSwitchedOff) {
+  const MapperWorld world = BuildMapperWorld(SmallWorld(1));
+  LocalMapperOptions options;
+  options.registration.use_global_candidate = false;
+  const LocalMapResult result = ReconstructLocally(
+      options, world.data, world.coarse_poses, AllImages(world));
+  EXPECT_EQ(result.num_registered_by_global_pose, 0);
+  EXPECT_EQ(result.reconstruction.NumRegImages(), 30);
+}
+
+TEST(LocalMapper, FewGlobalAdjustments) {
+  const MapperWorld world = BuildMapperWorld(SmallWorld(2));
+  LocalMapperOptions options;
+  const int num_few = ReconstructLocally(options, world.data,
+                                         world.coarse_poses, AllImages(world))
+                          .num_global_adjustments;
+  options.global_adjustment_growth = 1.05;
+  const int num_many = ReconstructLocally(options, world.data,
+                                          world.coarse_poses, AllImages(world))
+                           .num_global_adjustments;
+  EXPECT_LE(num_few, num_many);
+  EXPECT_LE(num_few, 7);
+}
+
+TEST(LocalMapper, ThrowsWithoutAnInitialPair) {
+  MapperWorld world = BuildMapperWorld(SmallWorld(1));
+  world.data.pairs.clear();
+  EXPECT_THROW(
+      ReconstructLocally({}, world.data, world.coarse_poses, AllImages(world)),
+      std::runtime_error);
+}
+
+TEST(PriorSupport, ComparesWhatTheFlagsClaim) {
+  RelativePosePrior prior;
+  prior.cam2_from_cam1.translation = Eigen::Vector3d(0.0, 0.0, -2.0);
+  prior.covariance = 1e-6 * Eigen::Matrix<double, 6, 6>::Identity();
+  prior.flags = kPriorRotation | kPriorDirection | kPriorLength;
+  Rigid3d motion = prior.cam2_from_cam1;
+  EXPECT_TRUE(IsSupportedByPrior({}, prior, motion));
+  motion.translation *= 1.5;
+  EXPECT_FALSE(IsSupportedByPrior({}, prior, motion));
+  prior.flags = kPriorRotation;
+  EXPECT_TRUE(IsSupportedByPrior({}, prior, motion));
+  motion.rotation = ExpSo3(Eigen::Vector3d(0.0, 0.2, 0.0));
+  EXPECT_FALSE(IsSupportedByPrior({}, prior, motion));
+  prior.flags = 0;
+  EXPECT_FALSE(IsSupportedByPrior({}, prior, motion));
+}
+
+}  // namespace
+}  // namespace adasfm

@@ -1,0 +1,230 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// What the mapper stage does when it is stopped, when a part fails and when
+// memory is short.
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <mutex>
+#include <new>
+#include <nlohmann/json.hpp>
+#include <stdexcept>
+
+#include "colmap_ext/mapper_stage/mapper_stage.h"
+#include "colmap_ext/mapper_stage/part_memory.h"
+#include "tests/testing/colmap_ext/mapper_stage_fixture.h"
+
+namespace adasfm {
+namespace {
+
+namespace fs = std::filesystem;
+
+class MapperCheckpointsTest : public MapperStageTest {
+ protected:
+  // The summary without what a clock says.
+  static nlohmann::json Figures(const MapperStageSummary& summary) {
+    nlohmann::json json =
+        nlohmann::json::parse(FormatMapperSummaryJson(summary));
+    for (const char* name : {"plan", "parts", "merge", "refine"}) {
+      json.erase(std::string(name) + "_seconds");
+    }
+    for (nlohmann::json& part : json["parts"]) part.erase("seconds");
+    return json;
+  }
+};
+
+TEST_F(MapperCheckpointsTest, ContinuesFromWhatIsThere) {
+  MapperWorldOptions options;
+  options.world.num_images = 80;
+  const MapperWorld world = BuildMapperWorld(options);
+  options_.num_threads = 1;
+  const auto undisturbed = Run(world);
+  // As a kill in the middle of part 0 leaves it: its temporary folder, and no
+  // part.
+  const std::string part = folder_ + "/checkpoints/part_0";
+  fs::rename(part, part + ".tmp");
+  fs::remove(part + ".tmp/points3D.bin");
+  const auto part_time = fs::last_write_time(folder_ + "/checkpoints/part_1");
+  const auto continued = Run(world);
+  EXPECT_EQ(part_time, fs::last_write_time(folder_ + "/checkpoints/part_1"));
+  ASSERT_EQ(undisturbed.size(), continued.size());
+  for (const auto& [image_id, pose] : undisturbed) {
+    EXPECT_TRUE(PosesNear(pose, continued.at(image_id), 1e-9, 1e-9));
+  }
+}
+
+TEST_F(MapperCheckpointsTest, ContinuesInsideTheRefinement) {
+  MapperWorldOptions options;
+  options.world.num_images = 80;
+  const MapperWorld world = BuildMapperWorld(options);
+  options_.num_threads = 1;
+  const auto undisturbed = Run(world);
+  const nlohmann::json expected_figures = Figures(summary_);
+  fs::remove_all(folder_);
+  MapperStage stopped(options_, world.data, world.coarse_poses, folder_,
+                      [](const std::string& line, double) {
+                        if (line.find("round 2") != std::string::npos) {
+                          throw std::runtime_error("stopped");
+                        }
+                      });
+  ASSERT_TRUE(stopped.Plan().ok());
+  ASSERT_TRUE(stopped.RunAllParts().ok());
+  EXPECT_THROW(stopped.Merge(true), std::runtime_error);
+  const std::string saved = folder_ + "/checkpoints/refine_";
+  EXPECT_FALSE(fs::exists(saved + "0"));
+  EXPECT_TRUE(fs::exists(saved + "1"));
+  // Twice: the rest of the rounds, then nothing but reading.
+  for (int run = 0; run < 2; ++run) {
+    const auto continued = Run(world);
+    EXPECT_TRUE(fs::exists(saved + "3"));
+    ASSERT_EQ(undisturbed.size(), continued.size());
+    for (const auto& [image_id, pose] : undisturbed) {
+      EXPECT_TRUE(PosesNear(pose, continued.at(image_id), 1e-12, 1e-12));
+    }
+    EXPECT_EQ(Figures(summary_), expected_figures);
+  }
+  // Other options of the refinement do not continue from it.
+  options_.local.keypoint_sigma_px = 2.0;
+  MapperStage changed(options_, world.data, world.coarse_poses, folder_);
+  EXPECT_FALSE(changed.Merge(true).ok());
+}
+
+TEST_F(MapperCheckpointsTest, PartThatThrowsIsTriedOnceMoreMoreStrictly) {
+  MapperWorldOptions options;
+  options.world.num_images = 80;
+  const MapperWorld world = BuildMapperWorld(options);
+  options_.num_threads = 1;
+  std::vector<int> min_visible;
+  const auto throws_while_loose =
+      [&](const LocalMapperOptions& local, const SceneData& data,
+          const CoarsePoseMap& coarse, const std::set<image_t>& images) {
+        if (images.count(1)) {
+          min_visible.push_back(local.registration.min_num_visible_points);
+          if (min_visible.size() == 1) throw std::runtime_error("a bad point");
+        }
+        return ReconstructLocally(local, data, coarse, images);
+      };
+  std::string lines;
+  MapperStage stage(
+      options_, world.data, world.coarse_poses, folder_,
+      [&](const std::string& line, double) { lines += line + "\n"; },
+      throws_while_loose);
+  ASSERT_TRUE(stage.Plan().ok());
+  ASSERT_TRUE(stage.RunAllParts().ok());
+  ASSERT_TRUE(stage.Merge(true).ok());
+  EXPECT_NE(lines.find("failed: a bad point; trying again"), std::string::npos)
+      << lines;
+  ASSERT_EQ(min_visible.size(), 2);
+  EXPECT_GT(min_visible[1], min_visible[0]);
+  int num_retried = 0;
+  for (const PartReport& part : stage.Summary().parts) {
+    EXPECT_TRUE(part.failure.empty());
+    num_retried += part.retry_reason == "a bad point";
+  }
+  EXPECT_EQ(num_retried, 1);
+}
+
+TEST_F(MapperCheckpointsTest, PartThatKeepsThrowingIsNamedAndTheOthersGoOn) {
+  MapperWorldOptions options;
+  options.world.num_images = 80;
+  const MapperWorld world = BuildMapperWorld(options);
+  int num_calls = 0;
+  options_.num_threads = 1;
+  MapperStage stage(
+      options_, world.data, world.coarse_poses, folder_, {},
+      [&](const LocalMapperOptions& local, const SceneData& data,
+          const CoarsePoseMap& coarse, const std::set<image_t>& images) {
+        if (images.count(1)) {
+          ++num_calls;
+          throw std::bad_alloc();
+        }
+        return ReconstructLocally(local, data, coarse, images);
+      });
+  ASSERT_TRUE(stage.Plan().ok());
+  ASSERT_TRUE(stage.RunAllParts().ok());
+  EXPECT_EQ(num_calls, 2);
+  const auto model = stage.Merge(true);
+  ASSERT_TRUE(model.ok());
+  // The coarse poses and the refinement stand in for the part.
+  EXPECT_EQ(model->NumRegImages(), options.world.num_images);
+  EXPECT_LT(ComputeAlignedErrors(Poses(*model), world.true_poses, {}).rmse_m,
+            CoarseRmseM(world));
+  EXPECT_NE(FormatMapperSummaryText(stage.Summary()).find("FAILED: std::bad"),
+            std::string::npos);
+}
+
+TEST_F(MapperCheckpointsTest, MemoryBoundsTheParallelParts) {
+  MapperWorldOptions options;
+  options.world.num_images = 80;
+  const MapperWorld world = BuildMapperWorld(options);
+  for (const bool enough : {true, false}) {
+    options_.max_memory_gb = enough ? 10.0 : 1e-3;
+    fs::remove_all(folder_);
+    std::string lines;
+    std::mutex mutex;
+    MapperStage stage(options_, world.data, world.coarse_poses, folder_,
+                      [&](const std::string& line, double) {
+                        const std::lock_guard<std::mutex> lock(mutex);
+                        lines += line + "\n";
+                      });
+    ASSERT_TRUE(stage.Plan().ok());
+    ASSERT_TRUE(stage.RunAllParts().ok());
+    EXPECT_EQ(stage.Summary().num_parallel_parts, enough ? 2 : 1);
+    EXPECT_GT(stage.Summary().max_part_memory_bytes, 1e6);
+    EXPECT_EQ(lines.find("not enough for one") == std::string::npos, enough)
+        << lines;
+  }
+}
+
+TEST(CountPartsThatFit, TakesTheBiggestTogether) {
+  EXPECT_EQ(CountPartsThatFit({1.0, 5.0, 3.0}, 9.0), 3);
+  EXPECT_EQ(CountPartsThatFit({1.0, 5.0, 3.0}, 8.0), 2);
+  EXPECT_EQ(CountPartsThatFit({1.0, 5.0, 3.0}, 5.0), 1);
+  EXPECT_EQ(CountPartsThatFit({1.0, 5.0, 3.0}, 0.0), 1);
+}
+
+TEST_F(MapperCheckpointsTest, ChangedOptionsOrDataStartAnew) {
+  MapperWorldOptions options;
+  options.world.num_images = 60;
+  MapperWorld world = BuildMapperWorld(options);
+  MapperStage stage(options_, world.data, world.coarse_poses, folder_);
+  ASSERT_TRUE(stage.Plan().ok());
+  ASSERT_TRUE(stage.RunPart(0).ok());
+  const std::string part = folder_ + "/checkpoints/part_0/state.json";
+  ASSERT_TRUE(fs::exists(part));
+
+  MapperStageOptions changed = options_;
+  changed.local.registration.max_reproj_error_px = 6.0;
+  MapperStage with_options(changed, world.data, world.coarse_poses, folder_);
+  EXPECT_NE(with_options.Fingerprint(), stage.Fingerprint());
+  EXPECT_FALSE(with_options.RunPart(0).ok());
+  EXPECT_FALSE(with_options.Merge(true).ok());
+
+  world.data.images.begin()->second.keypoints.front().x() += 1.0;
+  MapperStage with_data(options_, world.data, world.coarse_poses, folder_);
+  EXPECT_NE(with_data.Fingerprint(), stage.Fingerprint());
+  ASSERT_TRUE(with_data.Plan().ok());
+  EXPECT_FALSE(fs::exists(part));
+}
+
+TEST_F(MapperCheckpointsTest, MergeNamesTheMissingParts) {
+  MapperWorldOptions options;
+  options.world.num_images = 80;
+  const MapperWorld world = BuildMapperWorld(options);
+  MapperStage stage(options_, world.data, world.coarse_poses, folder_);
+  EXPECT_FALSE(stage.RunPart(0).ok());
+  ASSERT_TRUE(stage.Plan().ok());
+  ASSERT_TRUE(stage.RunPart(0).ok());
+  EXPECT_FALSE(stage.RunPart(99).ok());
+  const auto missing = stage.Merge(true);
+  ASSERT_FALSE(missing.ok());
+  EXPECT_NE(missing.status().message().find("missing parts: 1"),
+            std::string::npos);
+  // What is there can be merged all the same; the rest keeps coarse poses.
+  MapperStage again(options_, world.data, world.coarse_poses, folder_);
+  const auto model = again.Merge(false);
+  ASSERT_TRUE(model.ok());
+  EXPECT_EQ(model->NumRegImages(), options.world.num_images);
+}
+
+}  // namespace
+}  // namespace adasfm

@@ -1,0 +1,391 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "colmap_ext/pairs/select_pairs.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <iomanip>
+#include <opencv2/imgcodecs.hpp>
+#include <set>
+#include <sstream>
+
+#include "colmap_ext/database/prior_tables.h"
+#include "colmap_ext/datasets/write_synthetic_world.h"
+#include "colmap_ext/host/database.h"
+#include "core/random.h"
+#include "tests/testing/colmap_ext/command_line_fixture.h"
+
+namespace adasfm {
+namespace {
+
+constexpr int kNumDimensions = 128;
+
+// A descriptor as SIFT's: a unit vector of positive numbers times 512.
+Eigen::RowVectorXd RandomDescriptor(Random* random) {
+  Eigen::RowVectorXd descriptor(kNumDimensions);
+  for (int i = 0; i < kNumDimensions; ++i) {
+    descriptor(i) = std::abs(random->Gaussian(1.0));
+  }
+  return descriptor.normalized();
+}
+
+// The descriptor of every keypoint: its landmark's with noise, which turns it
+// by about 20 degrees (SIFT's nearest neighbours accept 30 to 40).
+class LandmarkDescriptors {
+ public:
+  LandmarkDescriptors(const SyntheticWorld& world, uint64_t seed)
+      : random_(seed) {
+    for (size_t i = 0; i < world.landmarks.size(); ++i) {
+      descriptors_.push_back(RandomDescriptor(&random_));
+    }
+  }
+
+  std::vector<uint8_t> Draw(int landmark_id) {
+    Eigen::RowVectorXd descriptor = landmark_id < 0 ? RandomDescriptor(&random_)
+                                                    : descriptors_[landmark_id];
+    for (int i = 0; i < kNumDimensions; ++i) {
+      descriptor(i) = std::max(
+          0.0, descriptor(i) +
+                   random_.Gaussian(0.36 / std::sqrt(1.0 * kNumDimensions)));
+    }
+    descriptor.normalize();
+    std::vector<uint8_t> bytes(kNumDimensions);
+    for (int i = 0; i < kNumDimensions; ++i) {
+      bytes[i] = std::min(255.0, std::round(512.0 * descriptor(i)));
+    }
+    return bytes;
+  }
+
+ private:
+  Random random_;
+  std::vector<Eigen::RowVectorXd> descriptors_;
+};
+
+class SelectPairsTest : public CommandLineTest {
+ protected:
+  // A database of the world with descriptors.
+  void MakeDatabase(const SyntheticWorldOptions& options) {
+    world_ = BuildSyntheticWorld(options);
+    ASSERT_TRUE(WriteSyntheticDatabase(world_, database_).ok());
+    LandmarkDescriptors descriptors(world_, options.seed);
+    SqliteConnection database(database_, SqliteConnection::Mode::kWrite);
+    SqliteTransaction transaction(&database);
+    SqliteStatement insert(&database,
+                           "INSERT OR REPLACE INTO descriptors(image_id, rows, "
+                           "cols, data) VALUES(?, ?, ?, ?)");
+    for (const SyntheticImage& image : world_.images) {
+      std::vector<uint8_t> blob;
+      for (const int landmark_id : image.landmark_ids) {
+        const std::vector<uint8_t> bytes = descriptors.Draw(landmark_id);
+        blob.insert(blob.end(), bytes.begin(), bytes.end());
+      }
+      insert.Reset();
+      insert.BindInt(1, image.image_id);
+      insert.BindInt(2, image.landmark_ids.size());
+      insert.BindInt(3, kNumDimensions);
+      insert.BindBlob(4, blob.data(), blob.size());
+      insert.Step();
+    }
+    transaction.Commit();
+  }
+
+  PairSelection Select(const PairSelectionOptions& options) {
+    const StatusOr<PairSelection> selection = SelectPairs(options, database_);
+    EXPECT_TRUE(selection.ok()) << selection.status().message();
+    return selection.ok() ? *selection : PairSelection();
+  }
+
+  SyntheticWorld world_;
+  std::string database_ = folder_.File("database.db");
+};
+
+SyntheticWorldOptions SmallWorld(int num_images) {
+  SyntheticWorldOptions options;
+  options.num_images = num_images;
+  options.num_keypoints_per_image = 100;
+  return options;
+}
+
+// The share of true pairs, more than `min_gap` images apart, that are selected.
+double RecallOfTruePairs(const SyntheticWorld& world,
+                         const std::vector<ImagePair>& selected, int min_gap,
+                         int* num_true) {
+  const std::set<ImagePair> chosen(selected.begin(), selected.end());
+  *num_true = 0;
+  int num_found = 0;
+  for (const SyntheticPair& pair : world.pairs) {
+    const int gap = pair.image_id2 - pair.image_id1;
+    if (pair.is_alias || gap <= min_gap || pair.inlier_matches.size() < 30) {
+      continue;
+    }
+    ++*num_true;
+    num_found += chosen.count(ImagePair(pair.image_id1, pair.image_id2));
+  }
+  return static_cast<double>(num_found) / std::max(1, *num_true);
+}
+
+TEST_F(SelectPairsTest, FindsTruePairsOfRevisits) {
+  int num_true_of_all = 0;
+  for (const uint64_t seed : {1, 2, 5}) {
+    // Far enough to come back to places seen before.
+    SyntheticWorldOptions options = SmallWorld(180);
+    options.spacing_m = 4.0;
+    options.seed = seed;
+    MakeDatabase(options);
+    const PairSelection selection = Select(PairSelectionOptions());
+    int num_true = 0;
+    const double recall =
+        RecallOfTruePairs(world_, selection.pairs, 10, &num_true);
+    num_true_of_all += num_true;
+    // Of no pairs there is no recall.
+    if (num_true > 0) {
+      EXPECT_GT(recall, 0.95) << "seed " << seed;
+    }
+    EXPECT_LT(selection.pairs.size(), 180 * (10 + 30));
+  }
+  EXPECT_GT(num_true_of_all, 100);
+}
+
+TEST_F(SelectPairsTest, NeighborsAndSimilarImagesCount) {
+  MakeDatabase(SmallWorld(40));
+  PairSelectionOptions options;
+  options.num_similar_images = 0;
+  options.num_temporal_neighbors = 3;
+  PairSelection selection = Select(options);
+  EXPECT_EQ(selection.pairs.size(), 39 + 38 + 37);
+  EXPECT_EQ(selection.num_temporal, 39 + 38 + 37);
+  EXPECT_FALSE(selection.ordered_by_time);
+  options.num_temporal_neighbors = 0;
+  options.num_similar_images = 5;
+  selection = Select(options);
+  std::map<image_t, int> counts;
+  for (const ImagePair& pair : selection.pairs) {
+    EXPECT_LT(pair.image_id1, pair.image_id2);
+    ++counts[pair.image_id1];
+    ++counts[pair.image_id2];
+  }
+  for (const auto& [image_id, count] : counts) EXPECT_GE(count, 5);
+  EXPECT_EQ(counts.size(), 40);
+}
+
+TEST_F(SelectPairsTest, ThreadsDoNotMatterAndOptionsDo) {
+  MakeDatabase(SmallWorld(60));
+  PairSelectionOptions options;
+  options.num_temporal_neighbors = 0;
+  options.num_similar_images = 4;
+  options.descriptors.num_threads = 1;
+  const std::vector<ImagePair> pairs = Select(options).pairs;
+  options.descriptors.num_threads = 3;
+  EXPECT_EQ(Select(options).pairs, pairs);
+  const auto changes = [&](auto change) {
+    PairSelectionOptions changed = options;
+    change(&changed.descriptors);
+    return Select(changed).pairs != pairs;
+  };
+  EXPECT_TRUE(changes([](auto* d) { d->vocabulary.num_words = 2; }));
+  EXPECT_TRUE(changes([](auto* d) { d->num_dimensions = 4; }));
+  EXPECT_TRUE(changes([](auto* d) { d->max_num_pca_images = 5; }));
+  EXPECT_TRUE(changes([](auto* d) { d->max_num_training_descriptors = 30; }));
+}
+
+TEST_F(SelectPairsTest, OrderIsThatOfTimesElseOfNames) {
+  MakeDatabase(SmallWorld(12));
+  bool by_time = true;
+  StatusOr<std::vector<image_t>> order = OrderImages(database_, "", &by_time);
+  ASSERT_TRUE(order.ok());
+  EXPECT_FALSE(by_time);
+  // Names are times here, ids are in their order.
+  EXPECT_TRUE(std::is_sorted(order->begin(), order->end()));
+  // Times against the order of the names, from a file.
+  std::string times = "#timestamp [ns],filename\n";
+  for (int i = 11; i >= 0; --i) {
+    times += std::to_string(1000 - i) + "," + world_.images[i].name + "\n";
+  }
+  order = OrderImages(database_, folder_.Write("times.csv", times), &by_time);
+  ASSERT_TRUE(order.ok()) << order.status().message();
+  EXPECT_TRUE(by_time);
+  EXPECT_TRUE(std::is_sorted(order->rbegin(), order->rend()));
+  // And from the importer's table.
+  PriorTables tables;
+  for (int i = 0; i < 12; ++i) {
+    tables.image_times.push_back({world_.images[i].image_id, 1000 - i});
+  }
+  ASSERT_TRUE(WritePriorTables(database_, tables).ok());
+  order = OrderImages(database_, "", &by_time);
+  EXPECT_TRUE(by_time);
+  EXPECT_TRUE(std::is_sorted(order->rbegin(), order->rend()));
+}
+
+TEST_F(SelectPairsTest, DigitsAreNumbers) {
+  MakeDatabase(SmallWorld(12));
+  {
+    SqliteConnection database(database_, SqliteConnection::Mode::kWrite);
+    database.Execute(
+        "UPDATE images SET name = 'photo' || (13 - image_id) || '.jpg'");
+  }
+  bool by_time = true;
+  const StatusOr<std::vector<image_t>> order =
+      OrderImages(database_, "", &by_time);
+  ASSERT_TRUE(order.ok());
+  EXPECT_TRUE(std::is_sorted(order->rbegin(), order->rend()));
+}
+
+TEST_F(SelectPairsTest, TakesDescriptorsFromElsewhere) {
+  MakeDatabase(SmallWorld(20));
+  // Places on a circle in the order of the images: neighbours are near.
+  std::string text = "# made by a network\n";
+  for (int i = 0; i < 20; ++i) {
+    text += world_.images[i].name + " " + std::to_string(std::cos(0.2 * i)) +
+            " " + std::to_string(std::sin(0.2 * i)) + "\n";
+  }
+  const std::string vectors = folder_.Write("netvlad.txt", text);
+  const std::string pairs = folder_.File("pairs.txt");
+  const Run run = Call("adasfm_pair_generator --database_path " + database_ +
+                       " --output_path " + pairs +
+                       " --AdaSfmPairs.num_temporal_neighbors 0"
+                       " --AdaSfmPairs.num_similar_images 2"
+                       " --AdaSfmPairs.descriptors_path " +
+                       vectors);
+  ASSERT_EQ(run.ExitCode(), 0) << run.err;
+  const std::string list = ReadBytes(pairs);
+  EXPECT_EQ(std::count(list.begin(), list.end(), '\n'), 21) << list;
+  EXPECT_NE(list.find(world_.images[4].name + " " + world_.images[5].name),
+            std::string::npos);
+
+  const std::string options = "adasfm_pair_generator --database_path " +
+                              database_ + " --output_path " + pairs +
+                              " --AdaSfmPairs.descriptors_path ";
+  ExpectError(options + folder_.File("missing.txt"), "missing.txt");
+  ExpectError(options + folder_.Write("a.txt", text + "x.png 1\n"),
+              "line 22: has 1 numbers, the lines before it 2");
+  ExpectError(options + folder_.Write("b.txt", "x.png 1 nan\n"), "'nan'");
+  ExpectError(options + folder_.Write("c.txt", "x.png 1 2\nx.png 1 2\n"),
+              "already");
+  ExpectError(options + folder_.Write("d.txt", "other.png 1 2\n"),
+              "none of its 1 images");
+  ExpectError(options + folder_.Write("e.txt", "x.png 0 0\n"), "is zero");
+}
+
+TEST_F(SelectPairsTest, WrongInputIsOneLine) {
+  MakeDatabase(SmallWorld(6));
+  const std::string call = "adasfm_pair_generator --output_path " +
+                           folder_.File("pairs.txt") + " --database_path ";
+  ExpectError(call + folder_.File("missing.db"), "missing.db");
+  ExpectError(call + database_ + " --AdaSfmPairs.num_words 0", "num_words");
+  ExpectError(call + database_ + " --AdaSfmPairs.num_similar_images -1",
+              "num_similar_images");
+  ExpectError(call + database_ +
+                  " --AdaSfmPairs.num_similar_images 0"
+                  " --AdaSfmPairs.num_temporal_neighbors 0",
+              "one of them must be positive");
+  {
+    SqliteConnection database(database_, SqliteConnection::Mode::kWrite);
+    database.Execute("DELETE FROM descriptors");
+  }
+  ExpectError(call + database_, "feature_extractor");
+  // Names are looked at before descriptors.
+  {
+    SqliteConnection database(database_, SqliteConnection::Mode::kWrite);
+    database.Execute("UPDATE images SET name = 'a b.png' WHERE image_id = 1");
+  }
+  ExpectError(call + database_, "'a b.png' has a space");
+}
+
+// Features and matches of learned models come in through COLMAP's own
+// importers (docs/guide/pair_selection.md).
+class LearnedFeaturesTest : public SelectPairsTest {
+ protected:
+  // An empty photo and a text file of features for every image.
+  void WriteFeatures() {
+    const std::string photos = folder_.File("photos");
+    const std::string features = folder_.File("features");
+    std::filesystem::create_directories(photos);
+    std::filesystem::create_directories(features);
+    LandmarkDescriptors descriptors(world_, 1);
+    for (const SyntheticImage& image : world_.images) {
+      cv::imwrite(
+          photos + "/" + image.name,
+          cv::Mat::zeros(world_.camera.height, world_.camera.width, CV_8U));
+      std::ofstream file(features + "/" + image.name + ".txt");
+      file << std::setprecision(9) << image.keypoints.size() << " "
+           << kNumDimensions << "\n";
+      for (size_t i = 0; i < image.keypoints.size(); ++i) {
+        file << image.keypoints[i].x() << " " << image.keypoints[i].y()
+             << " 1 0";
+        for (const int byte : descriptors.Draw(image.landmark_ids[i])) {
+          file << " " << byte;
+        }
+        file << "\n";
+      }
+    }
+    std::ostringstream camera;
+    camera << world_.camera.focal_px << "," << world_.camera.focal_px << ","
+           << world_.camera.principal_x_px << ","
+           << world_.camera.principal_y_px;
+    ExpectSuccess("feature_importer --database_path " + imported_ +
+                  " --image_path " + photos + " --import_path " + features +
+                  " --ImageReader.single_camera 1 --ImageReader.camera_model "
+                  "PINHOLE --ImageReader.camera_params " +
+                  camera.str());
+  }
+
+  void ExpectSuccess(const std::string& arguments) {
+    const Run run = Call(arguments);
+    EXPECT_EQ(run.ExitCode(), 0) << arguments << "\n" << run.out << run.err;
+  }
+
+  int Count(const std::string& table) {
+    SqliteConnection database(imported_, SqliteConnection::Mode::kRead);
+    SqliteStatement statement(
+        &database, "SELECT COUNT(*) FROM " + table + " WHERE rows >= 15");
+    return statement.Step() ? statement.Int(0) : 0;
+  }
+
+  void ExpectModel() {
+    ExpectSuccess("adasfm_global --database_path " + imported_ +
+                  " --output_path " + folder_.File("coarse"));
+    ExpectSuccess("adasfm_mapper --database_path " + imported_ +
+                  " --input_path " + folder_.File("coarse/0") +
+                  " --output_path " + folder_.File("sparse"));
+    EXPECT_TRUE(std::filesystem::exists(folder_.File("sparse/0/images.bin")));
+  }
+
+  std::string imported_ = folder_.File("imported.db");
+};
+
+TEST_F(LearnedFeaturesTest, FeaturesAndSelectedPairs) {
+  world_ = BuildSyntheticWorld(SmallWorld(20));
+  WriteFeatures();
+  const std::string pairs = folder_.File("pairs.txt");
+  ExpectSuccess("adasfm_pair_generator --database_path " + imported_ +
+                " --output_path " + pairs);
+  ExpectSuccess("matches_importer --database_path " + imported_ +
+                " --match_list_path " + pairs +
+                " --match_type pairs --SiftMatching.use_gpu 0");
+  EXPECT_GT(Count("two_view_geometries"), 40);
+  ExpectModel();
+}
+
+TEST_F(LearnedFeaturesTest, FeaturesAndMatches) {
+  world_ = BuildSyntheticWorld(SmallWorld(20));
+  WriteFeatures();
+  std::ostringstream matches;
+  for (const SyntheticPair& pair : world_.pairs) {
+    matches << world_.images[pair.image_id1 - 1].name << " "
+            << world_.images[pair.image_id2 - 1].name << "\n";
+    for (const FeatureMatch& match : pair.raw_matches) {
+      matches << match.point2D_idx1 << " " << match.point2D_idx2 << "\n";
+    }
+    matches << "\n";
+  }
+  ExpectSuccess("matches_importer --database_path " + imported_ +
+                " --match_list_path " +
+                folder_.Write("matches.txt", matches.str()) +
+                " --match_type raw --SiftMatching.use_gpu 0");
+  EXPECT_GT(Count("two_view_geometries"), 40);
+  ExpectModel();
+}
+
+}  // namespace
+}  // namespace adasfm

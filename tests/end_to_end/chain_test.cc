@@ -1,0 +1,215 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// The whole chain through its commands, on synthetic drives.
+
+#include <nlohmann/json.hpp>
+#include <string>
+
+#include "colmap_ext/host/database.h"
+#include "colmap_ext/host/model.h"
+#include "colmap_ext/io/double_blob.h"
+#include "colmap_ext/io/sqlite.h"
+#include "tests/testing/colmap_ext/command_line_fixture.h"
+
+namespace adasfm {
+namespace {
+
+class ChainTest : public CommandLineTest {
+ protected:
+  void Make(const std::string& options) {
+    ExpectSuccess("adasfm_synthesizer --output_path " + folder_.Path() + " " +
+                  options);
+  }
+
+  Run ExpectSuccess(const std::string& arguments) {
+    const Run run = Call(arguments);
+    EXPECT_EQ(run.ExitCode(), 0) << arguments << "\n" << run.err;
+    return run;
+  }
+
+  void Import() {
+    ExpectSuccess("adasfm_prior_importer --database_path " + database_ +
+                  " --image_times_path " + folder_.File("times.csv") +
+                  " --imu_path " + folder_.File("imu.csv") + " --wheel_path " +
+                  folder_.File("wheel.csv") + " --sensors_path " +
+                  folder_.File("sensors.yaml"));
+  }
+
+  std::string GlobalArguments(const std::string& output = "global") {
+    return "adasfm_global --database_path " + database_ + " --output_path " +
+           folder_.File(output);
+  }
+
+  std::string MapperArguments(const std::string& output = "sparse") {
+    return "adasfm_mapper --database_path " + database_ + " --input_path " +
+           folder_.File("global/0") + " --output_path " + folder_.File(output);
+  }
+
+  nlohmann::json Evaluate(const std::string& model) {
+    const std::string json = folder_.File("evaluation.json");
+    ExpectSuccess("adasfm_evaluator --input_path " + folder_.File(model) +
+                  " --ground_truth_path " + folder_.File("gt.txt") +
+                  " --json_path " + json);
+    return nlohmann::json::parse(ReadBytes(json));
+  }
+
+  std::string ModelBytes(const std::string& output) {
+    return ReadBytes(folder_.File(output + "/0/images.bin"));
+  }
+
+  void Sql(const std::string& statement) {
+    SqliteConnection(database_, SqliteConnection::Mode::kWrite)
+        .Execute(statement);
+  }
+
+  // Those of the database.
+  void ScaleFocalLengths(double factor) {
+    SqliteConnection database(database_, SqliteConnection::Mode::kWrite);
+    for (auto& [camera_id, camera] : ReadCameras(&database)) {
+      std::vector<double> params = camera.Params();
+      for (const size_t i : camera.FocalLengthIdxs()) params[i] *= factor;
+      SqliteStatement statement(
+          &database, "UPDATE cameras SET params = ? WHERE camera_id = ?");
+      BindDoubles(&statement, 1, params.data(), params.size());
+      statement.BindInt(2, camera_id);
+      statement.Step();
+    }
+  }
+
+  double FocalLength(const std::string& model) {
+    const auto reconstruction = ReadModel(folder_.File(model));
+    EXPECT_TRUE(reconstruction.ok());
+    return reconstruction->Cameras().begin()->second.MeanFocalLength();
+  }
+
+  std::string database_ = folder_.File("database.db");
+};
+
+int CountOf(const std::string& text, const std::string& word) {
+  int count = 0;
+  for (size_t at = text.find(word); at != std::string::npos;
+       at = text.find(word, at + 1)) {
+    ++count;
+  }
+  return count;
+}
+
+// The wheel scale is known to 1 % beforehand, and 0.5 px over 100 m of drive
+// leave a few centimetres (measured: 0.03 m on such worlds).
+void ExpectGoodMetricModel(const nlohmann::json& evaluation, int num_images) {
+  EXPECT_EQ(evaluation["num_images"], num_images);
+  EXPECT_LT(evaluation["sim3_least_squares"]["translation_rmse_m"], 0.15);
+  EXPECT_NEAR(evaluation["sim3"]["scale"], 1.0, 0.03);
+}
+
+TEST_F(ChainTest, AliasedDriveWithBlackoutEndsInOneMetricModel) {
+  Make(
+      "--num_images 160 --seed 2 --alias_ratio 0.04 --num_blackouts 1 "
+      "--wheel_slips 1");
+  Import();
+  ExpectSuccess(GlobalArguments());
+  ExpectSuccess(MapperArguments());
+  ExpectGoodMetricModel(Evaluate("sparse/0"), 160);
+  const auto summary =
+      nlohmann::json::parse(ReadBytes(folder_.File("sparse/summary.json")));
+  EXPECT_FALSE(summary.empty());
+}
+
+// Look-alike places on one street, left in the database: the parts are folded
+// there, the priors are torn, and the coarse poses take over.
+TEST_F(ChainTest, FalseLoopsAloneDoNotSpoilTheMapper) {
+  Make(
+      "--num_images 160 --seed 2 --alias_ratio 0.04 --num_blackouts 1 "
+      "--wheel_slips 1");
+  Import();
+  ExpectSuccess(GlobalArguments() + " --AdaSfmGlobal.refine_matches 0");
+  ExpectSuccess(MapperArguments());
+  ExpectGoodMetricModel(Evaluate("sparse/0"), 160);
+}
+
+TEST_F(ChainTest, TwiceIsOnceAndTheRestorerUndoes) {
+  Make("--num_images 40 --seed 3");
+  Import();
+  const auto rows = [&] {
+    std::string text;
+    const std::string dump = folder_.File("dump");
+    EXPECT_EQ(std::system(("sqlite3 " + database_ +
+                           " \"select pair_id, rows, config, hex(data), "
+                           "hex(qvec), hex(tvec), hex(E) from "
+                           "two_view_geometries order by pair_id\" > " +
+                           dump)
+                              .c_str()),
+              0);
+    return ReadBytes(dump);
+  };
+  const std::string original = rows();
+  ASSERT_FALSE(original.empty());
+  ExpectSuccess(GlobalArguments("global"));
+  const std::string once = rows();
+  EXPECT_NE(once, original);
+  ExpectSuccess(GlobalArguments("again"));
+  EXPECT_EQ(rows(), once);
+  EXPECT_EQ(ModelBytes("again"), ModelBytes("global"));
+  ExpectSuccess("adasfm_restorer --database_path " + database_);
+  EXPECT_EQ(rows(), original);
+}
+
+// The coarse stage finds a focal length that nobody marked as known, and the
+// mapper goes on with it, though the database has the wrong one.
+TEST_F(ChainTest, TheMapperTakesTheCoarseModelsCameras) {
+  Make("--num_images 80 --seed 4");
+  Import();
+  Sql("UPDATE cameras SET prior_focal_length = 0");
+  ExpectSuccess(GlobalArguments());
+  const std::string fixed =
+      " --AdaSfmMapper.refine_focal_length 0 "
+      "--AdaSfmMapper.refine_extra_params 0";
+  Run run = ExpectSuccess(MapperArguments("right") + fixed);
+  EXPECT_EQ(run.out.find("coarse model's camera"), std::string::npos);
+  ScaleFocalLengths(1.05);
+  ExpectSuccess(GlobalArguments());
+  run = ExpectSuccess(MapperArguments("wrong") + fixed);
+  EXPECT_NE(run.out.find("coarse model's camera"), std::string::npos);
+  EXPECT_NEAR(FocalLength("wrong/0") / FocalLength("right/0"), 1.0, 0.003);
+  EXPECT_EQ(FocalLength("wrong/0"), FocalLength("global/0"));
+  ExpectGoodMetricModel(Evaluate("wrong/0"), 80);
+}
+
+TEST_F(ChainTest, WithoutSensorsThereIsOneWarningAndAModel) {
+  Make("--num_images 60 --seed 4");
+  const Run run = ExpectSuccess(GlobalArguments());
+  EXPECT_EQ(CountOf(run.out + run.err, "WARNING"), 1) << run.out << run.err;
+  ExpectSuccess(MapperArguments());
+  const nlohmann::json evaluation = Evaluate("sparse/0");
+  EXPECT_EQ(evaluation["num_images"], 60);
+  // 90 m without metres or loops: COLMAP's mapper drifts by as much.
+  EXPECT_LT(evaluation["sim3_least_squares"]["translation_rmse_m"], 0.5);
+}
+
+TEST_F(ChainTest, WrongInputIsOneLineAndChangesNothing) {
+  Make("--num_images 12 --seed 1");
+  const std::string before = ReadBytes(database_);
+  const std::string output = " --output_path " + folder_.File("out_folder");
+  const std::string text = folder_.Write("text.db", "not a database");
+  const std::string empty = folder_.Write("empty.db", "");
+  const std::string below_file = folder_.Write("file", "x") + "/out";
+  for (const std::string& database :
+       {folder_.File("missing.db"), text, empty}) {
+    ExpectError("adasfm_global --database_path " + database + output, database);
+  }
+  EXPECT_FALSE(std::filesystem::exists(folder_.File("missing.db")));
+  ExpectError("adasfm_global --database_path " + database_ + " --output_path " +
+                  below_file,
+              below_file);
+  ExpectError("adasfm_global --database_path " + database_ + output +
+                  " --AdaSfmGlobal.max_epipolar_error_px -1",
+              "max_epipolar_error_px");
+  ExpectError("adasfm_mapper --database_path " + database_ + output +
+                  " --input_path " + folder_.File("none"),
+              "run adasfm_global first");
+  ExpectError("adasfm_synthesizer --output_path " + below_file, below_file);
+  ExpectError("adasfm_synthesizer --num_images 0" + output, "num_images");
+  EXPECT_EQ(ReadBytes(database_), before);
+}
+
+}  // namespace
+}  // namespace adasfm

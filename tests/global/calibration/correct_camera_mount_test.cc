@@ -1,0 +1,208 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "global/calibration/correct_camera_mount.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+#include "core/so3.h"
+#include "tests/testing/global/test_scene.h"
+
+namespace adasfm {
+namespace {
+
+struct Drive {
+  ViewGraph graph;
+  GlobalCorrespondences correspondences;
+  std::vector<RelativePosePrior> priors;
+};
+
+struct DriveOptions {
+  // The true camera from the stated one.
+  Eigen::Vector3d mount_deg = Eigen::Vector3d::Zero();
+  // Largest turn of a step.
+  double turn_rad = 0.05;
+  double noise_px = 0.5;
+  // Of the steps that follow each other.
+  bool has_positions = true;
+  int num_images = 120;
+};
+
+constexpr double kFocalLengthPx = 500.0;
+
+Bearing Observe(const Eigen::Vector3d& point_in_cam, double noise_px,
+                Random* random) {
+  const Eigen::Vector2d pixel =
+      kFocalLengthPx * point_in_cam.hnormalized() +
+      Eigen::Vector2d(random->Gaussian(noise_px), random->Gaussian(noise_px));
+  const Eigen::Vector3d ray(pixel.x(), pixel.y(), kFocalLengthPx);
+  Bearing bearing;
+  bearing.direction = ray.normalized();
+  const Eigen::Matrix3d project =
+      (Eigen::Matrix3d::Identity() -
+       bearing.direction * bearing.direction.transpose()) /
+      ray.norm();
+  bearing.jacobian = project.leftCols<2>();
+  return bearing;
+}
+
+// 1 m and 0.1 s a step along winding streets, points 5 to 40 m ahead of the
+// pair's middle; every pair of up to five steps has matches.
+Drive BuildDrive(const DriveOptions& options, uint64_t seed) {
+  Random random(seed);
+  Drive drive;
+  std::vector<Rigid3d> poses = {Rigid3d()};
+  drive.graph.images = {1};
+  const Eigen::Quaterniond stated_from_true =
+      ExpSo3(-DegToRad(1.0) * options.mount_deg);
+  for (int k = 1; k < options.num_images; ++k) {
+    const Rigid3d step(
+        ExpSo3(Eigen::Vector3d(0, options.turn_rad * std::sin(0.1 * k), 0)),
+        Eigen::Vector3d(0, 0, -1));
+    poses.push_back(step * poses.back());
+    drive.graph.images.push_back(k + 1);
+    drive.priors.push_back(BuildPrior(k, k + 1, step, 2e-4, 5e-3, &random));
+    TurnPrior(stated_from_true, &drive.priors.back());
+    if (!options.has_positions) drive.priors.back().flags = kPriorRotation;
+  }
+  for (int i = 0; i < options.num_images; ++i) {
+    for (int j = i + 1; j < std::min(options.num_images, i + 6); ++j) {
+      Rigid3d motion = poses[j] * poses[i].Inverse();
+      auto& bearings1 = drive.correspondences.bearings[i + 1];
+      auto& bearings2 = drive.correspondences.bearings[j + 1];
+      auto& matches = drive.correspondences.matches[ImagePair(i + 1, j + 1)];
+      for (int k = 0; k < 100; ++k) {
+        const Eigen::Vector3d point(random.Uniform(-10.0, 10.0),
+                                    random.Uniform(-5.0, 5.0),
+                                    random.Uniform(10.0, 40.0));
+        matches.push_back({static_cast<point2D_t>(bearings1.size()),
+                           static_cast<point2D_t>(bearings2.size())});
+        bearings1.push_back(Observe(point, options.noise_px, &random));
+        bearings2.push_back(Observe(motion * point, options.noise_px, &random));
+      }
+      constexpr double kRotationSigmaRad = 1e-3;
+      motion.rotation =
+          ExpSo3(random.GaussianVector(kRotationSigmaRad)) * motion.rotation;
+      drive.graph.edges.push_back(BuildEdge(ImagePair(i + 1, j + 1), motion));
+      drive.graph.edges.back().rotation_sigma_rad = kRotationSigmaRad;
+    }
+  }
+  return drive;
+}
+
+CameraMountReport Correct(Drive* drive, const CameraMountOptions& options) {
+  return CorrectCameraMount(options, OdometryChain(drive->priors, {}),
+                            drive->graph, drive->correspondences,
+                            &drive->priors);
+}
+
+double ErrorDeg(const CameraMountReport& report, const Eigen::Vector3d& truth) {
+  return RadToDeg(
+      AngleBetweenRad(ExpSo3(report.turn_rad), ExpSo3(DegToRad(1.0) * truth)));
+}
+
+TEST(CorrectCameraMount, FindsTheTurnAboutAllAxes) {
+  for (uint64_t seed = 1; seed <= 4; ++seed) {
+    DriveOptions options;
+    options.mount_deg = Eigen::Vector3d(0.6, -1.0, 1.5);
+    Drive drive = BuildDrive(options, seed);
+    const Drive stated = drive;
+    const CameraMountReport report = Correct(&drive, CameraMountOptions());
+    ASSERT_TRUE(report.corrected) << "seed " << seed;
+    // The steps' 5e-3 of direction, mostly persistent, is 0.29 deg for one step
+    // and a tenth of it for 120; turns of 0.05 know the roll to 1e-3 / 0.1 for
+    // one pair and a twentieth of it for all.
+    EXPECT_LT(ErrorDeg(report, options.mount_deg), 0.15) << "seed " << seed;
+    EXPECT_LT(ErrorDeg(report, options.mount_deg),
+              4.0 * RadToDeg(report.sigma_rad));
+    for (size_t k = 0; k < drive.priors.size(); ++k) {
+      RelativePosePrior expected = stated.priors[k];
+      TurnPrior(ExpSo3(report.turn_rad), &expected);
+      EXPECT_EQ(expected.cam2_from_cam1.translation,
+                drive.priors[k].cam2_from_cam1.translation);
+      EXPECT_EQ(expected.covariance, drive.priors[k].covariance);
+    }
+  }
+}
+
+TEST(CorrectCameraMount, LeavesARightMountAsItIs) {
+  for (uint64_t seed = 1; seed <= 8; ++seed) {
+    Drive drive = BuildDrive(DriveOptions(), seed);
+    const Drive before = drive;
+    const CameraMountReport report = Correct(&drive, CameraMountOptions());
+    EXPECT_FALSE(report.corrected) << "seed " << seed;
+    EXPECT_LT(report.chi2, 16.0) << "seed " << seed;
+    for (size_t k = 0; k < drive.priors.size(); ++k) {
+      EXPECT_EQ(drive.priors[k].cam2_from_cam1.translation,
+                before.priors[k].cam2_from_cam1.translation);
+    }
+  }
+}
+
+// Straight ahead nothing tells the roll: it stays zero, the others are found.
+TEST(CorrectCameraMount, KeepsWhatAStraightRoadDoesNotTellAtZero) {
+  DriveOptions options;
+  options.mount_deg = Eigen::Vector3d(0.6, -1.0, 1.5);
+  options.turn_rad = 0.0;
+  Drive drive = BuildDrive(options, 1);
+  const CameraMountReport report = Correct(&drive, CameraMountOptions());
+  ASSERT_TRUE(report.corrected);
+  EXPECT_NEAR(RadToDeg(report.turn_rad.z()), 0.0, 0.1);
+  EXPECT_NEAR(RadToDeg(report.turn_rad.x()), 0.6, 0.15);
+  EXPECT_NEAR(RadToDeg(report.turn_rad.y()), -1.0, 0.15);
+}
+
+// Without wheels the axis of the turns remains.
+TEST(CorrectCameraMount, SeesTheAxisOfTurnsWithoutPositions) {
+  DriveOptions options;
+  options.mount_deg = Eigen::Vector3d(2.0, 0.0, -3.0);
+  options.has_positions = false;
+  Drive drive = BuildDrive(options, 1);
+  const CameraMountReport report = Correct(&drive, CameraMountOptions());
+  ASSERT_TRUE(report.corrected);
+  EXPECT_LT(ErrorDeg(report, options.mount_deg), 0.6);
+}
+
+TEST(CorrectCameraMount, OptionsDecide) {
+  DriveOptions options;
+  options.mount_deg = Eigen::Vector3d(0.0, 0.7, 0.0);
+  const Drive drive = BuildDrive(options, 3);
+  const auto correct = [&](const CameraMountOptions& changed) {
+    Drive copy = drive;
+    return Correct(&copy, changed);
+  };
+  const CameraMountReport report = correct(CameraMountOptions());
+  EXPECT_TRUE(report.corrected);
+  CameraMountOptions changed;
+  changed.enabled = false;
+  EXPECT_FALSE(correct(changed).corrected);
+  changed = CameraMountOptions();
+  changed.min_num_sigmas = 50.0;
+  EXPECT_FALSE(correct(changed).corrected);
+  changed = CameraMountOptions();
+  changed.min_sigma_deg = 0.5;
+  EXPECT_FALSE(correct(changed).corrected);
+  changed = CameraMountOptions();
+  changed.sigma_deg = 0.01;
+  EXPECT_LT(correct(changed).turn_rad.norm(), 0.2 * report.turn_rad.norm());
+  changed = CameraMountOptions();
+  changed.max_num_steps = 2;
+  EXPECT_LT(correct(changed).num_pairs, 0.5 * report.num_pairs);
+  std::string error;
+  changed.max_num_steps = 0;
+  EXPECT_FALSE(changed.IsValid(&error));
+  EXPECT_NE(error.find("max_num_steps"), std::string::npos);
+}
+
+TEST(TurnPrior, KeepsWhatIsNotObservedInfinite) {
+  Random random(1);
+  RelativePosePrior prior = BuildPrior(1, 2, Rigid3d(), 1e-3, 1e-2, &random);
+  prior.covariance.bottomRightCorner<3, 3>().diagonal().setConstant(
+      std::numeric_limits<double>::infinity());
+  TurnPrior(ExpSo3(Eigen::Vector3d(0.1, 0.2, 0.3)), &prior);
+  EXPECT_FALSE(prior.covariance.hasNaN());
+  EXPECT_EQ(prior.covariance(4, 4), std::numeric_limits<double>::infinity());
+}
+
+}  // namespace
+}  // namespace adasfm

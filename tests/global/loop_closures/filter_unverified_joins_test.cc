@@ -1,0 +1,274 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "global/loop_closures/filter_unverified_joins.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <stdexcept>
+
+#include "core/random.h"
+#include "core/so3.h"
+#include "tests/testing/global/test_scene.h"
+
+namespace adasfm {
+namespace {
+
+// Two drives around the same block, a metre an image, and neither sensors nor
+// neighbouring images from one to the other:
+//
+//    60 --<-- 41     ids 1 ... 80, and the second drive 101 ... 180 in lanes a
+//    |         |     metre beside; where an image of one sees one of the other
+//    61       40     there may be a pair.
+//    |         |
+//    80 .. 1 -> 20
+constexpr int kNumImages = 80;
+constexpr image_t kSecond = 100;
+
+Rigid3d PoseAt(int k, bool is_second) {
+  constexpr int kSide = 20;
+  const int side = k / kSide;
+  Eigen::Vector3d center(0.0, is_second ? 1.0 : 0.0, 0.0);
+  Eigen::Vector3d direction = Eigen::Vector3d::UnitX();
+  for (int s = 0; s <= side; ++s) {
+    center += (s < side ? kSide : k % kSide) * direction;
+    if (s < side) direction = Eigen::Vector3d(-direction.y(), direction.x(), 0);
+  }
+  const Eigen::Quaterniond street(
+      Eigen::AngleAxisd(side * std::acos(0.0), Eigen::Vector3d::UnitZ()));
+  return CamFromWorldWithCenter(street.conjugate(), center);
+}
+
+struct Drives {
+  ViewGraph graph;
+  std::vector<std::optional<EdgeLength>> lengths;
+  std::vector<RelativePosePrior> priors;
+};
+
+Rigid3d PoseOf(image_t id) {
+  return id > kSecond ? PoseAt(id - kSecond - 1, true) : PoseAt(id - 1, false);
+}
+
+void AddPair(image_t i, image_t j, const Rigid3d& motion, Drives* drives) {
+  ViewGraphEdge edge = BuildEdge(ImagePair(i, j), motion);
+  edge.cam2_from_cam1.translation.normalize();
+  edge.num_inliers = 100;
+  const auto place = std::upper_bound(
+      drives->graph.edges.begin(), drives->graph.edges.end(), edge,
+      [](const auto& a, const auto& b) { return a.Pair() < b.Pair(); });
+  drives->lengths.insert(
+      drives->lengths.begin() + (place - drives->graph.edges.begin()),
+      EdgeLength{motion.translation.norm(), 0.01});
+  drives->graph.edges.insert(place, edge);
+}
+
+// Sensors on the first drive only.
+Drives BuildDrives(double scale_of_second = 1.0) {
+  Drives drives;
+  Random random(1);
+  for (const image_t offset : {image_t{0}, kSecond}) {
+    for (image_t i = offset + 1; i <= offset + kNumImages; ++i) {
+      drives.graph.images.push_back(i);
+      for (image_t j = i + 1; j <= std::min(i + 3, offset + kNumImages); ++j) {
+        Rigid3d motion = ComputeCam2FromCam1(PoseOf(i), PoseOf(j));
+        if (j == i + 1 && offset == 0) {
+          drives.priors.push_back(
+              BuildPrior(i, j, motion, 1e-4, 1e-3, &random));
+          drives.priors.back().flags =
+              kPriorRotation | kPriorDirection | kPriorLength;
+        }
+        if (offset > 0) motion.translation *= scale_of_second;
+        AddPair(i, j, motion, &drives);
+      }
+    }
+  }
+  return drives;
+}
+
+// Pairs of the images at k in the first drive and k + shift in the second, and
+// what they say: that they lie at k and k + apparent.
+void AddPlace(int begin, int end, int shift, int apparent, Drives* drives) {
+  for (int k = begin; k < end; ++k) {
+    for (const int skew : {0, 1}) {
+      const int j = k + shift + skew;
+      AddPair(k + 1, kSecond + j + 1,
+              ComputeCam2FromCam1(PoseAt(k, false),
+                                  PoseAt(k + apparent + skew, true)),
+              drives);
+    }
+  }
+}
+
+void AddTruePlace(int begin, int end, Drives* drives) {
+  AddPlace(begin, end, 0, 0, drives);
+}
+
+JoinFilterReport Filter(Drives* drives, const JoinFilterOptions& options = {}) {
+  return FilterUnverifiedJoins(options, drives->priors, drives->lengths,
+                               &drives->graph);
+}
+
+int CountKeptJoins(const ViewGraph& graph) {
+  int num_kept = 0;
+  for (const ViewGraphEdge& edge : graph.edges) {
+    if (edge.image_id1 > kSecond || edge.image_id2 <= kSecond) {
+      EXPECT_TRUE(edge.IsKept());
+    } else {
+      num_kept += edge.IsKept();
+    }
+  }
+  return num_kept;
+}
+
+TEST(FilterUnverifiedJoins, OnePlaceJoinsNothing) {
+  Drives drives = BuildDrives();
+  AddTruePlace(3, 18, &drives);
+  const JoinFilterReport report = Filter(&drives);
+  EXPECT_EQ(report.num_parts, 2);
+  EXPECT_EQ(report.num_confirmed, 0);
+  EXPECT_EQ(report.num_removed_pairs, 30);
+  ASSERT_EQ(report.split.size(), 1);
+  EXPECT_EQ(report.split[0].num_pairs, 30);
+  EXPECT_EQ(report.split[0].num_images, kNumImages);
+  EXPECT_LE(report.split[0].image_id1, kSecond);
+  EXPECT_GT(report.split[0].image_id2, kSecond);
+  EXPECT_EQ(CountKeptJoins(drives.graph), 0);
+  EXPECT_EQ(FindConnectedComponents(drives.graph).size(), 2);
+}
+
+TEST(FilterUnverifiedJoins, ASecondPlaceBehindATurnConfirms) {
+  // The unit of the part without sensors is free within a factor of two.
+  for (const double scale : {1.0, 0.7, 1.5}) {
+    Drives drives = BuildDrives(scale);
+    AddTruePlace(3, 10, &drives);
+    AddTruePlace(45, 52, &drives);
+    const JoinFilterReport report = Filter(&drives);
+    EXPECT_EQ(report.num_confirmed, 1) << scale;
+    EXPECT_TRUE(report.split.empty());
+    EXPECT_EQ(CountKeptJoins(drives.graph), 28) << scale;
+  }
+  // In one street both may look alike; farther apart they would count.
+  Drives drives = BuildDrives();
+  AddTruePlace(0, 3, &drives);
+  AddTruePlace(15, 18, &drives);
+  JoinFilterOptions options;
+  options.max_place_images = 12;
+  Drives same = drives;
+  EXPECT_EQ(Filter(&same).num_confirmed, 0);
+  EXPECT_EQ(Filter(&drives, options).num_confirmed, 1);
+}
+
+TEST(FilterUnverifiedJoins, LongRunsAroundCornersConfirmThemselves) {
+  Drives drives = BuildDrives();
+  AddTruePlace(5, 50, &drives);
+  EXPECT_EQ(Filter(&drives).num_confirmed, 1);
+  EXPECT_EQ(CountKeptJoins(drives.graph), 90);
+}
+
+// Places that look alike agree neither with true ones nor with each other.
+TEST(FilterUnverifiedJoins, FalsePlacesGo) {
+  // The second image stands a street further than the pair says.
+  Drives drives = BuildDrives();
+  AddPlace(4, 12, 22, 2, &drives);
+  AddPlace(64, 72, -21, -1, &drives);
+  Drives with_truth = drives;
+  EXPECT_EQ(Filter(&drives).num_confirmed, 0);
+  EXPECT_EQ(CountKeptJoins(drives.graph), 0);
+
+  AddTruePlace(3, 10, &with_truth);
+  AddTruePlace(45, 52, &with_truth);
+  EXPECT_EQ(Filter(&with_truth).num_confirmed, 1);
+  for (const ViewGraphEdge& edge : with_truth.graph.edges) {
+    if (edge.image_id1 > kSecond || edge.image_id2 <= kSecond) continue;
+    const int shift = edge.image_id2 - kSecond - edge.image_id1;
+    EXPECT_EQ(edge.IsKept(), shift == 0 || shift == 1)
+        << edge.image_id1 << " and " << edge.image_id2;
+  }
+}
+
+TEST(FilterUnverifiedJoins, SmallPartsFollowOneOther) {
+  Drives drives = BuildDrives();
+  // One image that sees a little of one drive and more of the other.
+  drives.graph.images.push_back(300);
+  AddPair(10, 300, PoseAt(2, true), &drives);
+  AddPair(kSecond + 10, 300, PoseAt(2, true), &drives);
+  AddPair(kSecond + 11, 300, PoseAt(2, true), &drives);
+  Filter(&drives);
+  for (const ViewGraphEdge& edge : drives.graph.edges) {
+    if (edge.image_id2 != 300) continue;
+    EXPECT_EQ(edge.IsKept(), edge.image_id1 != 10);
+  }
+  EXPECT_EQ(FindConnectedComponents(drives.graph).size(), 2);
+}
+
+TEST(FilterUnverifiedJoins, SensorsAndNeighboursMakeOnePart) {
+  Drives drives = BuildDrives();
+  AddTruePlace(3, 10, &drives);
+  // A prior over the gap.
+  Drives joined = drives;
+  joined.priors.push_back(joined.priors.front());
+  joined.priors.back().image_id1 = kNumImages;
+  joined.priors.back().image_id2 = kSecond + 1;
+  EXPECT_EQ(Filter(&joined).num_parts, 1);
+  EXPECT_EQ(CountKeptJoins(joined.graph), 14);
+  // A rotation alone leaves the places open.
+  Drives turned = drives;
+  turned.priors.push_back(joined.priors.back());
+  turned.priors.back().flags = kPriorRotation;
+  EXPECT_EQ(Filter(&turned).num_parts, 2);
+  // Ids that follow each other.
+  JoinFilterOptions options;
+  options.max_sequence_gap = 30;
+  AddPair(kNumImages, kSecond + 1,
+          ComputeCam2FromCam1(PoseOf(kNumImages), PoseOf(kSecond + 1)),
+          &drives);
+  EXPECT_EQ(Filter(&drives, options).num_parts, 1);
+}
+
+// Every field decides something.
+TEST(FilterUnverifiedJoins, OptionsDecide) {
+  Drives places = BuildDrives(1.0);
+  AddTruePlace(3, 10, &places);
+  // The second place is off by two metres in 42, and by two degrees.
+  for (int k = 45; k < 52; ++k) {
+    Rigid3d second = PoseAt(k, true);
+    second.translation.x() += 2.0;
+    second.rotation = ExpSo3(Eigen::Vector3d(0, 0, 0.035)) * second.rotation;
+    AddPair(k + 1, kSecond + k + 1,
+            ComputeCam2FromCam1(PoseAt(k, false), second), &places);
+  }
+  const auto confirms =
+      [&places](std::function<void(JoinFilterOptions*)> change) {
+        Drives copy = places;
+        JoinFilterOptions options;
+        change(&options);
+        return Filter(&copy, options).num_confirmed == 1;
+      };
+  EXPECT_TRUE(confirms([](JoinFilterOptions*) {}));
+  EXPECT_FALSE(confirms([](auto* o) { o->max_position_error_ratio = 0.01; }));
+  EXPECT_FALSE(confirms([](auto* o) { o->max_rotation_error_deg = 1.0; }));
+  EXPECT_FALSE(confirms([](auto* o) { o->min_turn_deg = 181.0; }));
+  EXPECT_FALSE(confirms([](auto* o) { o->min_num_pairs = 9; }));
+  // Too small to be judged.
+  EXPECT_TRUE(confirms([](auto* o) {
+    o->min_turn_deg = 181.0;
+    o->min_num_images = kNumImages + 1;
+  }));
+  for (int i = 0; i < 7; ++i) {
+    JoinFilterOptions options;
+    std::string error;
+    if (i == 0) options.max_sequence_gap = 0;
+    if (i == 1) options.min_num_images = 0;
+    if (i == 2) options.min_turn_deg = 0.0;
+    if (i == 3) options.max_place_images = 0;
+    if (i == 4) options.min_num_pairs = 0;
+    if (i == 5) options.max_rotation_error_deg = std::nan("");
+    if (i == 6) options.max_position_error_ratio = -1.0;
+    EXPECT_FALSE(options.IsValid(&error)) << i;
+    EXPECT_THROW(Filter(&places, options), std::invalid_argument) << i;
+  }
+}
+
+}  // namespace
+}  // namespace adasfm

@@ -1,0 +1,174 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "global/odometry/odometry_chain.h"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Eigenvalues>
+
+#include "core/so3.h"
+#include "tests/testing/global/test_scene.h"
+#include "tests/testing/matchers.h"
+
+namespace adasfm {
+namespace {
+
+using Matrix6d = Eigen::Matrix<double, 6, 6>;
+
+// A bent drive: 1 m a step.
+Rigid3d TrueStep(int k) {
+  return Rigid3d(ExpSo3(Eigen::Vector3d(0.002, 0.03 * std::sin(0.05 * k), 0)),
+                 Eigen::Vector3d(0.02, 0.01, -1.0));
+}
+
+TEST(OdometryChain, ComposesBothWays) {
+  Random random(1);
+  std::vector<RelativePosePrior> priors;
+  for (int k = 1; k < 30; ++k) {
+    priors.push_back(BuildPrior(k, k + 1, TrueStep(k), 0, 0, &random));
+  }
+  const OdometryChain chain(priors, OdometryChainOptions());
+  Rigid3d expected;
+  for (int k = 5; k < 20; ++k) expected = TrueStep(k) * expected;
+  EXPECT_TRUE(
+      PosesNear(chain.Motion(5, 20).cam2_from_cam1, expected, 1e-9, 1e-9));
+  EXPECT_TRUE(PosesNear(chain.Motion(20, 5).cam2_from_cam1, expected.Inverse(),
+                        1e-9, 1e-9));
+  EXPECT_EQ(chain.NumSteps(5, 20), 15);
+  EXPECT_EQ(chain.NumSteps(20, 5), -15);
+}
+
+TEST(OdometryChain, BreaksWherePriorsAreMissing) {
+  Random random(1);
+  std::vector<RelativePosePrior> priors;
+  for (int k = 1; k < 10; ++k) {
+    if (k == 5) continue;
+    priors.push_back(BuildPrior(k, k + 1, TrueStep(k), 0, 0, &random));
+  }
+  priors[1].flags = kPriorRotation;
+  const OdometryChain chain(priors, OdometryChainOptions());
+  EXPECT_TRUE(chain.IsConnected(1, 5));
+  EXPECT_FALSE(chain.IsConnected(5, 6));
+  EXPECT_FALSE(chain.IsConnected(1, 77));
+  EXPECT_THROW(chain.Motion(5, 6), std::invalid_argument);
+  EXPECT_TRUE(chain.Motion(1, 5).has_rotation);
+  EXPECT_FALSE(chain.Motion(1, 5).has_position);
+  EXPECT_TRUE(chain.Motion(3, 5).has_position);
+}
+
+// Draws chains with white noise and common errors; their spread must be the
+// covariance that the chain states.
+TEST(OdometryChain, CovarianceAgreesWithMonteCarlo) {
+  constexpr int kNumSteps = 120;
+  constexpr int kNumDraws = 1500;
+  constexpr double kRotationSigma = 2e-4;
+  constexpr double kTranslationSigma = 0.01;
+  OdometryChainOptions options;
+  options.scale_sigma = 0.004;
+  options.gyro_bias_sigma_rad_s = 5e-4;
+  options.persistent_translation_ratio = 0.3;
+  Random random(7);
+  const auto draw = [&](double rotation_sigma, double translation_sigma,
+                        double scale, const Eigen::Vector3d& bias,
+                        const Eigen::Vector3d& persistent) {
+    std::vector<RelativePosePrior> priors;
+    for (int k = 1; k <= kNumSteps; ++k) {
+      Rigid3d step = TrueStep(k);
+      step.rotation = ExpSo3(0.1 * bias) * step.rotation;
+      step.translation = scale * step.translation + persistent;
+      priors.push_back(BuildPrior(k, k + 1, step, rotation_sigma,
+                                  translation_sigma, &random));
+      priors.back().covariance.diagonal()
+          << Eigen::Vector3d::Constant(kRotationSigma * kRotationSigma),
+          Eigen::Vector3d::Constant(kTranslationSigma * kTranslationSigma);
+    }
+    return OdometryChain(priors, options);
+  };
+  const OdometryChain truth =
+      draw(0, 0, 1.0, Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero());
+  for (const auto& [from, to] :
+       std::vector<std::pair<image_t, image_t>>{{11, 111}, {111, 31}}) {
+    Matrix6d sampled = Matrix6d::Zero();
+    const ChainMotion expected = truth.Motion(from, to);
+    for (int k = 0; k < kNumDraws; ++k) {
+      const Rigid3d drawn =
+          draw(kRotationSigma, kTranslationSigma,
+               1.0 + random.Gaussian(options.scale_sigma),
+               random.GaussianVector(options.gyro_bias_sigma_rad_s),
+               random.GaussianVector(options.persistent_translation_ratio *
+                                     kTranslationSigma))
+              .Motion(from, to)
+              .cam2_from_cam1;
+      Eigen::Matrix<double, 6, 1> error;
+      error << LogSo3(drawn.rotation *
+                      expected.cam2_from_cam1.rotation.conjugate()),
+          drawn.translation - expected.cam2_from_cam1.translation;
+      sampled += error * error.transpose() / kNumDraws;
+    }
+    // In the frame in which the stated covariance is the identity, sampled
+    // variances have a standard error of sqrt(2 / n) = 3.7 %.
+    const Matrix6d whitener =
+        Matrix6d(expected.covariance.llt().matrixL()).inverse();
+    const Eigen::SelfAdjointEigenSolver<Matrix6d> eigen(whitener * sampled *
+                                                        whitener.transpose());
+    EXPECT_GT(eigen.eigenvalues().minCoeff(), 0.8);
+    EXPECT_LT(eigen.eigenvalues().maxCoeff(), 1.2);
+  }
+}
+
+// The scale changes at each step, and nothing brings it back: a drive round a
+// block does not close then.
+TEST(OdometryChain, ScaleDriftAgreesWithMonteCarlo) {
+  constexpr int kNumSteps = 120;
+  constexpr int kNumDraws = 1500;
+  OdometryChainOptions options;
+  options.scale_sigma = 0.0;
+  options.gyro_bias_sigma_rad_s = 0.0;
+  options.scale_drift_ratio = 0.01;
+  Random random(7);
+  const auto draw = [&](double drift_ratio) {
+    std::vector<RelativePosePrior> priors;
+    double scale = 1.0;
+    for (int k = 1; k <= kNumSteps; ++k) {
+      Rigid3d step = TrueStep(k);
+      step.rotation = ExpSo3(Eigen::Vector3d(0.0, 0.05, 0.0)) * step.rotation;
+      scale *= std::exp(random.Gaussian(drift_ratio));
+      step.translation *= scale;
+      priors.push_back(BuildPrior(k, k + 1, step, 0, 0, &random));
+      priors.back().covariance = 1e-8 * Matrix6d::Identity();
+    }
+    return OdometryChain(priors, options);
+  };
+  const OdometryChain truth = draw(0.0);
+  for (const auto& [from, to] :
+       std::vector<std::pair<image_t, image_t>>{{1, 116}, {111, 31}}) {
+    const ChainMotion expected = truth.Motion(from, to);
+    const Eigen::Matrix3d covariance =
+        expected.covariance.bottomRightCorner<3, 3>();
+    Eigen::Matrix3d sampled = Eigen::Matrix3d::Zero();
+    for (int k = 0; k < kNumDraws; ++k) {
+      const OdometryChain drawn = draw(options.scale_drift_ratio);
+      // The part before the earlier image scales the whole; only the change
+      // since then is the chain's.
+      const image_t earlier = std::min(from, to);
+      const double scale =
+          drawn.Motion(earlier, earlier + 1).cam2_from_cam1.translation.norm() /
+          truth.Motion(earlier, earlier + 1).cam2_from_cam1.translation.norm();
+      const Eigen::Vector3d error =
+          drawn.Motion(from, to).cam2_from_cam1.translation / scale -
+          expected.cam2_from_cam1.translation;
+      sampled += error * error.transpose() / kNumDraws;
+    }
+    // As above; the drift is 10 % after 100 steps, which is not quite linear.
+    const Eigen::Matrix3d whitener =
+        Eigen::Matrix3d(covariance.llt().matrixL()).inverse();
+    const Eigen::Vector3d eigenvalues =
+        Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(whitener * sampled *
+                                                       whitener.transpose())
+            .eigenvalues();
+    EXPECT_LT(eigenvalues.maxCoeff(), 1.25);
+    EXPECT_NEAR(sampled.trace(), covariance.trace(), 0.2 * covariance.trace());
+  }
+}
+
+}  // namespace
+}  // namespace adasfm

@@ -1,0 +1,155 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "global/odometry/visual_steps.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "global/odometry/odometry_chain.h"
+#include "tests/testing/global/test_scene.h"
+
+namespace adasfm {
+namespace {
+
+constexpr int kNumImages = 12;
+
+struct StepProblem {
+  TestScene scene;
+  std::vector<RelativePosePrior> priors;
+  std::map<ImagePair, double> known_lengths_m;
+};
+
+// An arc of which the sensors saw the rotations, and the positions of the steps
+// that has_position picks.
+template <typename Function>
+StepProblem BuildProblem(uint64_t seed, Function has_position) {
+  StepProblem problem;
+  TestSceneOptions options;
+  options.num_images = kNumImages;
+  options.noise_px = 0.3;
+  problem.scene = BuildTestScene(options, seed);
+  Random random(seed);
+  const auto& poses = problem.scene.cams_from_world;
+  for (auto it = poses.begin(); std::next(it) != poses.end(); ++it) {
+    const auto next = std::next(it);
+    RelativePosePrior prior = BuildPrior(
+        it->first, next->first, ComputeCam2FromCam1(it->second, next->second),
+        1e-4, 1e-3, &random);
+    if (has_position(static_cast<int>(problem.priors.size()))) {
+      problem.known_lengths_m[ImagePair(it->first, next->first)] =
+          prior.cam2_from_cam1.translation.norm();
+    } else {
+      prior.flags = kPriorRotation;
+      prior.cam2_from_cam1.translation.setZero();
+    }
+    problem.priors.push_back(prior);
+  }
+  return problem;
+}
+
+VisualSteps Complete(const StepProblem& problem,
+                     const VisualStepOptions& options = {}) {
+  return AddVisualSteps(options, EdgeLengthOptions(), problem.scene.graph,
+                        problem.scene.correspondences, problem.known_lengths_m,
+                        problem.priors);
+}
+
+// The way from the first image to the last, as the completed chain has it.
+double LengthRatioOfTheWay(const StepProblem& problem,
+                           const VisualSteps& steps) {
+  const OdometryChain chain(steps.priors, OdometryChainOptions());
+  const auto& poses = problem.scene.cams_from_world;
+  const ChainMotion motion =
+      chain.Motion(poses.begin()->first, poses.rbegin()->first);
+  EXPECT_TRUE(motion.has_position);
+  const Rigid3d truth =
+      ComputeCam2FromCam1(poses.begin()->second, poses.rbegin()->second);
+  EXPECT_GT(motion.cam2_from_cam1.translation.normalized().dot(
+                truth.translation.normalized()),
+            0.99);
+  return motion.cam2_from_cam1.translation.norm() / truth.translation.norm();
+}
+
+TEST(AddVisualSteps, SpreadsMetresToTheStepsWithoutPosition) {
+  for (uint64_t seed = 1; seed <= 3; ++seed) {
+    const StepProblem problem = BuildProblem(seed, [](int k) { return k < 4; });
+    const VisualSteps steps = Complete(problem);
+    EXPECT_EQ(steps.num_by_vision, kNumImages - 1 - 4);
+    EXPECT_EQ(steps.num_coasting, 0);
+    EXPECT_EQ(steps.unit_m, 1.0);
+    EXPECT_NEAR(LengthRatioOfTheWay(problem, steps), 1.0, 0.1) << seed;
+    // What the sensors saw stays.
+    EXPECT_EQ(steps.priors[2].cam2_from_cam1.translation,
+              problem.priors[2].cam2_from_cam1.translation);
+  }
+}
+
+TEST(AddVisualSteps, WithoutMetresTheUnitIsAStep) {
+  const StepProblem problem = BuildProblem(1, [](int) { return false; });
+  const VisualSteps steps = Complete(problem);
+  EXPECT_EQ(steps.num_by_vision, kNumImages - 1);
+  const double first = steps.priors[0].cam2_from_cam1.translation.norm();
+  const auto& poses = problem.scene.cams_from_world;
+  const double truth = ComputeCam2FromCam1(poses.begin()->second,
+                                           std::next(poses.begin())->second)
+                           .translation.norm();
+  EXPECT_NEAR(LengthRatioOfTheWay(problem, steps), first / truth,
+              0.1 * first / truth);
+  EXPECT_NEAR(steps.unit_m, first, 0.5 * first);
+}
+
+double TranslationVariance(const RelativePosePrior& prior) {
+  return prior.covariance.bottomRightCorner<3, 3>().trace();
+}
+
+// Vision that drifts more is believed less.
+TEST(AddVisualSteps, SigmasFollowTheOptions) {
+  const StepProblem problem = BuildProblem(1, [](int) { return false; });
+  VisualStepOptions options;
+  const double plain = TranslationVariance(Complete(problem).priors[3]);
+  options.length_error_ratio *= 3.0;
+  options.direction_error_deg *= 3.0;
+  EXPECT_GT(TranslationVariance(Complete(problem, options).priors[3]),
+            4.0 * plain);
+}
+
+TEST(AddVisualSteps, GoesOnWhereNothingSees) {
+  StepProblem problem = BuildProblem(1, [](int k) { return k < 4 || k >= 7; });
+  for (ViewGraphEdge& edge : problem.scene.graph.edges) {
+    if (edge.image_id1 <= 7 && edge.image_id2 >= 6) {
+      edge.removal = EdgeRemoval::kFewInliers;
+    }
+  }
+  const VisualSteps steps = Complete(problem);
+  EXPECT_EQ(steps.num_coasting + steps.num_by_vision, 3);
+  EXPECT_GT(steps.num_coasting, 0);
+  EXPECT_NEAR(LengthRatioOfTheWay(problem, steps), 1.0, 0.1);
+  VisualStepOptions options;
+  options.max_coasting_s = 0.01;
+  EXPECT_EQ(Complete(problem, options).num_coasting, 0);
+}
+
+TEST(AddVisualSteps, ContinuesAnInterruptedChain) {
+  StepProblem problem = BuildProblem(1, [](int) { return true; });
+  problem.priors.erase(problem.priors.begin() + 5);
+  const VisualSteps steps = Complete(problem);
+  EXPECT_EQ(steps.priors.size(), kNumImages - 1);
+  EXPECT_EQ(steps.num_by_vision, 1);
+  EXPECT_NEAR(LengthRatioOfTheWay(problem, steps), 1.0, 0.1);
+}
+
+TEST(VisualStepOptions, NamesWhatIsWrong) {
+  VisualStepOptions options;
+  std::string error;
+  EXPECT_TRUE(options.IsValid(&error));
+  options.max_num_steps = 0;
+  EXPECT_FALSE(options.IsValid(&error));
+  EXPECT_NE(error.find("max_num_steps"), std::string::npos);
+  options = VisualStepOptions();
+  options.max_coasting_s = -1.0;
+  EXPECT_FALSE(options.IsValid(&error));
+  EXPECT_NE(error.find("max_coasting_s"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace adasfm

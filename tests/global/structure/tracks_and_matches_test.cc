@@ -1,0 +1,191 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <set>
+
+#include "core/so3.h"
+#include "global/structure/match_refinement.h"
+#include "global/structure/tracks.h"
+#include "global/structure/triangulate_tracks.h"
+#include "tests/testing/global/test_scene.h"
+
+namespace adasfm {
+namespace {
+
+std::vector<Track> BuildTracks(
+    const TrackOptions& options,
+    const std::map<ImagePair, std::vector<FeatureMatch>>& matches) {
+  return SelectTracks(options, JoinMatches(options, matches));
+}
+
+// Images 1 2 3; keypoint 0 everywhere is one point, and a wrong match would
+// join keypoint 5 of image 3 to it:
+//   1:0 - 2:0 - 3:0      2:0 - 3:5 (in a pair with fewer matches, so later)
+TEST(BuildTracks, KeepsOneKeypointPerImage) {
+  std::map<ImagePair, std::vector<FeatureMatch>> matches;
+  matches[ImagePair(1, 2)] = {{0, 0}, {1, 1}, {2, 2}};
+  matches[ImagePair(1, 3)] = {{0, 0}, {1, 1}};
+  matches[ImagePair(2, 3)] = {{0, 5}};
+  const std::vector<Track> tracks = BuildTracks(TrackOptions(), matches);
+  ASSERT_EQ(tracks.size(), 2);
+  EXPECT_EQ(tracks[0], (Track{{1, 0}, {2, 0}, {3, 0}}));
+  EXPECT_EQ(tracks[1], (Track{{1, 1}, {2, 1}, {3, 1}}));
+  TrackOptions options;
+  options.min_track_length = 2;
+  EXPECT_EQ(BuildTracks(options, matches).size(), 3);
+  options.max_num_tracks = 1;
+  EXPECT_EQ(BuildTracks(options, matches).size(), 1);
+  options = TrackOptions();
+  options.min_num_tracks_per_image = 1;
+  EXPECT_EQ(BuildTracks(options, matches).size(), 1);
+}
+
+TEST(BuildTracks, ShortensLongTracksEvenly) {
+  constexpr int kNumImages = 40;
+  constexpr int kNumTracks = 64;
+  std::map<ImagePair, std::vector<FeatureMatch>> matches;
+  for (image_t i = 1; i < kNumImages; ++i) {
+    for (point2D_t k = 0; k < kNumTracks; ++k) {
+      matches[ImagePair(i, i + 1)].push_back({k, k});
+    }
+  }
+  for (const int max_length : {3, 4, 12, 39, 40, 50}) {
+    TrackOptions options;
+    options.max_track_length = max_length;
+    const std::vector<Track> tracks = BuildTracks(options, matches);
+    ASSERT_EQ(tracks.size(), kNumTracks);
+    std::map<image_t, int> num_tracks;
+    const int length = std::min(max_length, kNumImages);
+    for (const Track& track : tracks) {
+      ASSERT_EQ(track.size(), length);
+      EXPECT_EQ(track.front().image_id, 1);
+      EXPECT_EQ(track.back().image_id, kNumImages);
+      for (int k = 1; k < length; ++k) {
+        EXPECT_EQ(track[k].point2D_idx, track[0].point2D_idx);
+        EXPECT_GT(track[k].image_id, track[k - 1].image_id);
+        if (length > 3) {
+          EXPECT_LE(track[k].image_id - track[k - 1].image_id,
+                    2 * (kNumImages - 1) / (length - 2));
+        }
+      }
+      for (const TrackElement& element : track) ++num_tracks[element.image_id];
+    }
+    // No image falls out of all tracks.
+    if (max_length >= 12) {
+      EXPECT_EQ(num_tracks.size(), kNumImages);
+    }
+  }
+}
+
+TEST(EstimateTrackBytes, CoversTheTracksAndGrowsWithTheMatches) {
+  std::map<ImagePair, std::vector<FeatureMatch>> matches;
+  EXPECT_EQ(EstimateTrackBytes(matches), 0);
+  size_t last = 0;
+  for (image_t i = 1; i < 30; ++i) {
+    for (point2D_t k = 0; k < 100; ++k) {
+      matches[ImagePair(i, i + 1)].push_back({k, k});
+    }
+    const size_t estimate = EstimateTrackBytes(matches);
+    EXPECT_GT(estimate, last);
+    last = estimate;
+    size_t num_bytes = 0;
+    TrackOptions options;
+    options.min_track_length = 2;
+    for (const Track& track : BuildTracks(options, matches)) {
+      num_bytes += sizeof(Track) + track.capacity() * sizeof(TrackElement);
+    }
+    EXPECT_GT(estimate, num_bytes);
+  }
+}
+
+TEST(TriangulateTracks, FindsThePointsDespiteWrongObservations) {
+  for (const bool fisheye : {false, true}) {
+    TestSceneOptions options;
+    options.noise_px = 0.3;
+    options.fisheye = fisheye;
+    const TestScene scene = BuildTestScene(options, 1);
+    std::vector<Track> tracks;
+    for (point2D_t k = 0; k < options.num_landmarks; ++k) {
+      tracks.emplace_back();
+      for (const image_t image_id : scene.graph.images) {
+        // Image 4 sees something else.
+        const point2D_t wrong = (k + 7) % options.num_landmarks;
+        tracks.back().push_back({image_id, image_id == 4 ? wrong : k});
+      }
+    }
+    TrackTriangulationOptions triangulation;
+    triangulation.max_reproj_error_px = 4.0;
+    const auto points =
+        TriangulateTracks(triangulation, scene.cams_from_world,
+                          scene.correspondences.bearings, tracks);
+    EXPECT_GT(points.size(), 0.95 * tracks.size());
+    for (const TriangulatedTrack& point : points) {
+      const Eigen::Vector3d& truth =
+          scene.landmarks[point.track.front().point2D_idx];
+      // 0.3 px at 20 m over a baseline of some 5 m and at least 250 px.
+      EXPECT_LT((point.point_in_world - truth).norm(), 0.6);
+      EXPECT_GE(point.angle_deg, triangulation.min_triangulation_angle_deg);
+      EXPECT_LT(point.mean_reproj_error_px, 2.0);
+    }
+    triangulation.min_triangulation_angle_deg = 90.0;
+    EXPECT_TRUE(TriangulateTracks(triangulation, scene.cams_from_world,
+                                  scene.correspondences.bearings, tracks)
+                    .empty());
+  }
+}
+
+TEST(RefineMatches, RecoversTrueMatchesAndDropsFalseOnes) {
+  for (const bool fisheye : {false, true}) {
+    TestSceneOptions options;
+    options.noise_px = 0.5;
+    options.outlier_ratio = 0.4;
+    options.fisheye = fisheye;
+    const TestScene scene = BuildTestScene(options, 2);
+    const MatchRefinementReport report = RefineMatches(
+        MatchRefinementOptions(), scene.cams_from_world,
+        scene.correspondences.bearings, scene.correspondences.matches);
+    int num_true = 0;
+    int num_true_kept = 0;
+    int num_kept = 0;
+    for (const auto& [pair, matches] : scene.correspondences.matches) {
+      for (const FeatureMatch& match : matches) {
+        num_true += match.point2D_idx1 == match.point2D_idx2;
+      }
+    }
+    for (const RefinedPair& pair : report.pairs) {
+      for (const FeatureMatch& match : pair.matches) {
+        ++num_kept;
+        num_true_kept += match.point2D_idx1 == match.point2D_idx2;
+      }
+    }
+    // Twice 0.7 px of noise against 4 px: nearly all; a wrong match lies in the
+    // band by chance in about 4 px of 500.
+    EXPECT_GT(num_true_kept, 0.97 * num_true);
+    EXPECT_GT(num_true_kept, 0.96 * num_kept);
+    EXPECT_EQ(report.num_removed_pairs, 0);
+  }
+}
+
+TEST(RefineMatches, RemovesPairsAndSkipsImagesWithoutPose) {
+  const TestScene scene = BuildTestScene(TestSceneOptions(), 2);
+  auto candidates = scene.correspondences.matches;
+  candidates[ImagePair(1, 2)].resize(10);
+  auto poses = scene.cams_from_world;
+  poses.erase(8);
+  const MatchRefinementReport report =
+      RefineMatches(MatchRefinementOptions(), poses,
+                    scene.correspondences.bearings, candidates);
+  EXPECT_EQ(report.num_removed_pairs, 1);
+  EXPECT_TRUE(report.pairs.front().removed);
+  EXPECT_EQ(report.num_skipped_pairs, 4);
+  MatchRefinementOptions options;
+  options.min_num_matches = 10;
+  EXPECT_EQ(
+      RefineMatches(options, poses, scene.correspondences.bearings, candidates)
+          .num_removed_pairs,
+      0);
+}
+
+}  // namespace
+}  // namespace adasfm

@@ -1,0 +1,261 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/random.h"
+#include "core/so3.h"
+#include "sensors/calibration_check/rotation_comparison.h"
+#include "sensors/io/log_checks.h"
+#include "tests/testing/sensors/synthetic_dataset.h"
+
+namespace adasfm {
+namespace {
+
+// What users get wrong, and the words that must be in the answer.
+struct Mistake {
+  const char* name;
+  void (*make)(Dataset*);
+  const char* words;
+};
+
+class Mistakes : public testing::TestWithParam<Mistake> {};
+
+TEST_P(Mistakes, AreNamed) {
+  for (const uint64_t seed : {1, 2, 3}) {
+    const SyntheticWorld world = BuildSyntheticWorld(SmallWorld(seed, 120));
+    Dataset data = ToDataset(world);
+    GetParam().make(&data);
+    // As the importer does: first the reader's checks of the log alone.
+    const Status units = CheckImuUnits(
+        data.logs.imu,
+        LogOrigin::Numbered("imu.csv", data.logs.imu.size(), "line"));
+    if (!units.ok()) {
+      EXPECT_NE(units.message().find(GetParam().words), std::string::npos)
+          << units.message();
+      EXPECT_NE(units.message().find("imu.csv, line"), std::string::npos);
+      continue;
+    }
+    const std::vector<VisualRotation> vision = SimulateVision(world, seed);
+    const StatusOr<PriorEstimate> estimate =
+        EstimatePriors(data.images, data.logs, data.calibration, vision, {});
+    ASSERT_FALSE(estimate.ok()) << GetParam().name;
+    EXPECT_NE(estimate.status().message().find(GetParam().words),
+              std::string::npos)
+        << estimate.status().message();
+    // The user may insist.
+    PriorEstimationOptions options;
+    options.check_against_vision = false;
+    EXPECT_TRUE(EstimatePriors(data.images, data.logs, data.calibration, vision,
+                               options)
+                    .ok());
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Table, Mistakes,
+    testing::Values(Mistake{"SwappedAxes",
+                            [](Dataset* data) {
+                              for (ImuSample& s : data->logs.imu) {
+                                std::swap(s.angular_velocity.y(),
+                                          s.angular_velocity.z());
+                                std::swap(s.specific_force.y(),
+                                          s.specific_force.z());
+                              }
+                            },
+                            "axes"},
+                    Mistake{"InvertedExtrinsics",
+                            [](Dataset* data) {
+                              data->calibration.cam_from_imu =
+                                  data->calibration.cam_from_imu.Inverse();
+                            },
+                            "inverted"},
+                    Mistake{"Degrees",
+                            [](Dataset* data) {
+                              for (ImuSample& s : data->logs.imu) {
+                                s.angular_velocity *= RadToDeg(1.0);
+                              }
+                            },
+                            "deg/s"},
+                    Mistake{"GravitiesForMetres",
+                            [](Dataset* data) {
+                              for (ImuSample& s : data->logs.imu) {
+                                s.specific_force /= 9.81;
+                              }
+                            },
+                            "m/s^2"},
+                    Mistake{"OneSecond",
+                            [](Dataset* data) {
+                              for (ImuSample& s : data->logs.imu) {
+                                s.timestamp_ns += 1'000'000'000;
+                              }
+                            },
+                            "timeshift_cam_imu"}),
+    [](const testing::TestParamInfo<Mistake>& mistake) {
+      return mistake.param.name;
+    });
+
+TEST(VisionCheck, FindsTheTimeShift) {
+  for (const uint64_t seed : {1, 2, 3}) {
+    SyntheticWorldOptions world_options = SmallWorld(seed, 120);
+    world_options.timeshift_cam_imu_s = 0.0623;
+    const SyntheticWorld world = BuildSyntheticWorld(world_options);
+    Dataset data = ToDataset(world);
+    data.calibration.timeshift_cam_imu_s = 0.0;
+    PriorEstimationOptions options;
+    options.estimate_time_shift = true;
+    const StatusOr<PriorEstimate> estimate =
+        EstimatePriors(data.images, data.logs, data.calibration,
+                       SimulateVision(world, seed), options);
+    ASSERT_TRUE(estimate.ok()) << estimate.status().message();
+    EXPECT_NEAR(estimate->summary.timeshift_cam_imu_s, 0.0623, 0.01);
+  }
+}
+
+// Between two frames (0.2 s) the shift is found to a hundredth of a frame, as
+// far to one side as to the other, also with a slightly turned T_cam_imu.
+TEST(VisionCheck, TimeShiftsAreExactAndUnbiased) {
+  constexpr int kNumSeeds = 20;
+  double sum = 0.0, squares = 0.0;
+  for (int seed = 1; seed <= kNumSeeds; ++seed) {
+    SyntheticWorldOptions world_options = SmallWorld(seed, 120);
+    world_options.timeshift_cam_imu_s = 0.0623 + 0.003 * (seed - 10);
+    const SyntheticWorld world = BuildSyntheticWorld(world_options);
+    Dataset data = ToDataset(world);
+    data.calibration.timeshift_cam_imu_s = 0.0;
+    Random random(seed);
+    data.calibration.cam_from_imu.rotation =
+        ExpSo3(random.GaussianVector(DegToRad(0.5))) *
+        data.calibration.cam_from_imu.rotation;
+    PriorEstimationOptions options;
+    options.estimate_time_shift = true;
+    const StatusOr<PriorEstimate> estimate =
+        EstimatePriors(data.images, data.logs, data.calibration,
+                       SimulateVision(world, seed, {1e-3, 3, 0.02}), options);
+    ASSERT_TRUE(estimate.ok()) << estimate.status().message();
+    const double error = estimate->summary.timeshift_cam_imu_s -
+                         world_options.timeshift_cam_imu_s;
+    sum += error;
+    squares += error * error;
+  }
+  const double rms = std::sqrt(squares / kNumSeeds);
+  EXPECT_LT(rms, 0.002);
+  EXPECT_LT(std::abs(sum / kNumSeeds), 3.0 * rms / std::sqrt(kNumSeeds));
+  RecordProperty("rms_ms", std::to_string(1e3 * rms));
+  RecordProperty("mean_ms", std::to_string(1e3 * sum / kNumSeeds));
+}
+
+// A straight road hardly turns the cameras: what little there is drowns in the
+// noise of vision, and no refusal may come of that.
+TEST(VisionCheck, AcceptsARightCalibrationOnAStraightRoad) {
+  for (uint64_t seed = 1; seed <= 20; ++seed) {
+    SyntheticWorldOptions options = SmallWorld(seed, 51);
+    options.trajectory = SyntheticTrajectory::kStraight;
+    options.standstill_s = seed % 2 == 0 ? 3.0 : 0.0;
+    const SyntheticWorld world = BuildSyntheticWorld(options);
+    const Dataset data = ToDataset(world);
+    for (const double sigma_deg : {0.02, 0.1, 0.5}) {
+      const VisionNoise noise = {DegToRad(sigma_deg), 3, 0.02};
+      const StatusOr<PriorEstimate> estimate =
+          EstimatePriors(data.images, data.logs, data.calibration,
+                         SimulateVision(world, seed, noise), {});
+      EXPECT_TRUE(estimate.ok()) << "seed " << seed << ", noise " << sigma_deg
+                                 << " deg: " << estimate.status().message();
+    }
+  }
+}
+
+// Images of one drive with the log of another: refused, or at the least not
+// called agreement (two drives through blocks may bend at the same times).
+TEST(VisionCheck, NoticesTheLogOfAnotherDrive) {
+  int num_refused = 0;
+  for (const uint64_t seed : {1, 2, 3, 4, 5, 6}) {
+    const SyntheticWorld world = BuildSyntheticWorld(SmallWorld(seed, 120));
+    const SyntheticWorld other =
+        BuildSyntheticWorld(SmallWorld(seed + 100, 120));
+    Dataset data = ToDataset(world);
+    data.logs = ToDataset(other).logs;
+    const StatusOr<PriorEstimate> estimate =
+        EstimatePriors(data.images, data.logs, data.calibration,
+                       SimulateVision(world, seed), {});
+    num_refused += !estimate.ok();
+    if (!estimate.ok()) continue;
+    ASSERT_FALSE(estimate->summary.warnings.empty()) << "seed " << seed;
+    EXPECT_NE(estimate->summary.warnings[0].find("cannot be checked"),
+              std::string::npos);
+  }
+  EXPECT_GE(num_refused, 3);
+}
+
+// Under the truth, a wrong explanation is e^x times likelier in at most e^-x of
+// all cases, whether errors have short tails or long ones.
+TEST(Evidence, OfChanceIsSmall) {
+  Random random(1);
+  constexpr int kNumTrials = 5000;
+  for (const double wrong_ratio : {0.0, 0.1}) {
+    int num_beyond_three = 0;
+    for (int trial = 0; trial < kNumTrials; ++trial) {
+      std::vector<double> truth, wrong;
+      for (int i = 0; i < 60; ++i) {
+        const bool is_wrong = random.Uniform(0.0, 1.0) < wrong_ratio;
+        const Eigen::Vector3d error = random.GaussianVector(is_wrong ? 9 : 1);
+        truth.push_back(error.norm());
+        wrong.push_back((error + random.GaussianVector(0.2)).norm());
+      }
+      num_beyond_three += ComputeEvidence(truth, wrong, 1.0) > 3.0;
+    }
+    // e^-3 of them would be 249.
+    EXPECT_LE(num_beyond_three, 249);
+  }
+}
+
+TEST(Evidence, CountsRepeatsOnceAndHasASign) {
+  const std::vector<double> small(20, 0.1), large(20, 1.0);
+  const double evidence = ComputeEvidence(large, small, 1.0);
+  EXPECT_GT(evidence, 20.0);
+  EXPECT_NEAR(ComputeEvidence(large, small, 4.0), evidence / 4.0, 1e-9);
+  EXPECT_LT(ComputeEvidence(small, large, 1.0), -20.0);
+  EXPECT_EQ(ComputeEvidence(large, large, 1.0), 0.0);
+}
+
+TEST(VisionCheck, AcceptsARightCalibration) {
+  for (const uint64_t seed : {4, 5, 6}) {
+    const SyntheticWorld world = BuildSyntheticWorld(SmallWorld(seed));
+    const Dataset data = ToDataset(world);
+    const StatusOr<PriorEstimate> estimate =
+        EstimatePriors(data.images, data.logs, data.calibration,
+                       SimulateVision(world, seed), {});
+    EXPECT_TRUE(estimate.ok()) << estimate.status().message();
+  }
+}
+
+// Logs that end or begin in the middle of a drive cover few of the images, and
+// no time shift covers more: nothing may be read into that.
+TEST(VisionCheck, AcceptsLogsOfAPartOfTheDrive) {
+  for (const uint64_t seed : {1, 2, 3, 4}) {
+    const SyntheticWorld world = BuildSyntheticWorld(SmallWorld(seed, 120));
+    const bool ends = seed % 2 == 0;
+    Dataset data = ToDataset(world);
+    // Just under a half of the images.
+    const timestamp_t time_ns =
+        world.images[ends ? 58 : 60].timestamp_ns + 50'000'000;
+    const auto is_cut = [&](const auto& sample) {
+      return ends == (sample.timestamp_ns > time_ns);
+    };
+    std::vector<ImuSample>& imu = data.logs.imu;
+    imu.erase(std::remove_if(imu.begin(), imu.end(), is_cut), imu.end());
+    std::vector<WheelSample>& wheels = data.logs.wheel;
+    wheels.erase(std::remove_if(wheels.begin(), wheels.end(), is_cut),
+                 wheels.end());
+    const StatusOr<PriorEstimate> estimate =
+        EstimatePriors(data.images, data.logs, data.calibration,
+                       SimulateVision(world, seed, {1e-3, 3, 0.02}), {});
+    ASSERT_TRUE(estimate.ok()) << estimate.status().message();
+    EXPECT_NEAR(estimate->summary.visual_timeshift_correction_s, 0.0, 0.005);
+    EXPECT_EQ(estimate->summary.gyroscope_lag_s, 0.0);
+  }
+}
+
+}  // namespace
+}  // namespace adasfm

@@ -1,0 +1,72 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <map>
+#include <string>
+
+#include "colmap_ext/host/pose_conversion.h"
+#include "colmap_ext/mapper_stage/mapper_stage.h"
+#include "tests/testing/colmap_ext/mapper_world.h"
+#include "tests/testing/matchers.h"
+
+namespace adasfm {
+
+// The mapper stage in a folder of its own, on worlds that several parts share.
+class MapperStageTest : public testing::Test {
+ protected:
+  void SetUp() override {
+    const auto* info = testing::UnitTest::GetInstance()->current_test_info();
+    folder_ = (std::filesystem::temp_directory_path() /
+               (std::string("adasfm_mapper_") + info->name()))
+                  .string();
+    std::filesystem::remove_all(folder_);
+    // Small parts, so that small worlds have several.
+    options_.partition.max_num_images_undivided = 40;
+    options_.partition.cut.max_part_size = 40;
+    options_.num_threads = 2;
+  }
+  void TearDown() override { std::filesystem::remove_all(folder_); }
+
+  // Plan, parts and merge in the test's folder.
+  std::map<image_t, Rigid3d> Run(const MapperWorld& world) {
+    MapperStage stage(options_, world.data, world.coarse_poses, folder_);
+    EXPECT_TRUE(stage.Plan().ok());
+    EXPECT_TRUE(stage.RunAllParts().ok());
+    const auto model = stage.Merge(true);
+    EXPECT_TRUE(model.ok()) << model.status().message();
+    summary_ = stage.Summary();
+    return model.ok() ? Poses(*model) : std::map<image_t, Rigid3d>();
+  }
+
+  static std::map<image_t, Rigid3d> Poses(
+      const colmap::Reconstruction& reconstruction) {
+    std::map<image_t, Rigid3d> poses;
+    for (const image_t image_id : reconstruction.RegImageIds()) {
+      poses[image_id] = CamFromWorld(reconstruction.Image(image_id));
+    }
+    return poses;
+  }
+
+  // All images, at less than half of the coarse error.
+  void RunAndExpectBetterThanCoarse(const MapperWorldOptions& options) {
+    const MapperWorld world = BuildMapperWorld(options);
+    const AlignedErrors errors =
+        ComputeAlignedErrors(Run(world), world.true_poses, {});
+    EXPECT_EQ(errors.num_images, options.world.num_images);
+    EXPECT_LT(errors.rmse_m, 0.5 * CoarseRmseM(world));
+  }
+
+  static double CoarseRmseM(const MapperWorld& world) {
+    return ComputeAlignedErrors(world.coarse_poses, world.true_poses, {})
+        .rmse_m;
+  }
+
+  MapperStageOptions options_;
+  MapperStageSummary summary_;
+  std::string folder_;
+};
+
+}  // namespace adasfm

@@ -1,0 +1,31 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "synthetic/synthetic_world.h"
+#include "tests/testing/sensors/dataset.h"
+
+namespace adasfm {
+
+// A drive whose pictures hardly matter.
+SyntheticWorldOptions SmallWorld(uint64_t seed, int num_images = 80);
+
+Dataset ToDataset(const SyntheticWorld& world);
+
+struct VisionNoise {
+  // Of images that follow each other, rad per axis; grows with the root of
+  // the gap.
+  double sigma_rad = 1e-3;
+  int max_gap = 1;
+  // Share of rotations that are off by a tenth of a radian.
+  double wrong_ratio = 0.0;
+};
+
+// Two-view rotations of near images.
+std::vector<VisualRotation> SimulateVision(const SyntheticWorld& world,
+                                           uint64_t seed,
+                                           const VisionNoise& noise = {});
+
+}  // namespace adasfm
