@@ -17,6 +17,7 @@
 #include "colmap_ext/host/model.h"
 #include "sensors/io/calibration.h"
 #include "tests/testing/colmap_ext/command_line_fixture.h"
+#include "tests/testing/paths.h"
 
 namespace adasfm {
 namespace {
@@ -30,7 +31,7 @@ class AutomaticTest : public CommandLineTest {
   // One drive, rendered once for all tests; they only read it.
   static void SetUpTestSuite() {
     drive_ = std::make_unique<TemporaryFolder>();
-    ASSERT_EQ(std::system((std::string(ADASFM_LAUNCHER) +
+    ASSERT_EQ(std::system((LauncherPath() +
                            " adasfm_synthesizer --render 1 --num_images " +
                            std::to_string(kNumImages) +
                            " --image_width 480 --image_height 300 "
@@ -210,7 +211,7 @@ int InterruptAt(const std::string& arguments, const std::string& word,
     if (!freopen(out.c_str(), "w", stdout)) _exit(2);
     if (!freopen(err.c_str(), "w", stderr)) _exit(2);
     std::istringstream words(arguments);
-    std::vector<std::string> text = {ADASFM_LAUNCHER};
+    std::vector<std::string> text = {LauncherPath()};
     for (std::string argument; words >> argument;) text.push_back(argument);
     std::vector<char*> argv;
     for (std::string& argument : text) argv.push_back(argument.data());

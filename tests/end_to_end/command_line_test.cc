@@ -13,6 +13,7 @@
 #include "colmap_ext/database/prior_tables.h"
 #include "colmap_ext/datasets/write_synthetic_world.h"
 #include "tests/testing/colmap_ext/command_line_fixture.h"
+#include "tests/testing/paths.h"
 
 namespace adasfm {
 namespace {
@@ -45,7 +46,7 @@ TEST_F(CommandLineTest, HostThatCannotRun) {
   ExpectError("mapper", "is not an executable file",
               "ADASFM_HOST_COLMAP=" + folder_.Write("text", "x"));
   ExpectError("mapper", "is this program",
-              std::string("ADASFM_HOST_COLMAP=") + ADASFM_LAUNCHER);
+              std::string("ADASFM_HOST_COLMAP=") + LauncherPath());
 }
 
 TEST_F(CommandLineTest, HelpListsBoth) {

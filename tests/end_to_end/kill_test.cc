@@ -13,12 +13,13 @@
 
 #include "core/random.h"
 #include "tests/testing/colmap_ext/command_line_fixture.h"
+#include "tests/testing/paths.h"
 
 namespace adasfm {
 namespace {
 
 // More kills than the few that every test run can afford:
-// ADASFM_NUM_KILLS=50 test_colmap_ext --gtest_filter='KillTest.*'
+// ADASFM_NUM_KILLS=50 test_end_to_end --gtest_filter='KillTest.*'
 int NumKills() {
   const char* text = std::getenv("ADASFM_NUM_KILLS");
   return text == nullptr ? 4 : std::stoi(text);
@@ -65,7 +66,7 @@ class KillTest : public CommandLineTest {
       return child;
     }
     setpgid(0, 0);
-    setenv("LAUNCHER", ADASFM_LAUNCHER, 1);
+    setenv("LAUNCHER", LauncherPath().c_str(), 1);
     setenv("IN", folder_.Path().c_str(), 1);
     setenv("OUT", path.c_str(), 1);
     execl("/bin/sh", "sh", script_.c_str(), nullptr);

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "tests/testing/colmap_ext/command_line_fixture.h"
+#include "tests/testing/paths.h"
 
 namespace adasfm {
 namespace {
@@ -20,7 +21,7 @@ class Terminal {
  public:
   explicit Terminal(const std::string& arguments) {
     std::istringstream words(arguments);
-    std::vector<std::string> text = {ADASFM_LAUNCHER};
+    std::vector<std::string> text = {LauncherPath()};
     for (std::string word; words >> word;) text.push_back(word);
     std::vector<char*> argv;
     for (std::string& word : text) argv.push_back(word.data());

@@ -12,6 +12,7 @@
 #include "core/sim3d.h"
 #include "core/so3.h"
 #include "tests/testing/colmap_ext/temporary_folder.h"
+#include "tests/testing/paths.h"
 
 namespace adasfm {
 namespace {
@@ -282,8 +283,7 @@ double FigureOf(const std::string& line, const std::string& key) {
 }
 
 TEST(EvaluateModel, AgreesWithTheReferenceScript) {
-  const std::string script =
-      std::string(ADASFM_SOURCE_DIR) + "/../shared/tools/evalmodel.py";
+  const std::string script = SourceDir() + "/../shared/tools/evalmodel.py";
   if (!std::filesystem::exists(script)) {
     GTEST_SKIP() << "no " << script;
   }

@@ -9,6 +9,7 @@
 #include <string>
 
 #include "tests/testing/colmap_ext/temporary_folder.h"
+#include "tests/testing/paths.h"
 
 namespace adasfm {
 
@@ -27,7 +28,7 @@ class CommandLineTest : public testing::Test {
   Run Call(const std::string& arguments, const std::string& environment = "") {
     Run run;
     run.status =
-        std::system((environment + " " + ADASFM_LAUNCHER + " " + arguments +
+        std::system((environment + " " + LauncherPath() + " " + arguments +
                      " > " + folder_.File("out") + " 2> " + folder_.File("err"))
                         .c_str());
     run.out = ReadBytes(folder_.File("out"));

@@ -12,6 +12,7 @@
 #include "sensors/io/read_image_times.h"
 #include "sensors/io/read_imu.h"
 #include "sensors/io/read_wheel.h"
+#include "tests/testing/paths.h"
 
 namespace adasfm {
 namespace {
@@ -29,8 +30,7 @@ double MeanSquare(double sum, int count) {
 }  // namespace
 
 bool ReadDataset(const std::string& name, Dataset* dataset) {
-  const std::string folder =
-      std::string(ADASFM_SOURCE_DIR) + "/../shared/data/" + name;
+  const std::string folder = SourceDir() + "/../shared/data/" + name;
   if (!std::filesystem::exists(folder + "/gt.txt")) return false;
   dataset->calibration =
       Require(ReadSensorCalibration(folder + "/sensors.yaml"));
