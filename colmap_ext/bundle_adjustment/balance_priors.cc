@@ -123,7 +123,10 @@ PriorBundleAdjustmentSummary AdjustBundleInBalance(
         *keypoint_sigma_factor >= balance.max_sigma_factor) {
       return summary;
     }
-    const double chi2 = ComputePriorChi2PerDof(problem.priors, *reconstruction);
+    const double chi2 = ComputePriorChi2PerDof(
+        CorrectSharedErrors(options.shared_errors, summary.shared_errors,
+                            problem.priors),
+        *reconstruction);
     if (chi2 <= balance.max_chi2_per_dof) return summary;
     *keypoint_sigma_factor =
         std::min(balance.max_sigma_factor,

@@ -46,6 +46,23 @@ void FixGauge(bool has_lengths, BundleProblem* problem) {
   problem->FixDistanceToFarthestPose(kGaugeLengthRatio);
 }
 
+// Numbers the windows of the gyroscope's bias.
+void AssignWindows(double window_s, std::vector<PosePriorEdge>* edges) {
+  int window = -1;
+  double elapsed_s = 0.0;
+  image_t last_image = kInvalidImageId;
+  for (PosePriorEdge& edge : *edges) {
+    if (edge.dt_s < 0.0) continue;
+    if (window < 0 || edge.image_id1 != last_image || elapsed_s > window_s) {
+      ++window;
+      elapsed_s = 0.0;
+    }
+    edge.window = window;
+    elapsed_s += edge.dt_s;
+    last_image = edge.image_id2;
+  }
+}
+
 ceres::Solver::Options SolverOptions(
     const PriorBundleAdjustmentOptions& options, BundleProblem* problem) {
   ceres::Solver::Options solver;
@@ -84,6 +101,7 @@ PosePriorEdge PosePriorEdgeFromPrior(const RelativePosePrior& prior) {
   edge.image_id1 = prior.image_id1;
   edge.image_id2 = prior.image_id2;
   edge.cam2_from_cam1 = prior.cam2_from_cam1;
+  edge.dt_s = SecondsFromNs(prior.dt_ns);
   const auto sigma_or_infinity = [](double variance) {
     return std::isfinite(variance) && variance > 0.0
                ? std::sqrt(variance)
@@ -117,6 +135,7 @@ PosePriorEdge PosePriorEdgeFromPrior(const RelativePosePrior& prior) {
 }
 
 bool PriorBundleAdjustmentOptions::IsValid(std::string* error) const {
+  if (!shared_errors.IsValid(error)) return false;
   if (!CheckPositive("keypoint_sigma_px", keypoint_sigma_px, error) ||
       !CheckPositive("prior_loss_scale", prior_loss_scale, error)) {
     return false;
@@ -151,7 +170,9 @@ PriorBundleAdjustmentSummary AdjustBundle(
   if (!options.IsValid(&error)) throw std::invalid_argument(error);
 
   PriorBundleAdjustmentSummary summary;
-  BundleProblem bundle(options, problem, *reconstruction);
+  PriorBundleAdjustmentProblem with_windows = problem;
+  AssignWindows(options.shared_errors.gyroscope_window_s, &with_windows.priors);
+  BundleProblem bundle(options, with_windows, *reconstruction);
   summary.num_images = bundle.NumImages();
   summary.num_points = bundle.NumPoints();
   summary.num_residuals = bundle.NumResiduals();
@@ -173,8 +194,23 @@ PriorBundleAdjustmentSummary AdjustBundle(
   summary.success = solver_summary.IsSolutionUsable() &&
                     std::isfinite(solver_summary.final_cost) &&
                     bundle.IsFinite();
-  if (summary.success) bundle.WriteTo(reconstruction);
+  if (summary.success) {
+    bundle.WriteTo(reconstruction);
+    summary.shared_errors = bundle.EstimatedSharedErrors();
+  }
   return summary;
+}
+
+std::vector<PosePriorEdge> CorrectSharedErrors(
+    const SharedErrorOptions& options, const SharedErrors& shared_errors,
+    std::vector<PosePriorEdge> priors) {
+  AssignWindows(options.gyroscope_window_s, &priors);
+  for (PosePriorEdge& edge : priors) {
+    if (edge.dt_s < 0.0) continue;
+    edge.cam2_from_cam1 = shared_errors.Correct(edge.cam2_from_cam1, edge.dt_s,
+                                                edge.window);
+  }
+  return priors;
 }
 
 }  // namespace adasfm

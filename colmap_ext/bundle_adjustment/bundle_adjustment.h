@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "colmap_ext/bundle_adjustment/shared_errors.h"
 #include "core/relative_pose_prior.h"
 #include "core/rigid3d.h"
 #include "core/types.h"
@@ -37,6 +38,12 @@ struct PosePriorEdge {
   // itself keeps its full weight, as dropping it would open the gap, and says
   // nothing of the balance between keypoints and priors.
   bool is_held_by_points = true;
+  // Duration of a motion that sensors measured: it has part in the errors that
+  // their whole log shares (shared_errors.h), the gyroscope's bias that of this
+  // window. Negative: the motion has none of them.
+  double dt_s = -1.0;
+  // Set by AdjustBundle.
+  int window = 0;
 };
 
 // The edge of a sensor prior with the sigmas of its covariance; what its flags
@@ -56,6 +63,8 @@ struct PriorBundleAdjustmentOptions {
   // sigmas. It drops single wrong priors; many that vision contradicts together
   // are what balance_priors.h is for.
   double prior_loss_scale = 3.0;
+
+  SharedErrorOptions shared_errors;
 
   bool refine_focal_length = false;
   bool refine_principal_point = false;
@@ -86,6 +95,8 @@ struct PriorBundleAdjustmentProblem {
   std::set<image_t> images;
   // Registered images that take part with fixed poses.
   std::set<image_t> constant_images;
+  // Those of sensors in order of time: a window of the gyroscope's bias ends
+  // where a prior does not begin with the image that the last one ended with.
   std::vector<PosePriorEdge> priors;
 };
 
@@ -99,6 +110,8 @@ struct PriorBundleAdjustmentSummary {
   double final_cost = 0.0;
   double seconds = 0.0;
   std::string message;
+  // Of the priors with a duration; all zero on failure.
+  SharedErrors shared_errors;
 };
 
 // Adjusts poses, points and, on request, intrinsics of the reconstruction with
@@ -109,5 +122,10 @@ PriorBundleAdjustmentSummary AdjustBundle(
     const PriorBundleAdjustmentOptions& options,
     const PriorBundleAdjustmentProblem& problem,
     colmap::Reconstruction* reconstruction);
+
+// The priors of an adjustment without the shared errors that it found.
+std::vector<PosePriorEdge> CorrectSharedErrors(
+    const SharedErrorOptions& options, const SharedErrors& shared_errors,
+    std::vector<PosePriorEdge> priors);
 
 }  // namespace adasfm

@@ -1,14 +1,44 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "colmap_ext/bundle_adjustment/bundle_problem.h"
 
+#include <ceres/normal_prior.h>
+
 #include <algorithm>
 #include <cmath>
 #include <set>
+#include <utility>
 
 #include "colmap_ext/bundle_adjustment/create_reprojection_cost.h"
 #include "colmap_ext/host/pose_conversion.h"
 
 namespace adasfm {
+namespace {
+
+// (second - first) / sigma, 3 residuals.
+class DifferenceCost final : public ceres::SizedCostFunction<3, 3, 3> {
+ public:
+  explicit DifferenceCost(double sigma) : inverse_sigma_(1.0 / sigma) {}
+
+  bool Evaluate(double const* const* parameters, double* residuals,
+                double** jacobians) const final {
+    using Jacobian = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
+    for (int i = 0; i < 3; ++i) {
+      residuals[i] = inverse_sigma_ * (parameters[1][i] - parameters[0][i]);
+    }
+    for (int block = 0; jacobians != nullptr && block < 2; ++block) {
+      if (jacobians[block] == nullptr) continue;
+      Eigen::Map<Jacobian> jacobian(jacobians[block]);
+      jacobian = Jacobian::Identity() *
+                 (block == 0 ? -inverse_sigma_ : inverse_sigma_);
+    }
+    return true;
+  }
+
+ private:
+  double inverse_sigma_;
+};
+
+}  // namespace
 
 BundleProblem::BundleProblem(const PriorBundleAdjustmentOptions& options,
                              const PriorBundleAdjustmentProblem& problem,
@@ -29,6 +59,7 @@ BundleProblem::BundleProblem(const PriorBundleAdjustmentOptions& options,
   AddImages(problem, reconstruction);
   AddPoints(reconstruction);
   AddPriors(problem.priors);
+  AddSharedErrorPriors();
   SetConstantBlocks(reconstruction);
 }
 
@@ -162,13 +193,73 @@ void BundleProblem::AddPriors(const std::vector<PosePriorEdge>& edges) {
 void BundleProblem::AddPrior(const PosePriorEdge& edge,
                              PosePriorCost::Term term, ImageBlock* image1,
                              ImageBlock* image2, ceres::LossFunction* loss) {
-  other_costs_.push_back(
-      std::make_unique<PosePriorCost>(edge, term, image1->pose, image2->pose));
-  problem_->AddResidualBlock(other_costs_.back().get(), loss,
-                             image1->pose->parameters,
-                             image2->pose->parameters);
+  auto cost =
+      std::make_unique<PosePriorCost>(edge, term, image1->pose, image2->pose);
+  std::vector<double*> parameters = {image1->pose->parameters,
+                                     image2->pose->parameters};
+  const std::vector<double*> shared = SharedParameters(edge, *cost, term);
+  parameters.insert(parameters.end(), shared.begin(), shared.end());
+  other_costs_.push_back(std::move(cost));
+  problem_->AddResidualBlock(other_costs_.back().get(), loss, parameters);
   image1->num_priors += 1;
   image2->num_priors += 1;
+}
+
+std::vector<double*> BundleProblem::SharedParameters(const PosePriorEdge& edge,
+                                                     const PosePriorCost& cost,
+                                                     PosePriorCost::Term term) {
+  if (cost.parameter_block_sizes().size() == 2) return {};
+  if (term != PosePriorCost::Term::kRotation) {
+    driving_direction_.is_used = true;
+    return {driving_direction_.values};
+  }
+  SharedBlock& bias = gyroscope_bias_[edge.window];
+  bias.is_used = extrinsic_rotation_.is_used = true;
+  return {extrinsic_rotation_.values, bias.values};
+}
+
+void BundleProblem::AddSharedErrorPriors() {
+  const SharedErrorOptions& shared = options_.shared_errors;
+  // A normal prior around zero; sigma 0 holds the values.
+  const auto add = [this, &shared](SharedBlock* block, double sigma) {
+    if (!block->is_used) return;
+    if (!shared.enabled || !(sigma > 0.0)) {
+      problem_->SetParameterBlockConstant(block->values);
+      return;
+    }
+    other_costs_.push_back(std::make_unique<ceres::NormalPrior>(
+        Eigen::Matrix3d::Identity() / sigma, Eigen::Vector3d::Zero()));
+    problem_->AddResidualBlock(other_costs_.back().get(), nullptr,
+                               block->values);
+  };
+  add(&extrinsic_rotation_, shared.extrinsic_rotation_sigma_rad);
+  add(&driving_direction_, shared.driving_direction_sigma_rad);
+  const double step_sigma = shared.gyroscope_random_walk_rad_s_sqrt_s *
+                            std::sqrt(shared.gyroscope_window_s);
+  SharedBlock* before = nullptr;
+  for (auto& [window, block] : gyroscope_bias_) {
+    add(&block, shared.gyroscope_bias_sigma_rad_s);
+    if (before != nullptr && shared.enabled && step_sigma > 0.0 &&
+        shared.gyroscope_bias_sigma_rad_s > 0.0) {
+      other_costs_.push_back(std::make_unique<DifferenceCost>(step_sigma));
+      problem_->AddResidualBlock(other_costs_.back().get(), nullptr,
+                                 before->values, block.values);
+    }
+    before = &block;
+  }
+}
+
+SharedErrors BundleProblem::EstimatedSharedErrors() const {
+  SharedErrors errors;
+  const auto vector = [](const SharedBlock& block) {
+    return Eigen::Vector3d(block.values[0], block.values[1], block.values[2]);
+  };
+  errors.extrinsic_rotation = vector(extrinsic_rotation_);
+  errors.driving_direction = vector(driving_direction_);
+  for (const auto& [window, block] : gyroscope_bias_) {
+    errors.gyroscope_bias[window] = vector(block);
+  }
+  return errors;
 }
 
 void BundleProblem::SetConstantBlocks(
@@ -213,6 +304,12 @@ std::shared_ptr<ceres::ParameterBlockOrdering> BundleProblem::Ordering() {
   for (auto& [camera_id, block] : cameras_) {
     if (block.is_used) ordering->AddElementToGroup(block.params.data(), 1);
   }
+  const auto add_shared = [&ordering](SharedBlock* block) {
+    if (block->is_used) ordering->AddElementToGroup(block->values, 1);
+  };
+  add_shared(&extrinsic_rotation_);
+  add_shared(&driving_direction_);
+  for (auto& [window, block] : gyroscope_bias_) add_shared(&block);
   return ordering;
 }
 

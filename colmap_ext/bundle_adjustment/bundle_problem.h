@@ -45,6 +45,7 @@ class BundleProblem final : private ceres::EvaluationCallback {
   std::shared_ptr<ceres::ParameterBlockOrdering> Ordering();
   ceres::Problem* CeresProblem() { return problem_.get(); }
   bool IsFinite() const;
+  SharedErrors EstimatedSharedErrors() const;
   void WriteTo(colmap::Reconstruction* reconstruction) const;
 
  private:
@@ -84,6 +85,13 @@ class BundleProblem final : private ceres::EvaluationCallback {
   void AddPrior(const PosePriorEdge& edge, PosePriorCost::Term term,
                 ImageBlock* image1, ImageBlock* image2,
                 ceres::LossFunction* loss);
+  // The parameters of the shared errors that the edge has part in.
+  std::vector<double*> SharedParameters(const PosePriorEdge& edge,
+                                        const PosePriorCost& cost,
+                                        PosePriorCost::Term term);
+  // What is believed of the shared errors; errors that no prior has part in do
+  // not take part.
+  void AddSharedErrorPriors();
   void SetConstantBlocks(const colmap::Reconstruction& reconstruction);
 
   const PriorBundleAdjustmentOptions options_;
@@ -93,6 +101,14 @@ class BundleProblem final : private ceres::EvaluationCallback {
   // of ids, so that every run adds in the same order.
   std::vector<AdjustedPose> poses_;
   std::vector<PointBlock> points_;
+  // Parameters of shared_errors.h; those used by a prior take part.
+  struct SharedBlock {
+    double values[3] = {0, 0, 0};
+    bool is_used = false;
+  };
+  SharedBlock extrinsic_rotation_;
+  SharedBlock driving_direction_;
+  std::map<int, SharedBlock> gyroscope_bias_;  // by window
   std::deque<ReprojectionCost> reprojection_costs_;
   std::vector<std::unique_ptr<ceres::CostFunction>> other_costs_;
   std::unique_ptr<ceres::LossFunction> reprojection_loss_;

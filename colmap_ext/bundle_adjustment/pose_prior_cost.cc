@@ -111,19 +111,52 @@ PosePriorCost::PosePriorCost(const PosePriorEdge& edge, Term term,
   }
   inverse_sigma_ = 1.0 / sigma;
   set_num_residuals(num_residuals);
+  if (edge.dt_s >= 0.0) {
+    const Eigen::Matrix3d from_middle = CameraFromMiddle(rotation_);
+    const Eigen::Matrix3d from_direction =
+        -inverse_sigma_ * Hat(translation_) * from_middle;
+    if (term == Term::kRotation) {
+      from_shared_ = {inverse_sigma_ * (Eigen::Matrix3d::Identity() -
+                                        rotation_.toRotationMatrix()),
+                      inverse_sigma_ * edge.dt_s * from_middle};
+    } else if (term == Term::kTranslation) {
+      from_shared_ = {from_direction};
+    } else if (term == Term::kDirection && length_ > kMinLength) {
+      from_shared_ = {Eigen::Matrix3d::Zero()};
+      from_shared_[0].topRows<2>() =
+          basis_.transpose() * from_direction / length_;
+    }
+  }
   *mutable_parameter_block_sizes() = {6, 6};
+  mutable_parameter_block_sizes()->resize(2 + from_shared_.size(), 3);
 }
 
-bool PosePriorCost::Evaluate(double const* const*, double* residuals,
+bool PosePriorCost::Evaluate(double const* const* parameters, double* residuals,
                              double** jacobians) const {
-  double* no_jacobians[2] = {nullptr, nullptr};
+  double* no_jacobians[4] = {nullptr, nullptr, nullptr, nullptr};
   if (jacobians == nullptr) jacobians = no_jacobians;
   if (term_ == Term::kRotation) {
     EvaluateRotation(residuals, jacobians);
   } else {
     EvaluateTranslation(residuals, jacobians);
   }
+  SubtractSharedErrors(parameters, residuals, jacobians);
   return true;
+}
+
+void PosePriorCost::SubtractSharedErrors(double const* const* parameters,
+                                         double* residuals,
+                                         double** jacobians) const {
+  for (size_t k = 0; k < from_shared_.size(); ++k) {
+    const Eigen::Map<const Eigen::Vector3d> shared(parameters[2 + k]);
+    for (int row = 0; row < num_residuals(); ++row) {
+      residuals[row] -= from_shared_[k].row(row).dot(shared);
+      if (jacobians[2 + k] == nullptr) continue;
+      for (int col = 0; col < 3; ++col) {
+        jacobians[2 + k][3 * row + col] = -from_shared_[k](row, col);
+      }
+    }
+  }
 }
 
 void PosePriorCost::EvaluateRotation(double* residuals,

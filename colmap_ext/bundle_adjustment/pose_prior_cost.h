@@ -4,6 +4,7 @@
 #include <ceres/cost_function.h>
 
 #include <Eigen/Core>
+#include <vector>
 
 #include "colmap_ext/bundle_adjustment/adjusted_pose.h"
 #include "colmap_ext/bundle_adjustment/bundle_adjustment.h"
@@ -26,9 +27,13 @@ Eigen::Vector2d DirectionError(const Eigen::Vector3d& vector,
 //   kDirection: DirectionError(t, t^) / sigma  2 residuals
 //   kLength:    (|t| - |t^|) / sigma     1 residual
 //   kTranslation: (t - t^) / sigma       3 residuals
-// Parameters: AdjustedPose::parameters of image 1 (6) and of image 2 (6). The
-// poses are read from the objects, which must be up to date. One cost per term,
-// so that the robust loss can drop a wrong term and keep the others.
+// Parameters: AdjustedPose::parameters of image 1 (6) and of image 2 (6), then,
+// when the edge has part in the errors that all priors share (shared_errors.h),
+//   kRotation: extrinsic_rotation (3), gyroscope_bias of the window (3)
+//   kDirection, kTranslation: driving_direction (3)
+// whose effect on R^ and t^ is taken off to first order. The poses are read
+// from the objects, which must be up to date. One cost per term, so that the
+// robust loss can drop a wrong term and keep the others.
 class PosePriorCost final : public ceres::CostFunction {
  public:
   enum class Term { kRotation, kDirection, kLength, kTranslation };
@@ -42,6 +47,9 @@ class PosePriorCost final : public ceres::CostFunction {
  private:
   void EvaluateRotation(double* residuals, double** jacobians) const;
   void EvaluateTranslation(double* residuals, double** jacobians) const;
+  // Takes the shared errors off the residuals that the poses give.
+  void SubtractSharedErrors(double const* const* parameters, double* residuals,
+                            double** jacobians) const;
 
   Term term_;
   const AdjustedPose* pose1_;
@@ -52,6 +60,8 @@ class PosePriorCost final : public ceres::CostFunction {
   Eigen::Vector3d translation_;
   double length_ = 0.0;
   double inverse_sigma_ = 1.0;
+  // Of the residuals, by the shared parameters; as many rows as residuals.
+  std::vector<Eigen::Matrix3d> from_shared_;
 };
 
 }  // namespace adasfm

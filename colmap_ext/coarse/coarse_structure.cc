@@ -85,8 +85,10 @@ void FillFigures(const CoarseStructureOptions& options,
     model->num_images_with_few_points +=
         num_points < options.min_num_points_per_image;
   }
-  model->prior_chi2_per_dof =
-      ComputePriorChi2PerDof(problem.priors, reconstruction);
+  model->prior_chi2_per_dof = ComputePriorChi2PerDof(
+      CorrectSharedErrors(options.bundle.shared_errors,
+                          model->rounds.back().shared_errors, problem.priors),
+      reconstruction);
   model->priors_agree =
       model->prior_chi2_per_dof <= options.balance.max_chi2_per_dof;
 }

@@ -160,14 +160,16 @@ class ModelRefiner {
     options.max_num_iterations = max_num_iterations;
     options.function_tolerance = function_tolerance;
     options.num_threads = options_.num_threads;
-    summary_.num_iterations +=
+    const PriorBundleAdjustmentSummary adjustment =
         AdjustBundleInBalance(options_.balance, options, problem,
-                              &reconstruction_, keypoint_sigma_factor)
-            .num_iterations;
+                              &reconstruction_, keypoint_sigma_factor);
+    summary_.num_iterations += adjustment.num_iterations;
     summary_.keypoint_sigma_px =
         options_.keypoint_sigma_px * *keypoint_sigma_factor;
-    summary_.prior_chi2_per_dof =
-        ComputePriorChi2PerDof(problem.priors, reconstruction_);
+    summary_.prior_chi2_per_dof = ComputePriorChi2PerDof(
+        CorrectSharedErrors(options.shared_errors, adjustment.shared_errors,
+                            problem.priors),
+        reconstruction_);
   }
 
   bool IsContradicted(const RelativePosePrior& prior) const {

@@ -107,6 +107,57 @@ TEST_P(PosePriorCostTest, IsZeroAtTheMeasurement) {
   }
 }
 
+TEST_P(PosePriorCostTest, JacobiansBySharedErrorsEqualNumericOnes) {
+  for (int seed = 0; seed < 20; ++seed) {
+    Random random(seed);
+    AdjustedPose pose1 = RandomPose(&random);
+    AdjustedPose pose2 = RandomPose(&random);
+    PosePriorEdge edge = RandomEdge(&random);
+    edge.dt_s = 0.3;
+    const PosePriorCost cost(edge, GetParam(), &pose1, &pose2);
+    Eigen::Vector3d shared[] = {random.GaussianVector(0.1),
+                                random.GaussianVector(0.1)};
+    std::vector<double*> parameters = {pose1.parameters, pose2.parameters,
+                                       shared[0].data(), shared[1].data()};
+    parameters.resize(cost.parameter_block_sizes().size());
+    const auto changed = [&] {
+      pose1.Update();
+      pose2.Update();
+    };
+    for (size_t block = 0; block < parameters.size(); ++block) {
+      EXPECT_LT(JacobianError(cost, parameters, block, changed), 1e-5)
+          << "seed " << seed << ", block " << block;
+    }
+  }
+}
+
+// A prior with known shared errors agrees, to first order, with the motion that
+// SharedErrors::Correct makes of it.
+TEST_P(PosePriorCostTest, SharedErrorsAreThoseThatCorrectTakesOut) {
+  for (int seed = 0; seed < 20; ++seed) {
+    Random random(seed);
+    PosePriorEdge edge = RandomEdge(&random);
+    edge.dt_s = 0.3;
+    SharedErrors errors;
+    errors.gyroscope_bias[0] = random.GaussianVector(1e-3);
+    errors.extrinsic_rotation = random.GaussianVector(1e-3);
+    errors.driving_direction = random.GaussianVector(1e-3);
+    AdjustedPose pose1 = RandomPose(&random);
+    AdjustedPose pose2(errors.Correct(edge.cam2_from_cam1, edge.dt_s, 0) *
+                       pose1.CamFromWorld());
+    const PosePriorCost cost(edge, GetParam(), &pose1, &pose2);
+    const bool is_rotation = GetParam() == PosePriorCost::Term::kRotation;
+    const double* parameters[] = {pose1.parameters, pose2.parameters,
+                                  is_rotation ? errors.extrinsic_rotation.data()
+                                              : errors.driving_direction.data(),
+                                  errors.gyroscope_bias.at(0).data()};
+    std::vector<double> residuals(cost.num_residuals());
+    cost.Evaluate(parameters, residuals.data(), nullptr);
+    // Second-order terms of errors of 1e-3.
+    for (const double residual : residuals) EXPECT_NEAR(residual, 0.0, 3e-4);
+  }
+}
+
 INSTANTIATE_TEST_SUITE_P(Terms, PosePriorCostTest,
                          testing::Values(PosePriorCost::Term::kRotation,
                                          PosePriorCost::Term::kDirection,

@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "colmap_ext/bundle_adjustment/shared_errors.h"
+
+#include <cmath>
+
+#include "core/so3.h"
+
+namespace adasfm {
+
+bool SharedErrorOptions::IsValid(std::string* error) const {
+  const auto check = [error](const char* name, double value, bool may_be_zero) {
+    if (std::isfinite(value) && (value > 0.0 || (may_be_zero && value == 0.0)))
+      return true;
+    *error = std::string(name) + " is " + std::to_string(value) +
+             ", but must be " + (may_be_zero ? "at least 0" : "positive");
+    return false;
+  };
+  return check("gyroscope_bias_sigma_rad_s", gyroscope_bias_sigma_rad_s,
+               true) &&
+         check("gyroscope_random_walk_rad_s_sqrt_s",
+               gyroscope_random_walk_rad_s_sqrt_s, true) &&
+         check("gyroscope_window_s", gyroscope_window_s, false) &&
+         check("extrinsic_rotation_sigma_rad", extrinsic_rotation_sigma_rad,
+               true) &&
+         check("driving_direction_sigma_rad", driving_direction_sigma_rad,
+               true);
+}
+
+Eigen::Matrix3d CameraFromMiddle(const Eigen::Quaterniond& cam2_from_cam1) {
+  return ExpSo3(0.5 * LogSo3(cam2_from_cam1)).toRotationMatrix();
+}
+
+Rigid3d SharedErrors::Correct(const Rigid3d& cam2_from_cam1, double dt_s,
+                              int window) const {
+  const Eigen::Quaterniond& rotation = cam2_from_cam1.rotation;
+  const Eigen::Matrix3d from_middle = CameraFromMiddle(rotation);
+  Eigen::Vector3d error = extrinsic_rotation - rotation * extrinsic_rotation;
+  const auto bias = gyroscope_bias.find(window);
+  if (bias != gyroscope_bias.end()) {
+    error += dt_s * (from_middle * bias->second);
+  }
+  return Rigid3d(
+      (ExpSo3(error) * rotation).normalized(),
+      ExpSo3(from_middle * driving_direction) * cam2_from_cam1.translation);
+}
+
+}  // namespace adasfm
