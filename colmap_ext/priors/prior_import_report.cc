@@ -26,6 +26,9 @@ std::string ImuLines(const SensorSummary& summary) {
        << " s)\n"
        << "gyroscope bias      " << ToText(summary.gyroscope_bias) << " +- "
        << summary.gyroscope_bias_sigma << " rad/s\n"
+       << "  of each axis      "
+       << ToText(summary.gyroscope_bias_covariance.diagonal().cwiseSqrt())
+       << " rad/s, 1 sigma\n"
        << "accelerometer bias  " << ToText(summary.accelerometer_bias) << " +- "
        << summary.accelerometer_bias_sigma << " m/s^2\n"
        << "gravity             " << ToText(summary.first_gravity_in_cam)
@@ -55,6 +58,10 @@ std::string FormatPriorImport(const PriorImport& import) {
        << " s, vision would add " << summary.visual_timeshift_correction_s
        << " s\n";
   if (summary.imu_rate_hz > 0.0) text << ImuLines(summary);
+  text << "noise / stated      gyroscope " << summary.gyroscope_noise_factor
+       << ", accelerometer " << summary.accelerometer_noise_factor
+       << ", wheels " << summary.wheel_speed_noise_factor << " (speed), "
+       << summary.wheel_yaw_noise_factor << " (yaw rate)\n";
   if (summary.wheel_rate_hz > 0.0) {
     text << "wheels              " << summary.wheel_rate_hz << " Hz, "
          << summary.num_wheel_gaps << " gaps (longest "
