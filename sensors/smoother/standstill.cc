@@ -25,10 +25,10 @@ constexpr double kMaxDeviation = 4.0;
 // Blocks whose means tell the spectrum, seconds: longer ones see slower motion,
 // but there are fewer of them. A run needs this many.
 constexpr double kShortestBlockS = 0.1;
-constexpr int kMinNumBlocks = 4;
+constexpr int kMinNumBlocks = 3;
 // The white noise weighs as much as this many blocks, since a variance of a few
 // blocks is itself not known.
-constexpr double kPriorBlocks = 4.0;
+constexpr double kPriorBlocks = 2.0;
 
 using SampleIterator = std::vector<ImuSample>::const_iterator;
 
