@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/median.h"
 #include "core/so3.h"
 #include "sensors/io/log_checks.h"
 
@@ -143,6 +144,9 @@ class Run {
 
   // Takes out the links that do turn.
   void Test(double density);
+  // What the links' mean rates scatter by, as a density squared about each
+  // axis. Medians, so that links that turn do not count.
+  Eigen::Array3d ScatterOfLinks(double white) const;
   void EstimateDensity(double density, double imu_rate_hz);
 
  private:
@@ -157,7 +161,31 @@ class Run {
   std::vector<OdometryLink>& links_;
 };
 
+Eigen::Array3d Run::ScatterOfLinks(double white) const {
+  // The median of a normal variable's distance from its median, in sigmas.
+  constexpr double kMedianDistance = 0.6745;
+  const double count = static_cast<double>(indices_.size());
+  Eigen::Array3d scatter;
+  for (int axis = 0; axis < 3; ++axis) {
+    std::vector<double> rates, distances;
+    for (const size_t k : indices_) {
+      rates.push_back(TurnOf(links_[k]).angle[axis] / links_[k].dt_s);
+    }
+    std::vector<double> sorted = rates;
+    const double median = UpperMedian(&sorted);
+    for (size_t i = 0; i < rates.size(); ++i) {
+      distances.push_back(std::abs(rates[i] - median) *
+                          std::sqrt(links_[indices_[i]].dt_s));
+    }
+    const double sigma = UpperMedian(&distances) / kMedianDistance;
+    scatter[axis] =
+        (kPriorBlocks * white + count * sigma * sigma) / (kPriorBlocks + count);
+  }
+  return scatter.max(white);
+}
+
 void Run::Test(double density) {
+  const Eigen::Array3d scatter = ScatterOfLinks(density * density).sqrt();
   Turn sum;
   for (const size_t k : indices_) sum.Add(TurnOf(links_[k]), 1.0);
   while (indices_.size() > 1) {
@@ -167,13 +195,11 @@ void Run::Test(double density) {
       const Turn own = TurnOf(links_[indices_[i]]);
       Turn rest = sum;
       rest.Add(own, -1.0);
-      const double sigma =
-          density * std::sqrt(1.0 / own.time_s + 1.0 / rest.time_s);
       const double deviation =
-          (own.angle / own.time_s - rest.angle / rest.time_s)
-              .cwiseAbs()
+          ((own.angle / own.time_s - rest.angle / rest.time_s).array().abs() /
+           scatter)
               .maxCoeff() /
-          sigma;
+          std::sqrt(1.0 / own.time_s + 1.0 / rest.time_s);
       if (deviation > largest) {
         largest = deviation;
         worst = i;

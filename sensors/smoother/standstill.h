@@ -16,14 +16,15 @@ namespace adasfm {
 //
 // Method. (1) A link is a candidate when, in the second around it, the wheels
 // (if any) do not turn and the IMU shows noise only. (2) Links in a row are a
-// run. In a run the mean rate is the same for all links, but for noise: the
-// link that is furthest from the mean of the others is taken out for as long as
-// it is further than kMaxDeviation sigmas. (3) What is left of a run moves
-// slowly all the same (springs, an idling engine, people): the spectral density
-// of its rates near frequency zero comes from means over blocks of samples, and
-// what exceeds the gyroscope's white noise is the machine's own motion,
-// standstill_rate_density of each link. So the information of a long standstill
-// grows as the log shows, not as white noise would have it.
+// run. In a run the mean rate is the same for all links, but for noise and what
+// they scatter by (medians): the link that is furthest from the mean of the
+// others is taken out for as long as it is further than kMaxDeviation sigmas.
+// (3) What is left of a run moves slowly all the same (springs, an idling
+// engine, people): the spectral density of its rates near frequency zero comes
+// from means over blocks of samples, and what exceeds the gyroscope's white
+// noise is the machine's own motion, standstill_rate_density of each link. So
+// the information of a long standstill grows as the log shows, not as white
+// noise would have it.
 //
 // Links without IMU are left as they are. A log that is too short marks
 // nothing.
