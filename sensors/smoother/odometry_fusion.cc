@@ -5,6 +5,7 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "core/median.h"
 #include "core/so3.h"
 #include "sensors/smoother/chain_elimination.h"
 #include "sensors/smoother/odometry_factors.h"
@@ -35,6 +36,26 @@ double RobustWeight(double chi2, double threshold_sigma) {
       threshold_sigma * threshold_sigma / std::max(chi2, 1e-12);
   return ratio >= 1.0 ? 1.0 : std::max(1e-6, ratio * ratio);
 }
+
+// Squares of residuals over their redundancy. Their median is that of the noise
+// as long as most links do not slip, also when the stated noise is so small
+// that most of them seem to.
+struct RowRatios {
+  std::vector<double> values;
+  double redundancy = 0.0;
+
+  NoiseCheck Check() {
+    // The median of a chi-square of one degree of freedom.
+    constexpr double kMedian = 0.4549;
+    if (values.empty()) return NoiseCheck();
+    return {redundancy * UpperMedian(&values) / kMedian, redundancy};
+  }
+};
+
+struct NoiseChecks {
+  RowRatios wheel_speed, wheel_yaw;
+  NoiseCheck accelerometer;
+};
 
 class Smoother {
  public:
@@ -79,8 +100,7 @@ class Smoother {
   OdometryMotion Motion(size_t k) const;
   Eigen::Matrix<double, 6, kLinkSize> MotionMap(size_t k) const;
   void CheckNoise(size_t k, const LinkResiduals& residuals,
-                  const LinkCovariance& covariance,
-                  OdometryFusionResult* result) const;
+                  const LinkCovariance& covariance, NoiseChecks* checks) const;
   void FillCovariances(OdometryFusionResult* result) const;
   std::vector<std::pair<size_t, double>> FindSlippingLinks() const;
   void FillResult(OdometryFusionResult* result) const;
@@ -269,23 +289,34 @@ std::vector<std::pair<size_t, double>> Smoother::FindSlippingLinks() const {
 
 void Smoother::CheckNoise(size_t k, const LinkResiduals& residuals,
                           const LinkCovariance& covariance,
-                          OdometryFusionResult* result) const {
+                          NoiseChecks* checks) const {
   const OdometryLink& link = problem_.links[k];
-  // Wheels at rest err less, and slips are no noise.
-  if (!link.has_imu || !link.has_wheel || weights_[k].wheel < 1.0 ||
+  // Wheels at rest err less.
+  if (!link.has_imu || !link.has_wheel ||
       link.standstill != StandstillKind::kNone) {
     return;
   }
-  const auto add = [&](const LinkResiduals::Rows& rows, NoiseCheck* check) {
-    const auto jacobian = residuals.jacobian.middleRows(rows.first, rows.size);
-    check->chi2 +=
-        residuals.values.segment(rows.first, rows.size).squaredNorm();
-    check->redundancy +=
-        rows.size - (jacobian * covariance).cwiseProduct(jacobian).sum();
+  const auto redundancy = [&](int row) {
+    const auto jacobian = residuals.jacobian.row(row);
+    return 1.0 - (jacobian * covariance).cwiseProduct(jacobian).sum();
   };
-  add(residuals.accelerometer, &result->accelerometer_check);
-  add(residuals.wheel_speed, &result->wheel_speed_check);
-  add(residuals.wheel_yaw, &result->wheel_yaw_check);
+  const auto add = [&](const LinkResiduals::Rows& rows, RowRatios* ratios) {
+    for (int row = rows.first; row < rows.first + rows.size; ++row) {
+      const double share = redundancy(row);
+      if (share <= 0.0) continue;
+      const double value = residuals.values[row];
+      ratios->values.push_back(value * value / (weights_[k].wheel * share));
+      ratios->redundancy += share;
+    }
+  };
+  add(residuals.wheel_speed, &checks->wheel_speed);
+  add(residuals.wheel_yaw, &checks->wheel_yaw);
+  if (weights_[k].wheel < 1.0) return;
+  const LinkResiduals::Rows& rows = residuals.accelerometer;
+  for (int row = rows.first; row < rows.first + rows.size; ++row) {
+    checks->accelerometer.chi2 += residuals.values[row] * residuals.values[row];
+    checks->accelerometer.redundancy += redundancy(row);
+  }
 }
 
 void Smoother::FillCovariances(OdometryFusionResult* result) const {
@@ -294,6 +325,7 @@ void Smoother::FillCovariances(OdometryFusionResult* result) const {
   const size_t num_links = problem_.links.size();
   result->motions.resize(num_links);
   Shared shared;
+  NoiseChecks checks;
   // How a motion moves with one sigma of each shared coordinate.
   std::vector<Eigen::Matrix<double, 6, Shared::kSize>> by_shared(num_links);
   double accel_variance = 0.0, length_variance = 0.0;
@@ -302,7 +334,7 @@ void Smoother::FillCovariances(OdometryFusionResult* result) const {
       num_links, FirstMessage(), [this](size_t k) { return Equations(k); },
       [&](size_t k, const LinkCovariance& covariance) {
         const LinkResiduals residuals = Residuals(k);
-        CheckNoise(k, residuals, covariance, result);
+        CheckNoise(k, residuals, covariance, &checks);
         shared.Add(problem_.links[k].dt_s, residuals, covariance);
         const Eigen::Matrix<double, 6, kLinkSize> map = MotionMap(k);
         result->motions[k] = Motion(k);
@@ -321,6 +353,9 @@ void Smoother::FillCovariances(OdometryFusionResult* result) const {
                                      Shared::Column(Shared::kScale));
         mount_variance = covariance.diagonal().segment<2>(kMount);
       });
+  result->accelerometer_check = checks.accelerometer;
+  result->wheel_speed_check = checks.wheel_speed.Check();
+  result->wheel_yaw_check = checks.wheel_yaw.Check();
   const Shared::Vector growth = shared.Growth();
   for (size_t k = 0; k < num_links; ++k) {
     result->motions[k].covariance +=

@@ -151,7 +151,8 @@ struct OdometryFusionResult {
   Eigen::Matrix3d gyroscope_bias_covariance = Eigen::Matrix3d::Zero();
   double gyroscope_bias_sigma = 0.0;      // mean of states and axes
   double accelerometer_bias_sigma = 0.0;  // mean of states and axes
-  // Over the links on the move whose wheels do not slip.
+  // Over the links on the move: of the accelerometer over those whose wheels do
+  // not slip, of the wheels by the median of all.
   NoiseCheck accelerometer_check, wheel_speed_check, wheel_yaw_check;
   int num_iterations = 0;
   bool converged = false;

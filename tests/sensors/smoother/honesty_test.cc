@@ -26,6 +26,8 @@ struct Mismatch {
   double growth = 1.0;
   // Left wheel longer, right wheel shorter by half of this.
   double wheel_difference = 0.0;
+  // An error of the speed that the wheels share for seconds (memory 1 s), m/s.
+  double slow_wheel_error = 0.0;
   // Stated noise figures of IMU and wheels over the true ones.
   double noise_factor = 1.0;
 };
@@ -51,9 +53,17 @@ Dataset SpoiltDataset(const SyntheticWorld& world, const Mismatch& mismatch,
   Random random(seed);
   AddRinging(mismatch, random.Uniform(0.0, 2.0 * kPi),
              world.options.standstill_s, &data);
+  const double keep = std::exp(-1.0 / world.options.wheel_rate_hz);
+  double slow_error = random.Gaussian(mismatch.slow_wheel_error);
   for (WheelSample& sample : data.logs.wheel) {
+    slow_error =
+        keep * slow_error +
+        random.Gaussian(mismatch.slow_wheel_error * std::sqrt(1 - keep * keep));
+    if (sample.first == 0.0 && sample.second == 0.0) continue;
     sample.first *= 1.0 + 0.5 * mismatch.wheel_difference;
     sample.second *= 1.0 - 0.5 * mismatch.wheel_difference;
+    sample.first += slow_error;
+    sample.second += slow_error;
   }
   SensorCalibration& calibration = data.calibration;
   calibration.imu_noise.gyroscope_noise_density *= mismatch.noise_factor;
@@ -115,8 +125,10 @@ INSTANTIATE_TEST_SUITE_P(
                     Mismatch{"Ringing", 2e-3, 1.0},
                     Mismatch{"Starting", 0.13, 1.0, 14.0},
                     Mismatch{"UnequalWheels", 0.0, 1.0, 1.0, 0.004},
-                    Mismatch{"NoiseTooSmall", 5e-4, 1.0, 1.0, 0.004, 1.0 / 3},
-                    Mismatch{"NoiseTooLarge", 5e-4, 1.0, 1.0, 0.004, 3.0}),
+                    Mismatch{"SlowWheels", 0.0, 1.0, 1.0, 0.004, 0.05},
+                    Mismatch{"NoiseTooSmall", 5e-4, 1.0, 1.0, 0.004, 0.0,
+                             1.0 / 3},
+                    Mismatch{"NoiseTooLarge", 5e-4, 1.0, 1.0, 0.004, 0.0, 3.0}),
     [](const auto& mismatch) { return mismatch.param.name; });
 
 }  // namespace
