@@ -8,6 +8,7 @@
 #include "core/so3.h"
 #include "sensors/calibration_check/check_against_vision.h"
 #include "sensors/io/format_figures.h"
+#include "sensors/preintegration/imu_noise.h"
 #include "sensors/select_images.h"
 #include "sensors/smoother/build_odometry_links.h"
 #include "sensors/smoother/compose_prior.h"
@@ -17,8 +18,25 @@
 namespace adasfm {
 namespace {
 
+// Noise figures are corrected this often at most, within this factor of the
+// stated ones, and for as long as they change by more than estimates of some
+// hundred residuals err.
+constexpr int kMaxNumCorrections = 3;
+constexpr double kMaxNoiseFactor = 5.0;
+constexpr double kMinNoiseChange = 1.2;
+
 timestamp_t NsFromSeconds(double seconds) {
   return std::llround(1e9 * seconds);
+}
+
+// Moves a factor by another, within limits; whether it moved enough to matter.
+bool Correct(double by, double min_factor, double* factor) {
+  const double corrected =
+      std::clamp(*factor * by, min_factor, kMaxNoiseFactor);
+  const double change = corrected / *factor;
+  if (std::max(change, 1.0 / change) < kMinNoiseChange) return false;
+  *factor = corrected;
+  return true;
 }
 
 // The stages of EstimatePriors with what they share.
@@ -26,7 +44,7 @@ class PriorEstimator {
  public:
   PriorEstimator(const SensorCalibration& calibration,
                  const PriorEstimationOptions& options)
-      : calibration_(calibration), options_(options) {}
+      : stated_(calibration), calibration_(calibration), options_(options) {}
 
   StatusOr<PriorEstimate> Run(const std::vector<ImageStamp>& images,
                               const SensorLogs& logs,
@@ -38,11 +56,16 @@ class PriorEstimator {
   Status CheckVision();
   void UndoFilter(const VisionCheck& check);
   void Fuse();
+  void BuildProblem();
+  // The smoother's residuals against the noise figures; whether these changed.
+  bool CorrectNoise();
   void BuildPriors();
   void FillSummary();
   ImuBias FirstBias() const;
 
-  const SensorCalibration& calibration_;
+  const SensorCalibration& stated_;
+  // With the noise figures in use.
+  SensorCalibration calibration_;
   const PriorEstimationOptions& options_;
   MotionLogs logs_;
   timestamp_t timeshift_ns_ = 0;
@@ -60,7 +83,10 @@ class PriorEstimator {
 
 void PriorEstimator::SelectLogs(const SensorLogs& logs) {
   SensorSummary& summary = estimate_.summary;
-  if (calibration_.has_imu) logs_.imu = logs.imu;
+  if (calibration_.has_imu) {
+    logs_.imu = logs.imu;
+    calibration_.imu_noise = RaiseToLog(logs.imu, stated_.imu_noise);
+  }
   if (calibration_.has_wheel) {
     logs_.wheel = ComputeWheelSpeeds(logs.wheel, calibration_);
     logs_.odometry = logs.odometry;
@@ -150,7 +176,7 @@ ImuBias PriorEstimator::FirstBias() const {
   return bias;
 }
 
-void PriorEstimator::Fuse() {
+void PriorEstimator::BuildProblem() {
   OdometryLinkOptions link_options;
   link_options.max_imu_gap_s = options_.max_imu_gap_s;
   link_options.max_wheel_gap_s = options_.max_wheel_gap_s;
@@ -162,6 +188,7 @@ void PriorEstimator::Fuse() {
   for (const ImageStamp& image : images_) {
     times.push_back(image.timestamp_ns + timeshift_ns_);
   }
+  problem_ = OdometryFusionProblem();
   timeline_ = BuildTimeline(times, logs_, link_options);
   problem_.imu_from_wheel = calibration_.imu_from_wheel;
   problem_.imu_noise = calibration_.imu_noise;
@@ -189,7 +216,48 @@ void PriorEstimator::Fuse() {
   problem_.initial_states =
       EstimateInitialOdometry(problem_.links, problem_.imu_from_wheel,
                               options_.fusion.gravity_m_s2, bias);
-  fused_ = FuseOdometry(problem_, options_.fusion);
+}
+
+bool PriorEstimator::CorrectNoise() {
+  NoiseCheck speed = fused_.wheel_speed_check;
+  NoiseCheck yaw = fused_.wheel_yaw_check;
+  SensorSummary& summary = estimate_.summary;
+  if (calibration_.wheel_type == WheelType::kDifferential ||
+      calibration_.wheel_type == WheelType::kTicks) {
+    // One figure for the speed of a wheel.
+    speed.chi2 += yaw.chi2;
+    speed.redundancy += yaw.redundancy;
+    yaw = NoiseCheck();
+  }
+  bool any = Correct(speed.Factor(), 1.0 / kMaxNoiseFactor,
+                     &summary.wheel_speed_noise_factor);
+  any |= Correct(yaw.Factor(), 1.0 / kMaxNoiseFactor,
+                 &summary.wheel_yaw_noise_factor);
+  // A smaller figure than the stated one is not believed (RaiseToLog).
+  double accelerometer = calibration_.imu_noise.accelerometer_noise_density /
+                         stated_.imu_noise.accelerometer_noise_density;
+  any |= Correct(fused_.accelerometer_check.Factor(), 1.0, &accelerometer);
+  calibration_.imu_noise.accelerometer_noise_density =
+      accelerometer * stated_.imu_noise.accelerometer_noise_density;
+  calibration_.wheel_speed_noise =
+      summary.wheel_speed_noise_factor * stated_.wheel_speed_noise;
+  calibration_.wheel_yaw_rate_noise =
+      summary.wheel_yaw_noise_factor * stated_.wheel_yaw_rate_noise;
+  return any;
+}
+
+void PriorEstimator::Fuse() {
+  for (int i = 0; i <= kMaxNumCorrections; ++i) {
+    BuildProblem();
+    fused_ = FuseOdometry(problem_, options_.fusion);
+    if (i == kMaxNumCorrections || !CorrectNoise()) break;
+  }
+  estimate_.summary.gyroscope_noise_factor =
+      calibration_.imu_noise.gyroscope_noise_density /
+      stated_.imu_noise.gyroscope_noise_density;
+  estimate_.summary.accelerometer_noise_factor =
+      calibration_.imu_noise.accelerometer_noise_density /
+      stated_.imu_noise.accelerometer_noise_density;
 }
 
 void PriorEstimator::BuildPriors() {

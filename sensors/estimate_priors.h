@@ -74,6 +74,8 @@ struct PriorEstimate {
   std::vector<RelativePosePrior> priors;
   // Unit vectors that point down.
   std::map<image_t, Eigen::Vector3d> gravity_in_cam;
+  // Also what all priors share: gyroscope_bias (rad/s, body frame) with
+  // gyroscope_bias_covariance, wheel_scale with wheel_scale_sigma.
   SensorSummary summary;
 };
 

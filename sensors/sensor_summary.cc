@@ -53,8 +53,9 @@ void SummarizeFusion(const OdometryFusionProblem& problem,
     summary->distance_m += fused.motions[k].body2_from_body1.translation.norm();
   }
   if (!logs.imu.empty()) {
+    summary->gyroscope_bias = fused.gyroscope_bias;
+    summary->gyroscope_bias_covariance = fused.gyroscope_bias_covariance;
     for (const OdometryState& state : fused.states) {
-      summary->gyroscope_bias += state.bias.gyroscope / fused.states.size();
       summary->accelerometer_bias +=
           state.bias.accelerometer / fused.states.size();
     }

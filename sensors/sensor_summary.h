@@ -23,11 +23,19 @@ struct SensorSummary {
   double max_imu_gap_s = 0.0;
   double max_wheel_gap_s = 0.0;
   double standstill_s = 0.0;
-  // Means over the sequence, with the mean 1 sigma of an axis.
+  // Means over the sequence, with the mean 1 sigma of an axis: rad/s, m/s^2, in
+  // the body (IMU) frame.
   Eigen::Vector3d gyroscope_bias = Eigen::Vector3d::Zero();
   double gyroscope_bias_sigma = 0.0;
   Eigen::Vector3d accelerometer_bias = Eigen::Vector3d::Zero();
   double accelerometer_bias_sigma = 0.0;
+  // Covariance of the gyroscope's bias (rad^2/s^2), body (IMU) frame.
+  Eigen::Matrix3d gyroscope_bias_covariance = Eigen::Matrix3d::Zero();
+  // Noise in use over the stated one, as the logs show it.
+  double gyroscope_noise_factor = 1.0;
+  double accelerometer_noise_factor = 1.0;
+  double wheel_speed_noise_factor = 1.0;
+  double wheel_yaw_noise_factor = 1.0;
   // At the first image in the logs, in its camera frame; zero when unknown.
   Eigen::Vector3d first_gravity_in_cam = Eigen::Vector3d::Zero();
   // True speed = scale * logged speed.

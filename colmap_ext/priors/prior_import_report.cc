@@ -26,6 +26,9 @@ std::string ImuLines(const SensorSummary& summary) {
        << " s)\n"
        << "gyroscope bias      " << ToText(summary.gyroscope_bias) << " +- "
        << summary.gyroscope_bias_sigma << " rad/s\n"
+       << "  of each axis      "
+       << ToText(summary.gyroscope_bias_covariance.diagonal().cwiseSqrt())
+       << " rad/s, 1 sigma\n"
        << "accelerometer bias  " << ToText(summary.accelerometer_bias) << " +- "
        << summary.accelerometer_bias_sigma << " m/s^2\n"
        << "gravity             " << ToText(summary.first_gravity_in_cam)
@@ -55,6 +58,10 @@ std::string FormatPriorImport(const PriorImport& import) {
        << " s, vision would add " << summary.visual_timeshift_correction_s
        << " s\n";
   if (summary.imu_rate_hz > 0.0) text << ImuLines(summary);
+  text << "noise / stated      gyroscope " << summary.gyroscope_noise_factor
+       << ", accelerometer " << summary.accelerometer_noise_factor
+       << ", wheels " << summary.wheel_speed_noise_factor << " (speed), "
+       << summary.wheel_yaw_noise_factor << " (yaw rate)\n";
   if (summary.wheel_rate_hz > 0.0) {
     text << "wheels              " << summary.wheel_rate_hz << " Hz, "
          << summary.num_wheel_gaps << " gaps (longest "
@@ -100,8 +107,15 @@ std::string PriorImportToJson(const PriorImport& import) {
       {"standstill_s", summary.standstill_s},
       {"gyroscope_bias_rad_s", ToList(summary.gyroscope_bias)},
       {"gyroscope_bias_sigma_rad_s", summary.gyroscope_bias_sigma},
+      {"gyroscope_bias_covariance_rad2_s2",
+       ToList(summary.gyroscope_bias_covariance.reshaped())},
       {"accelerometer_bias_m_s2", ToList(summary.accelerometer_bias)},
       {"accelerometer_bias_sigma_m_s2", summary.accelerometer_bias_sigma},
+      {"noise_over_stated",
+       {{"gyroscope", summary.gyroscope_noise_factor},
+        {"accelerometer", summary.accelerometer_noise_factor},
+        {"wheel_speed", summary.wheel_speed_noise_factor},
+        {"wheel_yaw_rate", summary.wheel_yaw_noise_factor}}},
       {"first_gravity_in_cam", ToList(summary.first_gravity_in_cam)},
       {"wheel_rate_hz", summary.wheel_rate_hz},
       {"num_wheel_gaps", summary.num_wheel_gaps},

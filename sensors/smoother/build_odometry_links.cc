@@ -6,22 +6,13 @@
 
 #include "core/so3.h"
 #include "sensors/io/log_checks.h"
+#include "sensors/smoother/standstill.h"
 
 namespace adasfm {
 namespace {
 
 // Images further apart than this belong to different recordings.
 constexpr double kMaxFilledGapS = 600.0;
-// A standstill: half the window, and what an idling engine may add to the
-// sensors' own noise.
-constexpr double kHalfWindowS = 0.5;
-constexpr double kIdleRate = 0.005;       // rad/s
-constexpr double kIdleForce = 0.05;       // m/s^2
-constexpr double kIdleRateDrift = 0.002;  // rad/s
-constexpr double kIdleForceDrift = 0.03;  // m/s^2
-constexpr double kMaxBias = 0.03;         // rad/s
-constexpr double kIdleSpeed = 0.02;       // m/s
-
 timestamp_t NsFromSeconds(double seconds) {
   return std::llround(1e9 * seconds);
 }
@@ -57,42 +48,6 @@ void AppendFilled(timestamp_t end_ns, timestamp_t max_step_ns,
     }
   }
   times->push_back(end_ns);
-}
-
-struct SampleMoments {
-  Eigen::Vector3d mean_rate = Eigen::Vector3d::Zero();
-  Eigen::Vector3d mean_force = Eigen::Vector3d::Zero();
-  double rate_sigma = 0.0;  // of one axis
-  double force_sigma = 0.0;
-};
-
-SampleMoments ComputeMoments(std::vector<ImuSample>::const_iterator first,
-                             std::vector<ImuSample>::const_iterator last) {
-  SampleMoments moments;
-  const double count = std::max<double>(1.0, last - first);
-  for (auto it = first; it != last; ++it) {
-    moments.mean_rate += it->angular_velocity / count;
-    moments.mean_force += it->specific_force / count;
-  }
-  double rate_sum = 0.0, force_sum = 0.0;
-  for (auto it = first; it != last; ++it) {
-    rate_sum += (it->angular_velocity - moments.mean_rate).squaredNorm();
-    force_sum += (it->specific_force - moments.mean_force).squaredNorm();
-  }
-  moments.rate_sigma = std::sqrt(rate_sum / (3.0 * count));
-  moments.force_sigma = std::sqrt(force_sum / (3.0 * count));
-  return moments;
-}
-
-bool WheelsStandStill(const std::vector<WheelSpeed>& speeds,
-                      timestamp_t start_ns, timestamp_t end_ns) {
-  bool any = false;
-  for (auto it = FirstNotBefore(speeds, start_ns);
-       it != speeds.end() && it->timestamp_ns <= end_ns; ++it) {
-    if (std::abs(it->speed) > kIdleSpeed) return false;
-    any = true;
-  }
-  return any;
 }
 
 // The pose of a trajectory at a time within it.
@@ -186,18 +141,6 @@ WheelNoise ComputeWheelNoise(const SensorCalibration& calibration,
 
 }  // namespace
 
-timestamp_t MotionLogs::StartNs() const {
-  if (!imu.empty()) return imu.front().timestamp_ns;
-  return wheel.empty() ? odometry.front().timestamp_ns
-                       : wheel.front().timestamp_ns;
-}
-
-timestamp_t MotionLogs::EndNs() const {
-  if (!imu.empty()) return imu.back().timestamp_ns;
-  return wheel.empty() ? odometry.back().timestamp_ns
-                       : wheel.back().timestamp_ns;
-}
-
 OdometryTimeline BuildTimeline(const std::vector<timestamp_t>& times_ns,
                                const MotionLogs& logs,
                                const OdometryLinkOptions& options) {
@@ -215,48 +158,10 @@ OdometryTimeline BuildTimeline(const std::vector<timestamp_t>& times_ns,
   return timeline;
 }
 
-StandstillKind FindStandstill(const MotionLogs& logs, timestamp_t time_ns,
-                              const ImuNoise& noise, double imu_rate_hz) {
-  const timestamp_t half = NsFromSeconds(kHalfWindowS);
-  const timestamp_t start = time_ns - half, end = time_ns + half;
-  const auto first = FirstNotBefore(logs.imu, start);
-  const auto last = FirstNotBefore(logs.imu, end);
-  // Half a window is enough at the log's ends.
-  if ((last - first) < kHalfWindowS * imu_rate_hz) return StandstillKind::kNone;
-  const bool has_wheel = !logs.wheel.empty();
-  if (has_wheel && !WheelsStandStill(logs.wheel, start, end)) {
-    return StandstillKind::kNone;
-  }
-  const SampleMoments all = ComputeMoments(first, last);
-  // An idling engine shakes, but its means stay; those of a machine that
-  // creeps or rocks do not.
-  const auto middle = first + (last - first) / 2;
-  const SampleMoments head = ComputeMoments(first, middle);
-  const SampleMoments tail = ComputeMoments(middle, last);
-  const double root_rate = std::sqrt(imu_rate_hz);
-  const double root_half = 3.0 * std::sqrt(2.0 / kHalfWindowS);
-  const bool turns =
-      all.mean_rate.norm() > kMaxBias ||
-      (head.mean_rate - tail.mean_rate).norm() >
-          kIdleRateDrift + root_half * noise.gyroscope_noise_density ||
-      all.rate_sigma >
-          kIdleRate + 1.5 * noise.gyroscope_noise_density * root_rate;
-  const bool moves =
-      (head.mean_force - tail.mean_force).norm() >
-          kIdleForceDrift + root_half * noise.accelerometer_noise_density ||
-      all.force_sigma >
-          kIdleForce + 1.5 * noise.accelerometer_noise_density * root_rate;
-  if (turns) return StandstillKind::kNone;
-  if (!moves) return StandstillKind::kAtRest;
-  // Wheels that do not turn keep the heading even when the machine rocks.
-  return has_wheel ? StandstillKind::kNoTurn : StandstillKind::kNone;
-}
-
 std::vector<OdometryLink> BuildOdometryLinks(
     const std::vector<timestamp_t>& times_ns, const MotionLogs& logs,
     const SensorCalibration& calibration, const ImuBias& bias,
     const OdometryLinkOptions& options) {
-  const double imu_rate_hz = RateHz(logs.imu);
   const double odometry_rate_hz = RateHz(logs.odometry);
   const double odometry_period =
       odometry_rate_hz > 0.0 ? 1.0 / odometry_rate_hz : 0.0;
@@ -273,8 +178,6 @@ std::vector<OdometryLink> BuildOdometryLinks(
       link.has_imu = true;
       link.imu = PreintegrateImu(logs.imu, start, end, bias,
                                  calibration.imu_noise, &profile);
-      link.standstill = FindStandstill(logs, (start + end) / 2,
-                                       calibration.imu_noise, imu_rate_hz);
     }
     if (CoversInterval(logs.odometry, start, end, options.max_wheel_gap_s)) {
       link.has_wheel = true;
@@ -289,6 +192,7 @@ std::vector<OdometryLink> BuildOdometryLinks(
                                      wheel_noise, profile);
     }
   }
+  MarkStandstills(times_ns, logs, calibration.imu_noise, &links);
   return links;
 }
 

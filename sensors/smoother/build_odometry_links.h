@@ -5,24 +5,10 @@
 
 #include "core/sensor_log.h"
 #include "sensors/io/calibration.h"
+#include "sensors/smoother/motion_logs.h"
 #include "sensors/smoother/odometry_fusion.h"
 
 namespace adasfm {
-
-// All that moves the machine, on the IMU's clock.
-struct MotionLogs {
-  std::vector<ImuSample> imu;
-  std::vector<WheelSpeed> wheel;
-  std::vector<OdometryPose> odometry;
-
-  bool IsEmpty() const {
-    return imu.empty() && wheel.empty() && odometry.empty();
-  }
-  // The first and last time that the main sensor (the IMU when there is one)
-  // covers. Undefined when empty.
-  timestamp_t StartNs() const;
-  timestamp_t EndNs() const;
-};
 
 struct OdometryLinkOptions {
   double max_imu_gap_s = 0.1;
@@ -45,11 +31,6 @@ struct OdometryTimeline {
 OdometryTimeline BuildTimeline(const std::vector<timestamp_t>& times_ns,
                                const MotionLogs& logs,
                                const OdometryLinkOptions& options);
-
-// Whether the machine stands still in the second around a time: the wheels (if
-// any) do not turn and the IMU shows noise only.
-StandstillKind FindStandstill(const MotionLogs& logs, timestamp_t time_ns,
-                              const ImuNoise& noise, double imu_rate_hz);
 
 // One link between each two successive times. bias is subtracted from the IMU.
 std::vector<OdometryLink> BuildOdometryLinks(

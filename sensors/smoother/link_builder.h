@@ -43,7 +43,7 @@ class LinkBuilder {
   void AddWeakPriors();
 
   LinkResiduals Finish() const {
-    LinkResiduals result;
+    LinkResiduals result = rows_;
     result.values = values_.head(num_rows_);
     result.jacobian = jacobian_.topRows(num_rows_);
     result.wheel_chi2 = wheel_chi2_;
@@ -110,6 +110,7 @@ class LinkBuilder {
   const Eigen::Quaterniond a_rotation_;
   const Eigen::Matrix3d a_;
   int num_rows_ = 0;
+  LinkResiduals rows_;  // only which rows are whose
   double wheel_chi2_ = 0.0;
   double vision_chi2_ = 0.0;
   Eigen::Matrix<double, kMaxResiduals, 1> values_;

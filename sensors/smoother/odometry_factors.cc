@@ -63,6 +63,8 @@ void LinkBuilder::AddImu() {
   block(6, kFirst + ChainState::kGyro) = -imu.position_by_gyroscope;
   block(6, kFirst + ChainState::kAccel) = -imu.position_by_accelerometer;
   Whiten<9>(imu.covariance);
+  // The rotation comes first, so that its rows hold the gyroscope's noise only.
+  rows_.accelerometer = {row + 3, 6};
 }
 
 void LinkBuilder::AddBiasWalk() {
@@ -100,9 +102,14 @@ void LinkBuilder::AddVision(double weight) {
 void LinkBuilder::AddStandstill() {
   const OdometryFusionOptions& options = *context_.options;
   const double dt = std::max(link_.dt_s, 1e-3);
-  const double angle = options.standstill_rate_sigma * dt;
+  // The mean over all links of the standstill has the variance density^2 / time
+  // + sigma^2: the second part as a density, too.
+  const Eigen::Array3d density =
+      link_.standstill_rate_density.array().square() +
+      options.standstill_rate_sigma * options.standstill_rate_sigma *
+          std::max(link_.standstill_time_s, dt);
   AddRotationResidual(Eigen::Quaterniond::Identity(),
-                      angle * angle * Eigen::Matrix3d::Identity());
+                      (dt * density).matrix().asDiagonal());
   if (link_.standstill != StandstillKind::kAtRest) return;
   AddVector(kSecond + ChainState::kStep, second_.step_in_previous,
             options.standstill_speed_sigma * dt);

@@ -17,7 +17,8 @@ inline constexpr int kLinkSize = 2 * ChainState::kSize + ChainGlobals::kSize;
 //   IMU       Log(dR^T A), A v_k+1 - v_k - R_k^T G dt - dv,
 //             u - v_k dt - R_k^T G dt^2 / 2 - dp      (joint 9x9 covariance)
 //   biases    b_k+1 - b_k                             (random walk)
-//   wheels    q (u + A l - l) - (M d + N (phi x d))   (3x3 / weight)
+//   wheels    q (u + A l - l) - (M d + N (phi x d))   (3x3 / weight), along the
+//             direction of driving first
 //   yaw       q' z . Log(A) - curvature * distance - yaw
 //   vision    Log(Exp(Log(V) / s)^T A)                (sigma / weight)
 //   rest      Log(A), u, v_k, v_k+1                   (at a standstill)
@@ -28,6 +29,13 @@ struct LinkResiduals {
   // Squared norm of the wheels' residuals, before their weight.
   double wheel_chi2 = 0.0;
   double vision_chi2 = 0.0;  // the same for vision
+  // First row and number of the rows that depend on the accelerometer's noise,
+  // the wheels' speed and the wheels' yaw. Each is whitened.
+  struct Rows {
+    int first = 0;
+    int size = 0;
+  };
+  Rows accelerometer, wheel_speed, wheel_yaw;
 };
 
 // What a link's sensors count for: 1, less where they contradict the rest.

@@ -5,9 +5,11 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "core/median.h"
 #include "core/so3.h"
 #include "sensors/smoother/chain_elimination.h"
 #include "sensors/smoother/odometry_factors.h"
+#include "sensors/smoother/shared_uncertainty.h"
 #include "sensors/smoother/wheel_slips.h"
 
 namespace adasfm {
@@ -19,9 +21,14 @@ constexpr double kFirstSpeedSigma = 50.0;  // m/s
 // Slip thresholds start high and come down, so that links are judged by a
 // solution that is nearly right already.
 constexpr double kFirstThresholdFactor = 8.0;
+// How far a slip's ends reach beyond what is seen of it, seconds.
+constexpr double kSlipMarginS = 0.5;
 // What wheels that are slipping or stuck at the start begin with.
 constexpr double kFirstSlipWeight = 1e-4;
-constexpr double kConvergedStep = 1e-5;  // of a sigma-free unit: rad, m/s, m
+// Converged: a step of all unknowns together by this share of a sigma.
+constexpr double kConvergedStep = 0.01;
+// The threshold comes down after a smaller step than this: rad, m/s, m.
+constexpr double kSettledStep = 1e-2;
 
 // 1 up to the threshold, then falling faster than the residual grows.
 double RobustWeight(double chi2, double threshold_sigma) {
@@ -29,6 +36,26 @@ double RobustWeight(double chi2, double threshold_sigma) {
       threshold_sigma * threshold_sigma / std::max(chi2, 1e-12);
   return ratio >= 1.0 ? 1.0 : std::max(1e-6, ratio * ratio);
 }
+
+// Squares of residuals over their redundancy. Their median is that of the noise
+// as long as most links do not slip, also when the stated noise is so small
+// that most of them seem to.
+struct RowRatios {
+  std::vector<double> values;
+  double redundancy = 0.0;
+
+  NoiseCheck Check() {
+    // The median of a chi-square of one degree of freedom.
+    constexpr double kMedian = 0.4549;
+    if (values.empty()) return NoiseCheck();
+    return {redundancy * UpperMedian(&values) / kMedian, redundancy};
+  }
+};
+
+struct NoiseChecks {
+  RowRatios wheel_speed, wheel_yaw;
+  NoiseCheck accelerometer;
+};
 
 class Smoother {
  public:
@@ -56,11 +83,25 @@ class Smoother {
   LinkEquations Equations(size_t k) const;
   ChainMessage FirstMessage() const;
   double Cost() const;
-  // One damped Gauss-Newton step; returns the largest coordinate's change.
-  double Step();
+  // One damped Gauss-Newton step.
+  struct Change {
+    double largest = 0.0;  // of a coordinate
+    // By how many sigmas all coordinates together: sqrt(2 (old - new cost)).
+    double num_sigmas = 0.0;
+  };
+  Change Step();
   // Thresholds are the options' times factor.
   void UpdateWeights(double factor);
-  OdometryMotion Motion(size_t k, const LinkCovariance& covariance) const;
+  // A slip's ends are below the threshold, but all on the same side: wheels
+  // close to it in time weigh no more than it does.
+  void SpreadSlips();
+  // The motion over a link, without its covariance, and its derivative by the
+  // link's coordinates.
+  OdometryMotion Motion(size_t k) const;
+  Eigen::Matrix<double, 6, kLinkSize> MotionMap(size_t k) const;
+  void CheckNoise(size_t k, const LinkResiduals& residuals,
+                  const LinkCovariance& covariance, NoiseChecks* checks) const;
+  void FillCovariances(OdometryFusionResult* result) const;
   std::vector<std::pair<size_t, double>> FindSlippingLinks() const;
   void FillResult(OdometryFusionResult* result) const;
 
@@ -132,7 +173,7 @@ double Smoother::Cost() const {
   return 0.5 * cost;
 }
 
-double Smoother::Step() {
+Smoother::Change Smoother::Step() {
   const double old_cost = Cost();
   const std::vector<ChainState> old_states = states_;
   const ChainGlobals old_globals = globals_;
@@ -154,13 +195,13 @@ double Smoother::Step() {
     const double cost = Cost();
     if (std::isfinite(cost) && cost <= old_cost * (1.0 + 1e-9) + 1e-12) {
       damping_ = damping_ < 1e-7 ? 0.0 : 0.1 * damping_;
-      return largest;
+      return {largest, std::sqrt(2.0 * std::max(0.0, old_cost - cost))};
     }
     states_ = old_states;
     globals_ = old_globals;
     damping_ = damping_ == 0.0 ? 1e-6 : 10.0 * damping_;
   }
-  return 0.0;
+  return Change();
 }
 
 void Smoother::UpdateWeights(double factor) {
@@ -179,30 +220,57 @@ void Smoother::UpdateWeights(double factor) {
           RobustWeight(residuals.vision_chi2, vision_threshold);
     }
   }
+  SpreadSlips();
 }
 
-OdometryMotion Smoother::Motion(size_t k,
-                                const LinkCovariance& covariance) const {
+void Smoother::SpreadSlips() {
+  std::vector<double> spread(weights_.size());
+  for (size_t k = 0; k < weights_.size(); ++k) spread[k] = weights_[k].wheel;
+  for (size_t k = 0; k < weights_.size(); ++k) {
+    const double weight = weights_[k].wheel;
+    if (weight > kSlipWeight) continue;
+    double time = 0.0;
+    for (size_t i = k; i > 0 && time < kSlipMarginS; --i) {
+      spread[i - 1] = std::min(spread[i - 1], weight);
+      time += problem_.links[i - 1].dt_s;
+    }
+    time = 0.0;
+    for (size_t i = k + 1; i < weights_.size() && time < kSlipMarginS; ++i) {
+      spread[i] = std::min(spread[i], weight);
+      time += problem_.links[i].dt_s;
+    }
+  }
+  for (size_t k = 0; k < weights_.size(); ++k) weights_[k].wheel = spread[k];
+}
+
+OdometryMotion Smoother::Motion(size_t k) const {
   OdometryMotion motion;
+  const Eigen::Quaterniond r21 =
+      states_[k + 1].state.world_from_imu.conjugate() *
+      states_[k].state.world_from_imu;
+  motion.body2_from_body1 =
+      Rigid3d(r21, r21 * -states_[k + 1].step_in_previous);
+  motion.wheel_weight = weights_[k].wheel;
+  return motion;
+}
+
+Eigen::Matrix<double, 6, kLinkSize> Smoother::MotionMap(size_t k) const {
   const Eigen::Matrix3d r2_transposed =
       states_[k + 1].state.world_from_imu.toRotationMatrix().transpose();
   const Eigen::Quaterniond r21 =
       states_[k + 1].state.world_from_imu.conjugate() *
       states_[k].state.world_from_imu;
-  const Eigen::Vector3d& step = states_[k + 1].step_in_previous;
-  motion.body2_from_body1 = Rigid3d(r21, r21 * -step);
-  motion.wheel_weight = weights_[k].wheel;
   // dtheta = R2^T (d1 - d2), dt = [R21 u]x dtheta - R21 du.
   Eigen::Matrix<double, 6, kLinkSize> map;
   map.setZero();
   map.block<3, 3>(0, ChainState::kRotation) = r2_transposed;
   map.block<3, 3>(0, ChainState::kSize + ChainState::kRotation) =
       -r2_transposed;
-  map.bottomRows<3>() = Hat(r21 * step) * map.topRows<3>();
+  map.bottomRows<3>() =
+      Hat(r21 * states_[k + 1].step_in_previous) * map.topRows<3>();
   map.block<3, 3>(3, ChainState::kSize + ChainState::kStep) -=
       r21.toRotationMatrix();
-  motion.covariance = map * covariance * map.transpose();
-  return motion;
+  return map;
 }
 
 std::vector<std::pair<size_t, double>> Smoother::FindSlippingLinks() const {
@@ -219,31 +287,107 @@ std::vector<std::pair<size_t, double>> Smoother::FindSlippingLinks() const {
   return links;
 }
 
-void Smoother::FillResult(OdometryFusionResult* result) const {
-  constexpr int kLength = 2 * ChainState::kSize + ChainGlobals::kLoggedLength;
+void Smoother::CheckNoise(size_t k, const LinkResiduals& residuals,
+                          const LinkCovariance& covariance,
+                          NoiseChecks* checks) const {
+  const OdometryLink& link = problem_.links[k];
+  // Wheels at rest err less.
+  if (!link.has_imu || !link.has_wheel ||
+      link.standstill != StandstillKind::kNone) {
+    return;
+  }
+  const auto redundancy = [&](int row) {
+    const auto jacobian = residuals.jacobian.row(row);
+    return 1.0 - (jacobian * covariance).cwiseProduct(jacobian).sum();
+  };
+  const auto add = [&](const LinkResiduals::Rows& rows, RowRatios* ratios) {
+    for (int row = rows.first; row < rows.first + rows.size; ++row) {
+      const double share = redundancy(row);
+      if (share <= 0.0) continue;
+      const double value = residuals.values[row];
+      ratios->values.push_back(value * value / (weights_[k].wheel * share));
+      ratios->redundancy += share;
+    }
+  };
+  add(residuals.wheel_speed, &checks->wheel_speed);
+  add(residuals.wheel_yaw, &checks->wheel_yaw);
+  if (weights_[k].wheel < 1.0) return;
+  const LinkResiduals::Rows& rows = residuals.accelerometer;
+  for (int row = rows.first; row < rows.first + rows.size; ++row) {
+    checks->accelerometer.chi2 += residuals.values[row] * residuals.values[row];
+    checks->accelerometer.redundancy += redundancy(row);
+  }
+}
+
+void Smoother::FillCovariances(OdometryFusionResult* result) const {
+  using Shared = SharedUncertainty;
   constexpr int kMount = 2 * ChainState::kSize + ChainGlobals::kMountYaw;
-  const double length = globals_.values[ChainGlobals::kLoggedLength];
   const size_t num_links = problem_.links.size();
   result->motions.resize(num_links);
-  double gyro_variance = 0.0, accel_variance = 0.0;
+  Shared shared;
+  NoiseChecks checks;
+  // How a motion moves with one sigma of each shared coordinate.
+  std::vector<Eigen::Matrix<double, 6, Shared::kSize>> by_shared(num_links);
+  double accel_variance = 0.0, length_variance = 0.0;
+  Eigen::Array2d mount_variance(0.0, 0.0);
   ComputeChainCovariances(
       num_links, FirstMessage(), [this](size_t k) { return Equations(k); },
       [&](size_t k, const LinkCovariance& covariance) {
-        result->motions[k] = Motion(k, covariance);
-        const auto variances = covariance.diagonal();
-        gyro_variance += variances.segment<3>(ChainState::kGyro).mean();
-        accel_variance += variances.segment<3>(ChainState::kAccel).mean();
-        result->wheel_scale_sigma =
-            std::sqrt(covariance(kLength, kLength)) / (length * length);
-        result->wheel_mount_sigma = variances.segment<2>(kMount).cwiseSqrt();
+        const LinkResiduals residuals = Residuals(k);
+        CheckNoise(k, residuals, covariance, &checks);
+        shared.Add(problem_.links[k].dt_s, residuals, covariance);
+        const Eigen::Matrix<double, 6, kLinkSize> map = MotionMap(k);
+        result->motions[k] = Motion(k);
+        result->motions[k].covariance = map * covariance * map.transpose();
+        for (int i = 0; i < Shared::kSize; ++i) {
+          const int column = Shared::Column(i);
+          by_shared[k].col(i) = map * covariance.col(column) /
+                                std::sqrt(covariance(column, column));
+        }
+        result->gyroscope_bias_covariance +=
+            covariance.block<3, 3>(ChainState::kGyro, ChainState::kGyro) /
+            num_links;
+        accel_variance +=
+            covariance.diagonal().segment<3>(ChainState::kAccel).mean();
+        length_variance = covariance(Shared::Column(Shared::kScale),
+                                     Shared::Column(Shared::kScale));
+        mount_variance = covariance.diagonal().segment<2>(kMount);
       });
-  result->wheel_scale = 1.0 / length;
-  result->wheel_mount = globals_.values.segment<2>(ChainGlobals::kMountYaw);
-  if (num_links > 0) {
-    result->gyroscope_bias_sigma = std::sqrt(gyro_variance / num_links);
-    result->accelerometer_bias_sigma = std::sqrt(accel_variance / num_links);
+  result->accelerometer_check = checks.accelerometer;
+  result->wheel_speed_check = checks.wheel_speed.Check();
+  result->wheel_yaw_check = checks.wheel_yaw.Check();
+  const Shared::Vector growth = shared.Growth();
+  for (size_t k = 0; k < num_links; ++k) {
+    result->motions[k].covariance +=
+        by_shared[k] * growth.matrix().asDiagonal() * by_shared[k].transpose();
   }
-  for (const ChainState& state : states_) result->states.push_back(state.state);
+  const Eigen::Vector3d root =
+      (1.0 + growth.segment<3>(Shared::kGyro)).sqrt().matrix();
+  result->gyroscope_bias_covariance =
+      (root.asDiagonal() * result->gyroscope_bias_covariance *
+       root.asDiagonal())
+          .eval();
+  result->gyroscope_bias_sigma =
+      std::sqrt(result->gyroscope_bias_covariance.trace() / 3.0);
+  result->accelerometer_bias_sigma = std::sqrt(accel_variance / num_links);
+  const double length = globals_.values[ChainGlobals::kLoggedLength];
+  result->wheel_scale_sigma =
+      std::sqrt(length_variance * (1.0 + growth[Shared::kScale])) /
+      (length * length);
+  result->wheel_mount_sigma =
+      (mount_variance * (1.0 + growth.segment<2>(Shared::kMountYaw)))
+          .sqrt()
+          .matrix();
+}
+
+void Smoother::FillResult(OdometryFusionResult* result) const {
+  for (const ChainState& state : states_) {
+    result->states.push_back(state.state);
+    result->gyroscope_bias += state.state.bias.gyroscope / states_.size();
+  }
+  result->wheel_scale = 1.0 / globals_.values[ChainGlobals::kLoggedLength];
+  result->wheel_mount = globals_.values.segment<2>(ChainGlobals::kMountYaw);
+  if (!problem_.links.empty()) FillCovariances(result);
   result->slipping_links = FindSlippingLinks();
 }
 
@@ -255,13 +399,13 @@ OdometryFusionResult Smoother::Run() {
   }
   while (result.num_iterations < options_.max_num_iterations) {
     ++result.num_iterations;
-    const double change = Step();
-    if (factor == 1.0 && change < kConvergedStep) {
+    const Change change = Step();
+    if (factor == 1.0 && change.num_sigmas < kConvergedStep) {
       result.converged = true;
       break;
     }
     // The threshold comes down once the solution has settled at it.
-    if (change < 1e-2) factor = std::max(1.0, 0.5 * factor);
+    if (change.largest < kSettledStep) factor = std::max(1.0, 0.5 * factor);
     UpdateWeights(factor);
   }
   FillResult(&result);
@@ -269,6 +413,10 @@ OdometryFusionResult Smoother::Run() {
 }
 
 }  // namespace
+
+double NoiseCheck::Factor() const {
+  return std::sqrt((kPriorRedundancy + chi2) / (kPriorRedundancy + redundancy));
+}
 
 OdometryFusionResult FuseOdometry(const OdometryFusionProblem& problem,
                                   const OdometryFusionOptions& options) {

@@ -43,12 +43,14 @@ struct OdometryFusionOptions {
   double visual_turn_sigma = 0.01;
   // Reported as slip when also the speed is off by more than this.
   double slip_min_speed_m_s = 0.2;
-  // A machine at rest moves no more than this.
+  // A machine at rest moves no more than this. The rate is one unknown of a
+  // whole standstill: it does not get smaller with its length.
   double standstill_speed_sigma = 0.005;  // m/s
   double standstill_rate_sigma = 1e-4;    // rad/s
   // Speeds of an IMU without wheels stay within this: all that is known.
   double unaided_speed_sigma = 15.0;  // m/s
-  int max_num_iterations = 30;
+  // A slipping wheel's weight settles slowly: most drives take 15.
+  int max_num_iterations = 100;
 
   bool IsValid(std::string* error) const;
 };
@@ -76,6 +78,11 @@ struct OdometryLink {
   // The wheels see no turn (WheelType::kSpeed).
   bool has_wheel_yaw = false;
   StandstillKind standstill = StandstillKind::kNone;
+  // At a standstill: the density of what the machine turns all the same,
+  // rad/s/sqrt(Hz) about each axis, and the time of all links that stand still
+  // together, s (sensors/smoother/standstill.h).
+  Eigen::Vector3d standstill_rate_density = Eigen::Vector3d::Zero();
+  double standstill_time_s = 0.0;
   // The body's rotation over the link (first_from_second) as cameras saw it.
   bool has_vision = false;
   Eigen::Quaterniond visual_rotation = Eigen::Quaterniond::Identity();
@@ -114,19 +121,39 @@ struct WheelSlip {
   double speed_error_m_s = 0.0;  // logged minus true, the largest
 };
 
+// How the residuals of one kind compare with their stated noise: the sum of
+// their squares, whitened, and its expectation (the residuals' redundancy).
+struct NoiseCheck {
+  double chi2 = 0.0;
+  double redundancy = 0.0;
+
+  // True over stated sigma. The stated one weighs as much as kPriorRedundancy
+  // residuals.
+  static constexpr double kPriorRedundancy = 30.0;
+  double Factor() const;
+};
+
 struct OdometryFusionResult {
   std::vector<OdometryState> states;
   std::vector<OdometryMotion> motions;  // one a link
   // Links whose wheels contradict the IMU, with logged minus fused speed.
   std::vector<std::pair<size_t, double>> slipping_links;
+  // True length = scale * logged length; 1 sigma.
   double wheel_scale = 1.0;
   double wheel_scale_sigma = 0.0;
   // How the direction of driving is turned against T_imu_wheel: about its z
   // (to the left) and its y axis (down), rad.
   Eigen::Vector2d wheel_mount = Eigen::Vector2d::Zero();
   Eigen::Vector2d wheel_mount_sigma = Eigen::Vector2d::Zero();
+  // rad/s in the body (IMU) frame: mean over the states, and the mean of their
+  // covariances (rad^2/s^2).
+  Eigen::Vector3d gyroscope_bias = Eigen::Vector3d::Zero();
+  Eigen::Matrix3d gyroscope_bias_covariance = Eigen::Matrix3d::Zero();
   double gyroscope_bias_sigma = 0.0;      // mean of states and axes
   double accelerometer_bias_sigma = 0.0;  // mean of states and axes
+  // Over the links on the move: of the accelerometer over those whose wheels do
+  // not slip, of the wheels by the median of all.
+  NoiseCheck accelerometer_check, wheel_speed_check, wheel_yaw_check;
   int num_iterations = 0;
   bool converged = false;
 };
@@ -135,7 +162,8 @@ struct OdometryFusionResult {
 // their mounting from all links at once. The normal equations are block
 // tridiagonal with a narrow border: time and memory are linear in the number
 // of links, and the covariances are the exact marginals of the linearised
-// problem (docs/reference/sensors.md). Throws std::invalid_argument when sizes
+// problem, widened where residuals are more alike over seconds than white noise
+// (smoother/shared_uncertainty.h). Throws std::invalid_argument when sizes
 // disagree.
 OdometryFusionResult FuseOdometry(const OdometryFusionProblem& problem,
                                   const OdometryFusionOptions& options);

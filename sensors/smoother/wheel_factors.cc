@@ -29,11 +29,23 @@ void LinkBuilder::AddWheel(double weight) {
   jacobian_.block<3, 1>(row, kGlobals + ChainGlobals::kLoggedLength) = moved;
   jacobian_.block<3, 2>(row, kGlobals + ChainGlobals::kMountYaw) =
       -map * forward_by_mount;
-  Whiten<3>(wheel.covariance / weight);
+  // In the wheel frame in the middle of the turn, the first row is the speed.
+  const Eigen::Matrix3d wheel_from_start =
+      (Eigen::Quaterniond::Identity().slerp(0.5, wheel.profile_rotation) *
+       context_.problem->imu_from_wheel.rotation)
+          .toRotationMatrix()
+          .transpose();
+  values_.segment<3>(row) = (wheel_from_start * values_.segment<3>(row)).eval();
+  jacobian_.middleRows<3>(row) =
+      (wheel_from_start * jacobian_.middleRows<3>(row)).eval();
+  Whiten<3>(wheel_from_start * wheel.covariance * wheel_from_start.transpose() /
+            weight);
+  rows_.wheel_speed = {row, 1};
   wheel_chi2_ +=
       weight > 0.0 ? values_.segment<3>(row).squaredNorm() / weight : 0.0;
   if (wheel.has_rotation) {
     AddRotationResidual(wheel.rotation, wheel.rotation_covariance / weight);
+    rows_.wheel_yaw = {row + 3, 3};
     wheel_chi2_ += values_.segment<3>(row + 3).squaredNorm() / weight;
     return;
   }
@@ -48,6 +60,7 @@ void LinkBuilder::AddWheelYaw(double weight) {
   const Eigen::Vector3d turn = LogSo3(a_rotation_);
   const double root_weight = std::sqrt(weight / wheel.yaw_variance);
   const int row = num_rows_++;
+  rows_.wheel_yaw = {row, 1};
   const double logged_per_true = globals_.values[ChainGlobals::kLoggedYaw];
   values_[row] = root_weight *
                  (logged_per_true * up.dot(turn) -

@@ -1,0 +1,26 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <vector>
+
+#include "core/sensor_log.h"
+#include "sensors/preintegration/wheel_odometry.h"
+
+namespace adasfm {
+
+// All that moves the machine, on the IMU's clock.
+struct MotionLogs {
+  std::vector<ImuSample> imu;
+  std::vector<WheelSpeed> wheel;
+  std::vector<OdometryPose> odometry;
+
+  bool IsEmpty() const {
+    return imu.empty() && wheel.empty() && odometry.empty();
+  }
+  // The first and last time that the main sensor (the IMU when there is one)
+  // covers. Undefined when empty.
+  timestamp_t StartNs() const;
+  timestamp_t EndNs() const;
+};
+
+}  // namespace adasfm
