@@ -77,13 +77,13 @@ bool DetectBaseline(const EdgeBearings& bearings,
       3.0 * kRatioSigma / std::sqrt(static_cast<double>(count));
   // Without a baseline, turns along the epipolar lines cost nothing, so the
   // rotation at hand may be any of them.
-  constexpr int kMaxNumTurns = 5;
+  constexpr int kMaxNumTurns = 3;
   Eigen::Matrix3d turned = rotation;
   double last_px = std::numeric_limits<double>::infinity();
   for (int i = 0; i <= kMaxNumTurns; ++i) {
     const double median_px = MedianDisplacementPx(bearings, turned, &turned);
     if (median_px <= (1.0 + tolerance) * expected_px) return false;
-    if (median_px > 0.9 * last_px) break;
+    if (median_px > 0.7 * last_px) break;
     last_px = median_px;
   }
   return true;
