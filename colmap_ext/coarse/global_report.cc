@@ -181,8 +181,7 @@ std::string FormatGlobalReportJson(const SceneData& scene,
   const RotationRateReport& rates = result.poses.rotation_rates;
   report["rotation_rates"] = {{"corrected", rates.corrected},
                               {"pairs", rates.num_pairs},
-                              {"max_rate_rad_s", rates.max_rate_rad_s},
-                              {"vision_offset_rad", rates.offset_rad.norm()}};
+                              {"max_rate_rad_s", rates.max_rate_rad_s}};
   report["joins"] = JoinFilterJson(scene, result.poses.join_filter);
   for (size_t i = 0; i < result.models.size(); ++i) {
     report["models"].push_back(

@@ -62,9 +62,6 @@ void GlobalOptionAdder::AddRotations() {
       "1 sigma of its change from span to span, per axis [rad/s]");
   Add("rotation_rate_min_sigma_rad", &rates->min_rotation_sigma_rad,
       "least error granted to a pair's rotation [rad]");
-  Add("rotation_rate_offset_sigma_rad", &rates->offset_sigma_rad,
-      "1 sigma of what all visual rotations are wrong by alike, per axis "
-      "[rad]");
 }
 
 void GlobalOptionAdder::AddMount() {

@@ -21,7 +21,7 @@ using Information = Eigen::Matrix<double, kNumMountUnknowns, kNumMountUnknowns>;
 // Fewer spans of the drive do not tell how they vary.
 constexpr int kMinNumSpans = 5;
 // 1 sigma of the other unknowns: what may be left of a gyroscope's bias, and
-// what two-view geometry is wrong by (RotationRateOptions).
+// what all two-view rotations are wrong by alike.
 constexpr double kRateSigmaRadS = 1e-3;
 constexpr double kOffsetSigmaRad = 2e-3;
 

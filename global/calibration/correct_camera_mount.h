@@ -49,8 +49,8 @@ struct CameraMountReport {
 // of the priors: R^ -> E R^ E^T, t^ -> E t^. Vision sees the axis about which
 // the camera turns (R = E R^ E^T for each pair), and where it moves to: with
 // the sensors' rotation held, a pair's matches have one direction, E t^. Linear
-// in E, a constant gyroscope bias and vision's own offset (see
-// RotationRateOptions), Huber weights, relinearised. The covariance is that of
+// in E, a constant gyroscope bias and an offset of all visual rotations
+// (kOffsetSigmaRad), Huber weights, relinearised. The covariance is that of
 // spans of the drive, whose pairs share their errors.
 // graph has rotations that do not know the priors (RefineRelativePoses without
 // predictions); pairs that are far apart or not of the chain are passed over.

@@ -54,7 +54,7 @@ Windows BuildWindows(const RotationRateOptions& options,
   return windows;
 }
 
-// What one pair says of its span: error = jacobian * rate + offset.
+// What one pair says of its span: error = jacobian * rate.
 struct RatePair {
   int window = 0;
   Eigen::Vector3d error;
@@ -107,48 +107,38 @@ std::vector<RatePair> CollectPairs(const RotationRateOptions& options,
   return pairs;
 }
 
-struct Corrections {
-  std::vector<Eigen::Vector3d> rates;  // by span
-  Eigen::Vector3d offset = Eigen::Vector3d::Zero();
-};
-
-// By span: what the errors ask of the rate, and what the offset takes from it.
-using Columns = Eigen::Matrix<double, 3, 4>;
+using Rates = std::vector<Eigen::Vector3d>;  // by span
 
 std::vector<double> ComputeWeights(const std::vector<RatePair>& pairs,
-                                   const Corrections& corrections) {
+                                   const Rates& rates) {
   constexpr double kHuberSigmas = 1.5;
   std::vector<double> weights;
   weights.reserve(pairs.size());
   for (const RatePair& pair : pairs) {
-    const double sigmas = (pair.error - corrections.offset -
-                           pair.jacobian * corrections.rates[pair.window])
-                              .norm() /
-                          pair.sigma;
+    const double sigmas =
+        (pair.error - pair.jacobian * rates[pair.window]).norm() / pair.sigma;
     weights.push_back(std::min(1.0, kHuberSigmas / std::max(sigmas, 1e-9)) /
                       (pair.sigma * pair.sigma * pair.num_steps));
   }
   return weights;
 }
 
-// The rates as a linear function of the offset: a chain of 3 x 3 blocks,
-// eliminated from its start.
-std::vector<Columns> SolveRates(const RotationRateOptions& options,
-                                const Windows& windows,
-                                const std::vector<RatePair>& pairs,
-                                const std::vector<double>& weights) {
+// One weighted least-squares solution: a chain of 3 x 3 blocks, eliminated from
+// its start.
+Rates SolveRates(const RotationRateOptions& options, const Windows& windows,
+                 const std::vector<RatePair>& pairs, const Rates& last) {
+  const std::vector<double> weights = ComputeWeights(pairs, last);
   const size_t count = windows.continues.size();
   const double coupling = std::pow(options.drift_sigma_rad_s, -2);
   std::vector<Eigen::Matrix3d> blocks(
       count,
       std::pow(options.rate_sigma_rad_s, -2) * Eigen::Matrix3d::Identity());
-  std::vector<Columns> right_sides(count, Columns::Zero());
+  Rates rates(count, Eigen::Vector3d::Zero());
   for (size_t k = 0; k < pairs.size(); ++k) {
     const RatePair& pair = pairs[k];
     const Eigen::Matrix3d weighted = weights[k] * pair.jacobian.transpose();
     blocks[pair.window] += weighted * pair.jacobian;
-    right_sides[pair.window].col(0) += weighted * pair.error;
-    right_sides[pair.window].rightCols<3>() += weighted;
+    rates[pair.window] += weighted * pair.error;
   }
   for (size_t w = 0; w < count; ++w) {
     if (!windows.continues[w]) continue;
@@ -160,43 +150,15 @@ std::vector<Columns> SolveRates(const RotationRateOptions& options,
     const Eigen::LLT<Eigen::Matrix3d> previous(blocks[w - 1]);
     blocks[w] -=
         coupling * coupling * previous.solve(Eigen::Matrix3d::Identity());
-    right_sides[w] += coupling * previous.solve(right_sides[w - 1]);
+    rates[w] += coupling * previous.solve(rates[w - 1]);
   }
-  std::vector<Columns> solution(count);
   for (size_t w = count; w-- > 0;) {
-    Columns right_side = right_sides[w];
     if (w + 1 < count && windows.continues[w + 1]) {
-      right_side += coupling * solution[w + 1];
+      rates[w] += coupling * rates[w + 1];
     }
-    solution[w] = blocks[w].llt().solve(right_side);
+    rates[w] = blocks[w].llt().solve(rates[w]).eval();
   }
-  return solution;
-}
-
-// One weighted least-squares solution.
-Corrections SolveCorrections(const RotationRateOptions& options,
-                             const Windows& windows,
-                             const std::vector<RatePair>& pairs,
-                             const Corrections& last) {
-  const std::vector<double> weights = ComputeWeights(pairs, last);
-  const std::vector<Columns> columns =
-      SolveRates(options, windows, pairs, weights);
-  Eigen::Matrix3d information =
-      std::pow(options.offset_sigma_rad, -2) * Eigen::Matrix3d::Identity();
-  Eigen::Vector3d right_side = Eigen::Vector3d::Zero();
-  for (size_t k = 0; k < pairs.size(); ++k) {
-    const Columns moved = pairs[k].jacobian * columns[pairs[k].window];
-    information +=
-        weights[k] * (Eigen::Matrix3d::Identity() - moved.rightCols<3>());
-    right_side += weights[k] * (pairs[k].error - moved.col(0));
-  }
-  Corrections corrections;
-  corrections.offset = information.partialPivLu().solve(right_side);
-  for (const Columns& column : columns) {
-    corrections.rates.push_back(column.col(0) -
-                                column.rightCols<3>() * corrections.offset);
-  }
-  return corrections;
+  return rates;
 }
 
 }  // namespace
@@ -208,11 +170,10 @@ bool RotationRateOptions::IsValid(std::string* error) const {
     return false;
   }
   if (!(window_s > 0.0) || !(rate_sigma_rad_s > 0.0) ||
-      !(drift_sigma_rad_s > 0.0) || !(min_rotation_sigma_rad > 0.0) ||
-      !(offset_sigma_rad > 0.0)) {
+      !(drift_sigma_rad_s > 0.0) || !(min_rotation_sigma_rad > 0.0)) {
     *error =
-        "window_s, rate_sigma_rad_s, drift_sigma_rad_s, "
-        "min_rotation_sigma_rad and offset_sigma_rad must be > 0";
+        "window_s, rate_sigma_rad_s, drift_sigma_rad_s and "
+        "min_rotation_sigma_rad must be > 0";
     return false;
   }
   return true;
@@ -228,16 +189,14 @@ RotationRateReport CorrectRotationRates(
       CollectPairs(options, chain, windows, graph);
   report.num_pairs = pairs.size();
   if (pairs.empty()) return report;
-  Corrections corrections;
-  corrections.rates.assign(windows.continues.size(), Eigen::Vector3d::Zero());
+  Rates rates(windows.continues.size(), Eigen::Vector3d::Zero());
   for (int k = 0; k < kNumIterations; ++k) {
-    corrections = SolveCorrections(options, windows, pairs, corrections);
+    rates = SolveRates(options, windows, pairs, rates);
   }
-  for (const Eigen::Vector3d& rate : corrections.rates) {
+  for (const Eigen::Vector3d& rate : rates) {
     if (!rate.allFinite()) return RotationRateReport();
     report.max_rate_rad_s = std::max(report.max_rate_rad_s, rate.norm());
   }
-  report.offset_rad = corrections.offset;
   for (RelativePosePrior& prior : *priors) {
     if (!prior.HasRotation() ||
         !chain.IsConnected(prior.image_id1, prior.image_id2) ||
@@ -247,7 +206,7 @@ RotationRateReport CorrectRotationRates(
     const int window = windows.window_of_step[chain.Index(prior.image_id2)];
     report.corrected = true;
     prior.cam2_from_cam1.rotation =
-        (ExpSo3(SecondsFromNs(prior.dt_ns) * corrections.rates[window]) *
+        (ExpSo3(SecondsFromNs(prior.dt_ns) * rates[window]) *
          prior.cam2_from_cam1.rotation)
             .normalized();
   }

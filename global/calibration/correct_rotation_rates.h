@@ -24,10 +24,6 @@ struct RotationRateOptions {
   double drift_sigma_rad_s = 1e-4;
   // Least error granted to a visual rotation.
   double min_rotation_sigma_rad = 5e-4;
-  // 1 sigma of what all visual rotations are wrong by alike, per axis: driving
-  // ahead, two-view geometry has a bias of a tenth of a degree. It is the same
-  // for near and far pairs, which tells it from a rate.
-  double offset_sigma_rad = 2e-3;
 
   bool IsValid(std::string* error) const;
 };
@@ -38,15 +34,13 @@ struct RotationRateReport {
   int num_pairs = 0;
   // Largest correction of a span.
   double max_rate_rad_s = 0.0;
-  // What the visual rotations are wrong by alike, in the later camera.
-  Eigen::Vector3d offset_rad = Eigen::Vector3d::Zero();
 };
 
 // Takes out of the priors' rotations what remained of the gyroscope's bias: a
 // standstill of seconds leaves degrees after minutes, and vision sees them
 // in the mean of hundreds of pairs, which must not know the priors yet
-// (RefineRelativePoses without predictions). Linear in the corrections and the
-// common offset, Huber weights.
+// (RefineRelativePoses without predictions). Linear in the corrections, Huber
+// weights.
 RotationRateReport CorrectRotationRates(const RotationRateOptions& options,
                                         const OdometryChain& chain,
                                         const ViewGraph& graph,

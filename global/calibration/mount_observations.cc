@@ -9,12 +9,12 @@
 #include <utility>
 
 #include "core/so3.h"
+#include "global/two_view/minimize_epipolar_distances.h"
 #include "global/two_view/translation_direction.h"
 
 namespace adasfm {
 namespace {
 
-using Matrix5d = Eigen::Matrix<double, 5, 5>;
 using Jacobian = Eigen::Matrix<double, 3, kNumMountUnknowns>;
 
 // Matches beyond these add little.
@@ -102,33 +102,6 @@ MountObservation ObserveRotation(const MountPair& pair,
   return Whiten<3>(
       pair, jacobian, residual,
       motion.rotation_covariance + sigma * sigma * Eigen::Matrix3d::Identity());
-}
-
-// The normal matrix of the matches' distances by (rotation, direction), in
-// units of the noise's variance.
-Matrix5d ComputeInformation(const TranslationProblem& problem,
-                            const Eigen::Vector3d& direction,
-                            const Eigen::Matrix<double, 3, 2>& basis) {
-  Matrix5d matrix = Matrix5d::Zero();
-  double sum_weights = 0.0;
-  double sum_weighted_squares = 0.0;
-  const EdgeBearings& bearings = problem.bearings;
-  for (size_t k = 0; k < bearings.bearings1.size(); ++k) {
-    const EpipolarResidual residual =
-        ComputeEpipolarResidual(*bearings.bearings1[k], *bearings.bearings2[k],
-                                problem.rotation, direction);
-    const double squared = residual.distance_px * residual.distance_px;
-    const double weight = 1.0 / (1.0 + squared / (kLossScalePx * kLossScalePx));
-    const Eigen::Matrix<double, 5, 1> jacobian = EpipolarJacobian(
-        *bearings.bearings1[k], *bearings.bearings2[k], problem.rotation,
-        direction, basis, residual.inverse_norm);
-    matrix.noalias() += weight * jacobian * jacobian.transpose();
-    sum_weights += weight;
-    sum_weighted_squares += weight * squared;
-  }
-  return matrix /
-         std::max(kKeypointSigmaPx * kKeypointSigmaPx,
-                  sum_weighted_squares / std::max(1.0, sum_weights - 2.0));
 }
 
 bool TellsTheMount(int max_num_steps, const OdometryChain& chain,
@@ -227,10 +200,12 @@ std::vector<MountObservation> ObserveMount(const OdometryChain& chain,
       !(direction.norm() > 0.5)) {
     return observations;
   }
-  const Eigen::Matrix<double, 3, 2> basis = TangentBasis(motion.direction);
-  const Matrix5d information = ComputeInformation(problem, direction, basis);
+  const EpipolarInformation information = ComputeEpipolarInformation(
+      {kLossScalePx, kKeypointSigmaPx, kNumDirectionUnknowns}, pair.bearings,
+      {motion.rotation, direction});
+  const Eigen::Matrix<double, 3, 2>& basis = information.basis;
   const Eigen::LLT<Eigen::Matrix2d> solver(
-      information.bottomRightCorner<2, 2>());
+      information.matrix.bottomRightCorner<2, 2>());
   const Eigen::Matrix2d by_matches = solver.solve(Eigen::Matrix2d::Identity());
   if (solver.info() != Eigen::Success || !by_matches.allFinite()) {
     return observations;
@@ -238,12 +213,12 @@ std::vector<MountObservation> ObserveMount(const OdometryChain& chain,
   // How the direction of least distances moves with the rotation that is held;
   // it is held at the sensors', which is off by minus the change.
   const Eigen::Matrix<double, 2, 3> by_rotation =
-      solver.solve(information.bottomLeftCorner<2, 3>());
+      solver.solve(information.matrix.bottomLeftCorner<2, 3>());
   Eigen::Matrix<double, 2, kNumMountUnknowns> jacobian =
       by_rotation * motion.rotation_change;
   jacobian.leftCols<3>() -= basis.transpose() * Hat(motion.direction);
   observations.push_back(Whiten<2>(
-      pair, jacobian, basis.transpose() * direction,
+      pair, jacobian, -basis.transpose() * motion.direction,
       by_matches +
           by_rotation * motion.rotation_covariance * by_rotation.transpose() +
           basis.transpose() * motion.direction_covariance * basis));

@@ -8,7 +8,8 @@
 namespace adasfm {
 
 // Whether half of a pair's points move by more than the noise of the keypoints
-// would let them, beyond the rotation. At a standstill, and when turning on the
+// would let them, whatever the rotation (the search for one starts at the given
+// one). At a standstill, and when turning on the
 // spot, they do not: then the few of grossest noise, or those on passing cars,
 // decide the direction alone, and agree with each other very well.
 //

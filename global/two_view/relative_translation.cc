@@ -10,73 +10,29 @@
 #include "core/parallel.h"
 #include "core/so3.h"
 #include "global/two_view/detect_baseline.h"
+#include "global/two_view/minimize_epipolar_distances.h"
 #include "global/two_view/translation_direction.h"
 
 namespace adasfm {
 namespace {
 
-// The covariance of basis^T normal for one pixel of noise in both keypoints.
-Eigen::Matrix2d NormalNoise(const TranslationProblem& problem, size_t k,
-                            const Eigen::Matrix<double, 3, 2>& basis) {
-  const Bearing& bearing1 = *problem.bearings.bearings1[k];
-  const Bearing& bearing2 = *problem.bearings.bearings2[k];
-  const Eigen::Matrix2d by_pixel1 = basis.transpose() *
-                                    Hat(bearing2.direction) * problem.rotation *
-                                    bearing1.jacobian;
-  const Eigen::Matrix2d by_pixel2 = basis.transpose() *
-                                    Hat(problem.rotation * bearing1.direction) *
-                                    bearing2.jacobian;
-  return by_pixel1 * by_pixel1.transpose() + by_pixel2 * by_pixel2.transpose();
-}
-
 // The larger axis of the direction's covariance: noise of the keypoints, and
 // what an error of the rotation would turn it by.
 double DirectionSigma(const RelativeTranslationOptions& options,
-                      const TranslationProblem& problem,
-                      const Eigen::Vector3d& translation) {
-  const Eigen::Matrix<double, 3, 2> basis = TangentBasis(translation);
-  Eigen::Matrix2d information = Eigen::Matrix2d::Zero();
-  Eigen::Matrix2d noise = Eigen::Matrix2d::Zero();
-  Eigen::Matrix<double, 2, 3> mixed = Eigen::Matrix<double, 2, 3>::Zero();
-  const double squared_scale = options.loss_scale_px * options.loss_scale_px;
-  double sum_weights = 0.0;
-  double sum_weighted_squares = 0.0;
-  for (size_t k = 0; k < problem.normals.size(); ++k) {
-    const Bearing& bearing2 = *problem.bearings.bearings2[k];
-    const EpipolarResidual residual =
-        ComputeEpipolarResidual(*problem.bearings.bearings1[k], bearing2,
-                                problem.rotation, translation);
-    const double squared = residual.distance_px * residual.distance_px;
-    const double weight = 1.0 / (1.0 + squared / squared_scale);
-    const Eigen::Vector2d by_direction =
-        residual.inverse_norm * basis.transpose() * problem.normals[k];
-    const Eigen::Vector3d by_rotation =
-        residual.inverse_norm *
-        (problem.rotation * problem.bearings.bearings1[k]->direction)
-            .cross(bearing2.direction.cross(translation));
-    information += weight * by_direction * by_direction.transpose();
-    noise += weight * NormalNoise(problem, k, residual.inverse_norm * basis);
-    mixed += weight * by_direction * by_rotation.transpose();
-    sum_weights += weight;
-    sum_weighted_squares += weight * squared;
-  }
-  const double measured_variance =
-      sum_weighted_squares / std::max(1.0, sum_weights - 2.0);
-  const double variance =
-      std::max(std::pow(options.keypoint_sigma_px, 2), measured_variance);
-  // Noise alone makes normals too: without a baseline there is nothing else.
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> eigen(
-      information - measured_variance * noise);
-  information = eigen.eigenvectors() *
-                eigen.eigenvalues().cwiseMax(0.0).asDiagonal() *
-                eigen.eigenvectors().transpose();
+                      const EdgeBearings& bearings, const TwoViewPose& pose) {
+  const EpipolarInformation information = ComputeEpipolarInformation(
+      {options.loss_scale_px, options.keypoint_sigma_px, kNumDirectionUnknowns},
+      bearings, pose);
   // The ridge stands for a radian: what nothing determines.
-  const Eigen::Matrix2d inverse =
-      (information + variance * Eigen::Matrix2d::Identity()).inverse();
+  const Eigen::Matrix2d by_matches =
+      (information.matrix.bottomRightCorner<2, 2>() +
+       Eigen::Matrix2d::Identity())
+          .inverse();
   const Eigen::Matrix<double, 2, 3> by_rotation =
-      DegToRad(options.rotation_sigma_deg) * inverse * mixed;
+      DegToRad(options.rotation_sigma_deg) * by_matches *
+      information.matrix.bottomLeftCorner<2, 3>();
   const Eigen::Matrix2d covariance =
-      variance * inverse + by_rotation * by_rotation.transpose();
+      by_matches + by_rotation * by_rotation.transpose();
   return std::sqrt(Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d>(covariance)
                        .eigenvalues()(1));
 }
@@ -94,7 +50,8 @@ void RefineEdge(const RelativeTranslationOptions& options,
   edge->has_translation = false;
   if (direction.norm() == 0.0) return;
   edge->cam2_from_cam1 = Rigid3d(problem.rotation, direction);
-  edge->direction_sigma_rad = DirectionSigma(options, problem, direction);
+  edge->direction_sigma_rad =
+      DirectionSigma(options, problem.bearings, {problem.rotation, direction});
   edge->has_baseline = DetectBaseline(problem.bearings, problem.rotation,
                                       direction, options.keypoint_sigma_px);
   edge->has_translation =

@@ -7,55 +7,49 @@
 #include <limits>
 #include <utility>
 
+#include "global/two_view/minimize_epipolar_distances.h"
+
 namespace adasfm {
 namespace {
 
-struct Weighted {
-  Eigen::Matrix3d matrix = Eigen::Matrix3d::Zero();
-  double cost = 0.0;
-  double sum_weights = 0.0;
-  double sum_weighted_squares = 0.0;
-};
-
 // sum of w normal normal^T in px^-2 with Cauchy weights at t.
-Weighted Accumulate(const TranslationProblem& problem,
-                    const Eigen::Vector3d& translation, double loss_scale_px) {
-  Weighted sums;
-  const double squared_scale = loss_scale_px * loss_scale_px;
+Eigen::Matrix3d SumNormals(const TranslationProblem& problem,
+                           const Eigen::Vector3d& translation,
+                           double loss_scale_px) {
+  Eigen::Matrix3d sum = Eigen::Matrix3d::Zero();
   for (size_t k = 0; k < problem.normals.size(); ++k) {
     const EpipolarResidual residual = ComputeEpipolarResidual(
         *problem.bearings.bearings1[k], *problem.bearings.bearings2[k],
         problem.rotation, translation);
-    const double squared = residual.distance_px * residual.distance_px;
-    const double weight = 1.0 / (1.0 + squared / squared_scale);
+    const double weight =
+        1.0 / (1.0 + std::pow(residual.distance_px / loss_scale_px, 2));
     const Eigen::Vector3d normal = residual.inverse_norm * problem.normals[k];
-    sums.matrix.noalias() += weight * normal * normal.transpose();
-    sums.cost += squared_scale * std::log1p(squared / squared_scale);
-    sums.sum_weights += weight;
-    sums.sum_weighted_squares += weight * squared;
+    sum.noalias() += weight * normal * normal.transpose();
   }
-  return sums;
+  return sum;
 }
 
-// IRLS from a start; each step is the least eigenvector. The loss narrows from
-// widest_factor times its scale.
-Eigen::Vector3d Solve(const TranslationProblem& problem, int num_iterations,
-                      double loss_scale_px, double widest_factor,
+// Least eigenvectors while the loss narrows from widest_factor times its scale.
+// They reach far, but the distances' roots are not held in what they minimise;
+// the minimum itself is found from there.
+EpipolarMinimum Solve(const DirectionSearch& options,
+                      const TranslationProblem& problem, double widest_factor,
                       Eigen::Vector3d translation) {
-  double scale = widest_factor * loss_scale_px;
-  for (int i = 0; i < num_iterations; ++i) {
-    const Weighted sums = Accumulate(problem, translation, scale);
-    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(sums.matrix);
-    Eigen::Vector3d next = eigen.eigenvectors().col(0);
+  EpipolarMinimization minimization;
+  minimization.max_num_iterations = options.max_num_iterations;
+  minimization.loss_scale_px = options.loss_scale_px;
+  minimization.hold_rotation = true;
+  for (double factor = widest_factor;
+       factor > 1.0 && minimization.max_num_iterations > 1; factor *= 0.5) {
+    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(
+        SumNormals(problem, translation, factor * options.loss_scale_px));
+    const Eigen::Vector3d next = eigen.eigenvectors().col(0);
     if (!next.allFinite()) break;
-    if (next.dot(translation) < 0.0) next = -next;
-    const double change = (next - translation).norm();
-    translation = next;
-    constexpr double kSmallChange = 1e-5;
-    if (scale <= loss_scale_px && change < kSmallChange) break;
-    scale = std::max(loss_scale_px, 0.5 * scale);
+    translation = next.dot(translation) < 0.0 ? -next : next;
+    --minimization.max_num_iterations;
   }
-  return translation;
+  return MinimizeEpipolarDistances(minimization, problem.bearings,
+                                   {problem.rotation, translation});
 }
 
 // The cost of an even subset of the matches, enough to rank hypotheses.
@@ -147,13 +141,11 @@ TranslationDirection EstimateTranslationDirection(
   }
   if (start.norm() > 0.0) starts.emplace_back(kFar, start.normalized());
   for (const auto& [widest_factor, candidate] : starts) {
-    const Eigen::Vector3d direction =
-        Solve(problem, options.max_num_iterations, options.loss_scale_px,
-              widest_factor, candidate);
-    const double cost =
-        Accumulate(problem, direction, options.loss_scale_px).cost;
-    if (direction.allFinite() && cost < best.cost) {
-      best.cost = cost;
+    const EpipolarMinimum minimum =
+        Solve(options, problem, widest_factor, candidate);
+    const Eigen::Vector3d& direction = minimum.pose.translation;
+    if (direction.allFinite() && minimum.cost < best.cost) {
+      best.cost = minimum.cost;
       best.direction = direction;
     }
   }

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <Eigen/Core>
+#include <Eigen/Geometry>
+#include <algorithm>
 #include <cmath>
 #include <vector>
 
@@ -37,19 +38,42 @@ inline EpipolarResidual ComputeEpipolarResidual(
   return residual;
 }
 
-// d distance_px / d (rotation in camera 2's frame, direction in `basis`, the
-// tangent plane of the translation), the root of ComputeEpipolarResidual held
-// fixed.
-inline Eigen::Matrix<double, 5, 1> EpipolarJacobian(
+// A distance with its derivatives by a rotation vector in camera 2's frame
+// (R -> Exp(w) R) and by t. Scaling t changes nothing, so the latter is
+// orthogonal to t. Zero where the distance has no root.
+struct EpipolarTerm {
+  double distance_px = 0.0;
+  Eigen::Matrix<double, 6, 1> jacobian = Eigen::Matrix<double, 6, 1>::Zero();
+};
+
+// The root N changes with the pose too. With y = R x1, m = x2 x t, and
+// a = J J^T n of both images:
+//   N d(distance) = de - (e / N^2) (a1 . dn1 + a2 . dn2)
+//   de = x2 . dn2,   dn2 = t x (w x y) + dt x y,   dn1 = R^T (m x w + x2 x dt)
+// Descent with de / N alone ends elsewhere than at the least distances.
+inline EpipolarTerm LinearizeEpipolarDistance(
     const Bearing& bearing1, const Bearing& bearing2,
-    const Eigen::Matrix3d& rotation, const Eigen::Vector3d& translation,
-    const Eigen::Matrix<double, 3, 2>& basis, double inverse_norm) {
+    const Eigen::Matrix3d& rotation, const Eigen::Vector3d& translation) {
   const Eigen::Vector3d& x2 = bearing2.direction;
-  const Eigen::Vector3d x1_in_cam2 = rotation * bearing1.direction;
-  Eigen::Matrix<double, 5, 1> jacobian;
-  jacobian << x1_in_cam2.cross(x2.cross(translation)),
-      basis.transpose() * x1_in_cam2.cross(x2);
-  return inverse_norm * jacobian;
+  const Eigen::Vector3d y = rotation * bearing1.direction;
+  const Eigen::Vector3d m = x2.cross(translation);
+  const Eigen::Vector3d n2 = translation.cross(y);
+  const Eigen::Vector2d root1 =
+      bearing1.jacobian.transpose() * (rotation.transpose() * m);
+  const Eigen::Vector2d root2 = bearing2.jacobian.transpose() * n2;
+  const double squared_norm = root1.squaredNorm() + root2.squaredNorm();
+  EpipolarTerm term;
+  if (!(squared_norm > 1e-30)) return term;
+  const double inverse_norm = 1.0 / std::sqrt(squared_norm);
+  term.distance_px = inverse_norm * x2.dot(n2);
+  const double factor = inverse_norm * term.distance_px;
+  const Eigen::Vector3d a1 =
+      factor * (rotation * (bearing1.jacobian * root1));  // in camera 2
+  const Eigen::Vector3d a2 = factor * (bearing2.jacobian * root2);
+  term.jacobian << y.cross(m - a2.cross(translation)) - a1.cross(m),
+      y.cross(x2 - a2) - a1.cross(x2);
+  term.jacobian *= inverse_norm;
+  return term;
 }
 
 // Depths along both rays in units of |t|, of the point nearest to both:

@@ -44,8 +44,6 @@ const std::vector<OptionCase>& Cases() {
              poses.rotation_rates.drift_sigma_rad_s),
       OPTION("rotation_rate_min_sigma_rad", 0.01,
              poses.rotation_rates.min_rotation_sigma_rad),
-      OPTION("rotation_rate_offset_sigma_rad", 0.01,
-             poses.rotation_rates.offset_sigma_rad),
       OPTION("camera_mount_max_num_steps", 5, poses.camera_mount.max_num_steps),
       OPTION("camera_mount_sigma_deg", 2, poses.camera_mount.sigma_deg),
       OPTION("camera_mount_min_sigma_deg", 0.2,
