@@ -6,7 +6,9 @@
 #include <stdexcept>
 
 #include "core/so3.h"
+#include "sensors/bridged_holes.h"
 #include "sensors/calibration_check/check_against_vision.h"
+#include "sensors/check_logs.h"
 #include "sensors/io/format_figures.h"
 #include "sensors/select_images.h"
 #include "sensors/smoother/build_odometry_links.h"
@@ -36,13 +38,14 @@ class PriorEstimator {
   void SelectLogs(const SensorLogs& logs);
   Status FindImagesInLogs();
   Status CheckVision();
+  Status CheckMotion();
   void UndoFilter(const VisionCheck& check);
   void Fuse();
   void BuildPriors();
   void FillSummary();
   ImuBias FirstBias() const;
 
-  const SensorCalibration& calibration_;
+  SensorCalibration calibration_;
   const PriorEstimationOptions& options_;
   MotionLogs logs_;
   timestamp_t timeshift_ns_ = 0;
@@ -121,6 +124,24 @@ Status PriorEstimator::CheckVision() {
   return Status::Ok();
 }
 
+Status PriorEstimator::CheckMotion() {
+  SensorSummary& summary = estimate_.summary;
+  std::vector<timestamp_t> times_ns;
+  for (const ImageStamp& image : images_) {
+    times_ns.push_back(image.timestamp_ns + timeshift_ns_);
+  }
+  const Status status = CheckCoverage(times_ns, logs_, &summary.warnings);
+  if (!status.ok()) return status;
+  const std::string contradiction =
+      FindContradiction(logs_, calibration_, &summary.warnings);
+  if (!contradiction.empty()) {
+    if (options_.check_against_vision) return Status::Error(contradiction);
+    summary.warnings.push_back(contradiction);
+  }
+  RaiseNoiseFigures(logs_, &calibration_, &summary.warnings);
+  return Status::Ok();
+}
+
 void PriorEstimator::UndoFilter(const VisionCheck& check) {
   if (check.filter.lag_s == 0.0) return;
   // Of the clock in use.
@@ -173,6 +194,8 @@ void PriorEstimator::Fuse() {
     problem_.links = BuildOdometryLinks(timeline_.times_ns, logs_, calibration_,
                                         bias, link_options);
   }
+  AddHoleUncertainty(logs_, timeline_.times_ns,
+                     calibration_.imu_from_wheel.rotation, &problem_.links);
   if (options_.use_visual_rotations) {
     const VisualLinks visual = AddVisualRotations(
         rotations_, timeshift_ns_, calibration_.cam_from_imu.rotation,
@@ -228,6 +251,7 @@ void PriorEstimator::FillSummary() {
     summary.first_gravity_in_cam = first->second;
   }
   SummarizeFusion(problem_, fused_, logs_, &summary);
+  WarnOfEstimate(&summary);
   PredictDrift(problem_, !logs_.imu.empty(), &summary);
   summary.wheel_slips = ListWheelSlips(fused_, timeline_, timeshift_ns_);
 }
@@ -260,6 +284,9 @@ StatusOr<PriorEstimate> PriorEstimator::Run(
   if (status.ok() && timeshift_ns_ != calibrated_shift) {
     status = FindImagesInLogs();
   }
+  if (!status.ok()) return status;
+  // The other sensors against each other.
+  status = CheckMotion();
   if (!status.ok()) return status;
   // 3. and 4. Preintegration and smoother.
   Fuse();
