@@ -17,6 +17,7 @@ constexpr double kMinImuRateHz = 40.0;
 // Below this the noise figure is another sensor's, or another unit's.
 constexpr double kMinNoiseShare = 0.2;
 constexpr double kMaxScaleError = 0.2;
+constexpr double kMaxScaleFactor = 2.0;
 
 template <typename Sample>
 bool Covers(const std::vector<Sample>& log, timestamp_t time_ns) {
@@ -154,17 +155,18 @@ void RaiseNoiseFigures(const MotionLogs& logs, SensorCalibration* calibration,
         &calibration->wheel_speed_noise, warnings);
 }
 
-void WarnOfEstimate(SensorSummary* summary) {
-  const double scale = summary->wheel_scale;
-  if (std::abs(scale - 1.0) <= kMaxScaleError) return;
+std::string DescribeWheelScale(double scale, bool* is_error) {
+  *is_error = !(scale > 1.0 / kMaxScaleFactor && scale < kMaxScaleFactor);
+  if (std::abs(scale - 1.0) <= kMaxScaleError) return "";
   const bool is_kmh = scale > 0.2 && scale < 0.35;
-  summary->warnings.push_back(
-      FormatFigures("the wheels' scale is %.4g: a metre of the wheel log is "
-                    "%.3g true metres; ",
-                    scale, scale) +
-      (is_kmh ? "the log looks like km/h (divide by 3.6)"
-              : "check the speeds' unit, the wheels' radius, metres_per_tick "
-                "and the wheels' clock"));
+  return FormatFigures(
+             "the wheels' scale is %.4g: a metre of the wheel log is "
+             "%.3g true metres; ",
+             scale, scale) +
+         (is_kmh ? "the log looks like km/h (divide by 3.6)"
+                 : "check the speeds' unit, the wheels' radius, "
+                   "metres_per_tick, the wheels' clock and whether the log "
+                   "belongs to this drive");
 }
 
 }  // namespace adasfm

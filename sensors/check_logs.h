@@ -34,8 +34,9 @@ std::string FindContradiction(const MotionLogs& logs,
 void RaiseNoiseFigures(const MotionLogs& logs, SensorCalibration* calibration,
                        std::vector<std::string>* warnings);
 
-// Of an estimate that is not what the calibration says: a wheel scale more than
-// 20 % from 1, with its likely causes.
-void WarnOfEstimate(SensorSummary* summary);
+// A line about a wheel scale more than 20 % from 1, with its likely causes;
+// empty when there is none. One beyond a factor of 2 has no other cause than a
+// wheel log that is wrong: is_error says so.
+std::string DescribeWheelScale(double scale, bool* is_error);
 
 }  // namespace adasfm

@@ -43,6 +43,7 @@ class PriorEstimator {
   void Fuse();
   void BuildPriors();
   void FillSummary();
+  Status CheckWheelScale();
   ImuBias FirstBias() const;
 
   SensorCalibration calibration_;
@@ -251,9 +252,18 @@ void PriorEstimator::FillSummary() {
     summary.first_gravity_in_cam = first->second;
   }
   SummarizeFusion(problem_, fused_, logs_, &summary);
-  WarnOfEstimate(&summary);
   PredictDrift(problem_, !logs_.imu.empty(), &summary);
   summary.wheel_slips = ListWheelSlips(fused_, timeline_, timeshift_ns_);
+}
+
+Status PriorEstimator::CheckWheelScale() {
+  bool is_error = false;
+  const std::string text =
+      DescribeWheelScale(estimate_.summary.wheel_scale, &is_error);
+  if (text.empty()) return Status::Ok();
+  if (is_error && options_.check_against_vision) return Status::Error(text);
+  estimate_.summary.warnings.push_back(text);
+  return Status::Ok();
 }
 
 StatusOr<PriorEstimate> PriorEstimator::Run(
@@ -293,6 +303,8 @@ StatusOr<PriorEstimate> PriorEstimator::Run(
   // 5. Camera frames and figures.
   BuildPriors();
   FillSummary();
+  status = CheckWheelScale();
+  if (!status.ok()) return status;
   return std::move(estimate_);
 }
 

@@ -29,8 +29,10 @@ constexpr double kMinCorrelation = 0.7;
 constexpr double kMinAcceleration = 0.3;  // m/s^2
 constexpr double kMinYawRate = 0.03;      // rad/s
 constexpr int kMinNumBins = 50;
-// Below it, where much moves, logs do not belong together.
-constexpr double kNoCorrelation = 0.2;
+// Below it, where much moves, logs do not belong together; without a yaw rate
+// to compare only far below, since engines and rough ground shake.
+constexpr double kNoCorrelation = 0.5;
+constexpr double kNoForceCorrelation = 0.2;
 // Wheel directions beyond this are more than a mount that was badly measured.
 constexpr double kMaxTurnDeg = 30.0;
 // Factors within this are right, or are found by the smoother.
@@ -165,10 +167,11 @@ std::string WheelChecker::CheckClock(const WheelFit& fit) const {
 }
 
 std::string WheelChecker::CheckBelonging(const WheelFit& fit) const {
-  const bool force_fits = fit.force_correlation > kNoCorrelation ||
-                          fit.mirrored_correlation > kNoCorrelation;
-  const bool yaw_fits = std::abs(fit.yaw_correlation) > kNoCorrelation;
-  if (fit.acceleration_rms < kMinAcceleration || force_fits || yaw_fits) {
+  const bool has_turns = has_yaw_ && fit.yaw_rate_rms > kMinYawRate;
+  const double bar = has_turns ? kNoCorrelation : kNoForceCorrelation;
+  if (fit.acceleration_rms < kMinAcceleration || fit.force_correlation > bar ||
+      fit.mirrored_correlation > kMinCorrelation ||
+      (has_turns && std::abs(fit.yaw_correlation) > bar)) {
     return "";
   }
   return FormatFigures(

@@ -17,12 +17,16 @@ constexpr size_t kMinHalfWindow = 5;
 constexpr double kMinRatio = 30.0;
 // The deviations are measured at no more places than these.
 constexpr size_t kMaxNumMeasured = 20000;
-// Samples looked at on each side of a spike, past the one next to it. Of both
-// sides together two may be spikes as well; the third largest deviation must
-// be less than this share of the spike's.
+// Samples looked at on each side of a spike. Of both sides together two may be
+// spikes as well; the third largest deviation must be no more than noise, or
+// next to nothing beside the spike's.
 constexpr size_t kNumNeighbours = 6;
 constexpr size_t kNumExcused = 2;
-constexpr double kQuietShare = 0.25;
+constexpr double kQuietRatio = 8.0;
+constexpr double kQuietShare = 0.02;
+// A spike's first and last sample are reached and left in one step of at least
+// this share of their deviation; bumps fade.
+constexpr double kEdgeShare = 0.7;
 
 class SpikeFinder {
  public:
@@ -36,14 +40,16 @@ class SpikeFinder {
 
  private:
   double Deviation(size_t index) const;
-  double TypicalDeviation() const;
+  double MeasureSigma() const;
   // Samples near a jump of more than half the threshold; only their deviations
   // need to be known.
   std::vector<double> DeviationsNearJumps(double threshold) const;
+  bool HasEdges(size_t begin, size_t end) const;
   bool IsQuietAround(size_t begin, size_t end, double peak) const;
 
   const std::vector<Eigen::Vector3d>& readings_;
   size_t half_window_;
+  double sigma_ = 0.0;  // robust, of a deviation
 };
 
 double SpikeFinder::Deviation(size_t index) const {
@@ -59,7 +65,7 @@ double SpikeFinder::Deviation(size_t index) const {
   return (readings_[index] - median).stableNorm();
 }
 
-double SpikeFinder::TypicalDeviation() const {
+double SpikeFinder::MeasureSigma() const {
   const size_t step = std::max<size_t>(
       1, readings_.size() / std::max<size_t>(kMaxNumMeasured, 1));
   std::vector<double> deviations;
@@ -71,7 +77,7 @@ double SpikeFinder::TypicalDeviation() const {
 
 std::vector<double> SpikeFinder::DeviationsNearJumps(double threshold) const {
   std::vector<double> deviations(readings_.size(), -1.0);
-  const size_t reach = half_window_ + kNumNeighbours + 2;
+  const size_t reach = half_window_ + 1;
   size_t done = 0;
   for (size_t i = 1; i < readings_.size(); ++i) {
     if ((readings_[i] - readings_[i - 1]).stableNorm() < 0.5 * threshold) {
@@ -86,9 +92,18 @@ std::vector<double> SpikeFinder::DeviationsNearJumps(double threshold) const {
   return deviations;
 }
 
+bool SpikeFinder::HasEdges(size_t begin, size_t end) const {
+  const auto step = [this](size_t i) {
+    return (readings_[i] - readings_[i - 1]).stableNorm();
+  };
+  return (begin == 0 || step(begin) > kEdgeShare * Deviation(begin)) &&
+         (end == readings_.size() ||
+          step(end) > kEdgeShare * Deviation(end - 1));
+}
+
 bool SpikeFinder::IsQuietAround(size_t begin, size_t end, double peak) const {
   std::vector<double> around;
-  for (size_t k = 2; k < 2 + kNumNeighbours; ++k) {
+  for (size_t k = 1; k <= kNumNeighbours; ++k) {
     if (begin >= k) around.push_back(Deviation(begin - k));
     if (end - 1 + k < readings_.size()) {
       around.push_back(Deviation(end - 1 + k));
@@ -96,14 +111,15 @@ bool SpikeFinder::IsQuietAround(size_t begin, size_t end, double peak) const {
   }
   std::sort(around.rbegin(), around.rend());
   return around.size() > kNumExcused &&
-         around[kNumExcused] < kQuietShare * peak;
+         around[kNumExcused] <
+             std::max(kQuietRatio * sigma_, kQuietShare * peak);
 }
 
 std::vector<bool> SpikeFinder::Run(double min_deviation) {
   std::vector<bool> is_spike(readings_.size(), false);
   if (readings_.size() < kMinNumSamples) return is_spike;
-  const double threshold =
-      std::max(min_deviation, kMinRatio * TypicalDeviation());
+  sigma_ = MeasureSigma();
+  const double threshold = std::max(min_deviation, kMinRatio * sigma_);
   const std::vector<double> deviations = DeviationsNearJumps(threshold);
   for (size_t begin = 0; begin < readings_.size(); ++begin) {
     if (deviations[begin] < threshold) continue;
@@ -112,7 +128,9 @@ std::vector<bool> SpikeFinder::Run(double min_deviation) {
     while (end < readings_.size() && deviations[end] >= threshold) {
       peak = std::max(peak, deviations[end++]);
     }
-    if (IsQuietAround(begin, end, peak)) {
+    // Of longer runs the medians would be wrong.
+    if (end - begin <= half_window_ && HasEdges(begin, end) &&
+        IsQuietAround(begin, end, peak)) {
       std::fill(is_spike.begin() + begin, is_spike.begin() + end, true);
     }
     begin = end;

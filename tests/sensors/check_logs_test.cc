@@ -77,15 +77,18 @@ TEST(CheckLogs, LeavesRightNoiseFigures) {
   }
 }
 
-TEST(CheckLogs, WarnsOfAWheelScaleFarFromOne) {
-  SensorSummary summary;
-  summary.wheel_scale = 1.1;
-  WarnOfEstimate(&summary);
-  EXPECT_TRUE(summary.warnings.empty());
-  summary.wheel_scale = 0.305;
-  WarnOfEstimate(&summary);
-  ASSERT_EQ(summary.warnings.size(), 1u);
-  EXPECT_NE(summary.warnings[0].find("km/h"), std::string::npos);
+TEST(CheckLogs, NamesAWheelScaleFarFromOne) {
+  bool is_error = true;
+  EXPECT_EQ(DescribeWheelScale(1.1, &is_error), "");
+  EXPECT_FALSE(is_error);
+  EXPECT_NE(DescribeWheelScale(1.4, &is_error).find("radius"),
+            std::string::npos);
+  EXPECT_FALSE(is_error);
+  EXPECT_NE(DescribeWheelScale(0.305, &is_error).find("km/h"),
+            std::string::npos);
+  EXPECT_TRUE(is_error);
+  EXPECT_NE(DescribeWheelScale(45.0, &is_error), "");
+  EXPECT_TRUE(is_error);
 }
 
 }  // namespace

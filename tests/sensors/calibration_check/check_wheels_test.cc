@@ -27,7 +27,7 @@ void ExpectNamed(Change change, const std::string& words) {
     Dataset data = Drive(seed);
     change(&data);
     const std::string text = Check(data).contradiction;
-    EXPECT_NE(text.find(words), std::string::npos)
+    EXPECT_TRUE(!text.empty() && text.find(words) != std::string::npos)
         << "seed " << seed << ": '" << text << "'";
   }
 }
@@ -128,16 +128,17 @@ TEST(CheckWheels, NamesTheWheelsClock) {
   }
 }
 
+// The same way driven from its end.
 TEST(CheckWheels, NamesTheLogOfAnotherDrive) {
-  for (const uint64_t seed : kSeeds) {
-    Dataset data = Drive(seed);
-    const Dataset other = Drive(seed + 20);
-    const timestamp_t shift = data.logs.imu.front().timestamp_ns -
-                              other.logs.imu.front().timestamp_ns;
-    data.logs.wheel = other.logs.wheel;
-    for (WheelSample& sample : data.logs.wheel) sample.timestamp_ns += shift;
-    EXPECT_NE(Check(data).contradiction, "") << seed;
-  }
+  ExpectNamed(
+      [](Dataset* data) {
+        const std::vector<WheelSample> log = data->logs.wheel;
+        for (size_t i = 0; i < log.size(); ++i) {
+          data->logs.wheel[i].first = log[log.size() - 1 - i].first;
+          data->logs.wheel[i].second = log[log.size() - 1 - i].second;
+        }
+      },
+      "");
 }
 
 TEST(CheckWheels, WarnsOfTheTrackWidth) {
