@@ -8,6 +8,7 @@
 #include "core/so3.h"
 #include "sensors/bridged_holes.h"
 #include "sensors/calibration_check/check_against_vision.h"
+#include "sensors/calibration_check/clock_jump.h"
 #include "sensors/check_logs.h"
 #include "sensors/io/format_figures.h"
 #include "sensors/select_images.h"
@@ -97,8 +98,14 @@ Status PriorEstimator::FindImagesInLogs() {
 
 Status PriorEstimator::CheckVision() {
   if (logs_.imu.empty() || rotations_.empty()) return Status::Ok();
-  const VisionCheck check = CheckAgainstVision(
-      rotations_, logs_.imu, calibration_, VisionCheckOptions());
+  VisionCheck check = CheckAgainstVision(rotations_, logs_.imu, calibration_,
+                                         VisionCheckOptions());
+  if (check.contradiction_is_time_shift) {
+    const std::string jump = FindClockJump(rotations_, logs_.imu, calibration_,
+                                           VisionCheckOptions());
+    check.contradiction_is_time_shift = jump.empty();
+    if (!jump.empty()) check.contradiction = jump;
+  }
   SensorSummary& summary = estimate_.summary;
   if (!check.is_conclusive) {
     summary.warnings.push_back(
