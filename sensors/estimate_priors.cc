@@ -6,7 +6,10 @@
 #include <stdexcept>
 
 #include "core/so3.h"
+#include "sensors/bridged_holes.h"
 #include "sensors/calibration_check/check_against_vision.h"
+#include "sensors/calibration_check/clock_jump.h"
+#include "sensors/check_logs.h"
 #include "sensors/io/format_figures.h"
 #include "sensors/preintegration/imu_noise.h"
 #include "sensors/select_images.h"
@@ -54,6 +57,7 @@ class PriorEstimator {
   void SelectLogs(const SensorLogs& logs);
   Status FindImagesInLogs();
   Status CheckVision();
+  Status CheckMotion();
   void UndoFilter(const VisionCheck& check);
   void Fuse();
   void BuildProblem();
@@ -61,6 +65,7 @@ class PriorEstimator {
   bool CorrectNoise();
   void BuildPriors();
   void FillSummary();
+  Status CheckWheelScale();
   ImuBias FirstBias() const;
 
   const SensorCalibration& stated_;
@@ -83,14 +88,14 @@ class PriorEstimator {
 
 void PriorEstimator::SelectLogs(const SensorLogs& logs) {
   SensorSummary& summary = estimate_.summary;
-  if (calibration_.has_imu) {
-    logs_.imu = logs.imu;
-    calibration_.imu_noise = RaiseToLog(logs.imu, stated_.imu_noise);
-  }
+  if (calibration_.has_imu) logs_.imu = logs.imu;
   if (calibration_.has_wheel) {
     logs_.wheel = ComputeWheelSpeeds(logs.wheel, calibration_);
     logs_.odometry = logs.odometry;
   }
+  // Far too small figures are said; then the IMU's are what the log shows.
+  RaiseNoiseFigures(logs_, &calibration_, &summary.warnings);
+  calibration_.imu_noise = RaiseToLog(logs_.imu, calibration_.imu_noise);
   if (!calibration_.has_imu && !logs.imu.empty()) {
     summary.warnings.push_back(
         "the calibration has no imu0: the IMU log is not used");
@@ -119,8 +124,14 @@ Status PriorEstimator::FindImagesInLogs() {
 
 Status PriorEstimator::CheckVision() {
   if (logs_.imu.empty() || rotations_.empty()) return Status::Ok();
-  const VisionCheck check = CheckAgainstVision(
-      rotations_, logs_.imu, calibration_, VisionCheckOptions());
+  VisionCheck check = CheckAgainstVision(rotations_, logs_.imu, calibration_,
+                                         VisionCheckOptions());
+  if (check.contradiction_is_time_shift) {
+    const std::string jump = FindClockJump(rotations_, logs_.imu, calibration_,
+                                           VisionCheckOptions());
+    check.contradiction_is_time_shift = jump.empty();
+    if (!jump.empty()) check.contradiction = jump;
+  }
   SensorSummary& summary = estimate_.summary;
   if (!check.is_conclusive) {
     summary.warnings.push_back(
@@ -144,6 +155,23 @@ Status PriorEstimator::CheckVision() {
   has_visual_bias_ = options_.use_visual_rotations;
   visual_bias_ = check.gyroscope_bias;
   if (options_.undo_gyroscope_filter) UndoFilter(check);
+  return Status::Ok();
+}
+
+Status PriorEstimator::CheckMotion() {
+  SensorSummary& summary = estimate_.summary;
+  std::vector<timestamp_t> times_ns;
+  for (const ImageStamp& image : images_) {
+    times_ns.push_back(image.timestamp_ns + timeshift_ns_);
+  }
+  const Status status = CheckCoverage(times_ns, logs_, &summary.warnings);
+  if (!status.ok()) return status;
+  const std::string contradiction =
+      FindContradiction(logs_, calibration_, &summary.warnings);
+  if (!contradiction.empty()) {
+    if (options_.check_against_vision) return Status::Error(contradiction);
+    summary.warnings.push_back(contradiction);
+  }
   return Status::Ok();
 }
 
@@ -200,6 +228,8 @@ void PriorEstimator::BuildProblem() {
     problem_.links = BuildOdometryLinks(timeline_.times_ns, logs_, calibration_,
                                         bias, link_options);
   }
+  AddHoleUncertainty(logs_, timeline_.times_ns,
+                     calibration_.imu_from_wheel.rotation, &problem_.links);
   if (options_.use_visual_rotations) {
     const VisualLinks visual = AddVisualRotations(
         rotations_, timeshift_ns_, calibration_.cam_from_imu.rotation,
@@ -300,6 +330,16 @@ void PriorEstimator::FillSummary() {
   summary.wheel_slips = ListWheelSlips(fused_, timeline_, timeshift_ns_);
 }
 
+Status PriorEstimator::CheckWheelScale() {
+  bool is_error = false;
+  const std::string text =
+      DescribeWheelScale(estimate_.summary.wheel_scale, &is_error);
+  if (text.empty()) return Status::Ok();
+  if (is_error && options_.check_against_vision) return Status::Error(text);
+  estimate_.summary.warnings.push_back(text);
+  return Status::Ok();
+}
+
 StatusOr<PriorEstimate> PriorEstimator::Run(
     const std::vector<ImageStamp>& images, const SensorLogs& logs,
     const std::vector<VisualRotation>& rotations) {
@@ -329,11 +369,16 @@ StatusOr<PriorEstimate> PriorEstimator::Run(
     status = FindImagesInLogs();
   }
   if (!status.ok()) return status;
+  // The other sensors against each other.
+  status = CheckMotion();
+  if (!status.ok()) return status;
   // 3. and 4. Preintegration and smoother.
   Fuse();
   // 5. Camera frames and figures.
   BuildPriors();
   FillSummary();
+  status = CheckWheelScale();
+  if (!status.ok()) return status;
   return std::move(estimate_);
 }
 

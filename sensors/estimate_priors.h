@@ -54,9 +54,9 @@ struct PriorEstimationOptions {
   // How well they tell the first value when they are too poor for the rest,
   // rad/s.
   double visual_bias_sigma = 0.002;
-  // Whether vision and gyroscope are compared before anything is believed
-  // (sensors/calibration_check/check_against_vision.h); a contradiction is an
-  // error.
+  // Whether a contradiction between sensors is an error: vision against the
+  // gyroscope (sensors/calibration_check/check_against_vision.h), wheels
+  // against the IMU (check_wheels.h there). Else it is a warning.
   bool check_against_vision = true;
   // Whether the time shift that vision and gyroscope agree on is added to the
   // calibration's.
@@ -80,11 +80,11 @@ struct PriorEstimate {
 };
 
 // From logs to priors: (1) order images and find those inside the logs,
-// (2) compare vision with the gyroscope, (3) preintegrate between images,
-// (4) smooth all of it at once, (5) express motion and covariance in the camera
-// frames. What the sensors cannot observe is flagged
-// (core/relative_pose_prior). Bad data gives a status of one line; invalid
-// options throw std::invalid_argument.
+// (2) compare vision with the gyroscope and the wheels with the IMU, (3)
+// preintegrate between images, (4) smooth all of it at once, (5) express motion
+// and covariance in the camera frames. What the sensors cannot observe is
+// flagged (core/relative_pose_prior). Bad data gives a status of one line;
+// invalid options throw std::invalid_argument.
 StatusOr<PriorEstimate> EstimatePriors(
     const std::vector<ImageStamp>& images, const SensorLogs& logs,
     const SensorCalibration& calibration,

@@ -135,6 +135,16 @@ std::string PriorImportToJson(const PriorImport& import) {
                                    {"end_ns", slip.end_ns},
                                    {"speed_error_m_s", slip.speed_error_m_s}});
   }
+  json["log_faults"] = nlohmann::ordered_json::array();
+  for (const LogFault& fault : import.log_faults) {
+    json["log_faults"].push_back({{"path", fault.path},
+                                  {"kind", FaultName(fault.kind)},
+                                  {"unit", fault.unit},
+                                  {"first", fault.first},
+                                  {"last", fault.last},
+                                  {"num_samples", fault.num_samples},
+                                  {"duration_s", fault.duration_s}});
+  }
   // Texts that are not UTF-8 (file names) must not end in an exception.
   return json.dump(2, ' ', false, nlohmann::json::error_handler_t::replace);
 }

@@ -3,18 +3,18 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <map>
 #include <tuple>
 #include <utility>
 
 #include "colmap_ext/host/camera.h"
 #include "colmap_ext/host/database.h"
+#include "colmap_ext/priors/read_sensor_logs.h"
 #include "colmap_ext/scene/scene_data.h"
 #include "colmap_ext/scene/two_view_poses.h"
 #include "global/two_view/refine_relative_poses.h"
 #include "sensors/io/read_image_times.h"
-#include "sensors/io/read_imu.h"
-#include "sensors/io/read_wheel.h"
 
 namespace adasfm {
 namespace {
@@ -126,33 +126,6 @@ StatusOr<std::vector<ImageStamp>> StampImages(const std::string& path,
   return stamps;
 }
 
-Status ReadLogs(const PriorImportPaths& paths,
-                const SensorCalibration& calibration, SensorLogs* logs,
-                std::vector<std::string>* warnings) {
-  if (!paths.imu_path.empty()) {
-    StatusOr<std::vector<ImuSample>> imu = ReadImu(paths.imu_path, warnings);
-    if (!imu.ok()) return imu.status();
-    logs->imu = std::move(imu).value();
-  }
-  if (paths.wheel_path.empty()) return Status::Ok();
-  if (!calibration.has_wheel) {
-    return Status::Error(paths.sensors_path + " has no wheel0, which " +
-                         paths.wheel_path + " needs; add it");
-  }
-  if (calibration.wheel_type == WheelType::kOdometry) {
-    StatusOr<std::vector<OdometryPose>> odometry =
-        ReadOdometry(paths.wheel_path, warnings);
-    if (!odometry.ok()) return odometry.status();
-    logs->odometry = std::move(odometry).value();
-    return Status::Ok();
-  }
-  StatusOr<std::vector<WheelSample>> wheel =
-      ReadWheel(paths.wheel_path, calibration.wheel_type, warnings);
-  if (!wheel.ok()) return wheel.status();
-  logs->wheel = std::move(wheel).value();
-  return Status::Ok();
-}
-
 void KeepNearPairs(const std::vector<ImageStamp>& stamps, int max_gap,
                    std::vector<ScenePair>* pairs) {
   std::map<image_t, int> ranks;
@@ -203,6 +176,8 @@ std::vector<VisualRotation> ComputeVisualRotations(SceneData scene) {
 StatusOr<SceneData> ReadScene(const std::string& database_path) {
   SceneDataOptions options;
   options.use_original_two_view_geometries = true;
+  // They are about to be replaced, damaged or not.
+  options.read_priors = false;
   StatusOr<SceneData> scene = ReadSceneData(database_path, options);
   if (scene.ok() && scene->images.empty()) {
     return Status::Error("the database " + database_path +
@@ -210,6 +185,37 @@ StatusOr<SceneData> ReadScene(const std::string& database_path) {
                          "first");
   }
   return scene;
+}
+
+// What no later command could use is not written.
+Status CheckEstimate(const PriorEstimate& estimate,
+                     const std::map<image_t, std::string>& names) {
+  constexpr char kRemedy[] =
+      "; check the noise figures of the calibration, the AdaSfmPriors options "
+      "and the logs' readings";
+  for (const RelativePosePrior& prior : estimate.priors) {
+    const auto variances = prior.covariance.diagonal().array();
+    if (prior.cam2_from_cam1.translation.allFinite() &&
+        std::abs(prior.cam2_from_cam1.rotation.norm() - 1.0) < 1e-6 &&
+        !prior.covariance.hasNaN() && (variances >= 0.0).all()) {
+      continue;
+    }
+    return Status::Error(
+        "the prior between the images " + names.at(prior.image_id1) + " and " +
+        names.at(prior.image_id2) + " is not finite" + kRemedy);
+  }
+  for (const auto& [image_id, gravity_in_cam] : estimate.gravity_in_cam) {
+    if (std::abs(gravity_in_cam.norm() - 1.0) < 1e-6) continue;
+    return Status::Error("the gravity of image " + names.at(image_id) +
+                         " is not finite" + kRemedy);
+  }
+  const SensorSummary& summary = estimate.summary;
+  if (std::isfinite(summary.distance_m) && std::isfinite(summary.wheel_scale) &&
+      std::isfinite(summary.drift_per_100m_m)) {
+    return Status::Ok();
+  }
+  return Status::Error(std::string("the estimate of the drive is not finite") +
+                       kRemedy);
 }
 
 }  // namespace
@@ -237,7 +243,7 @@ StatusOr<PriorImport> ComputePriorImport(const PriorImportPaths& paths,
   const auto start = std::chrono::steady_clock::now();
   PriorImport import;
   SensorLogs logs;
-  status = ReadLogs(paths, *calibration, &logs, &import.warnings);
+  status = ReadSensorLogs(paths, *calibration, &logs, &import);
   if (!status.ok()) return status;
   StatusOr<SceneData> scene = ReadScene(paths.database_path);
   if (!scene.ok()) return scene.status();
@@ -245,6 +251,8 @@ StatusOr<PriorImport> ComputePriorImport(const PriorImportPaths& paths,
   const StatusOr<std::vector<ImageStamp>> stamps =
       StampImages(paths.image_times_path, *scene, &import);
   if (!stamps.ok()) return stamps.status();
+  std::map<image_t, std::string> names;
+  for (const ImageStamp& stamp : *stamps) names[stamp.image_id] = stamp.name;
   KeepNearPairs(*stamps, options.max_visual_gap, &scene->pairs);
   const std::vector<VisualRotation> rotations =
       ComputeVisualRotations(std::move(scene).value());
@@ -253,6 +261,8 @@ StatusOr<PriorImport> ComputePriorImport(const PriorImportPaths& paths,
   StatusOr<PriorEstimate> estimate = EstimatePriors(
       *stamps, logs, *calibration, rotations, options.estimation);
   if (!estimate.ok()) return estimate.status();
+  status = CheckEstimate(*estimate, names);
+  if (!status.ok()) return status;
   import.tables.priors = std::move(estimate->priors);
   for (const auto& [image_id, gravity_in_cam] : estimate->gravity_in_cam) {
     import.tables.gravity.push_back({image_id, gravity_in_cam});

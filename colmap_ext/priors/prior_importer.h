@@ -7,6 +7,7 @@
 #include "colmap_ext/database/prior_tables.h"
 #include "core/status.h"
 #include "sensors/estimate_priors.h"
+#include "sensors/log_cleaning/log_fault.h"
 
 namespace adasfm {
 
@@ -35,6 +36,8 @@ struct PriorImport {
   int num_visual_rotations = 0;
   // Of the import and of the sensors.
   std::vector<std::string> warnings;
+  // Samples that were left out of the logs.
+  std::vector<LogFault> log_faults;
   double seconds = 0.0;  // that it took
 };
 

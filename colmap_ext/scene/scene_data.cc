@@ -146,7 +146,7 @@ StatusOr<SceneData> ReadSceneData(const std::string& database_path,
     SqliteConnection database(database_path, SqliteConnection::Mode::kRead);
     scene.cameras = ReadCameras(&database);
     ReadSceneImages(&database, &scene);
-    ReadScenePriors(&database, options, &scene);
+    if (options.read_priors) ReadScenePriors(&database, options, &scene);
     ReadScenePairs(&database, options, &scene);
     if (options.read_raw_matches) ReadRawMatches(&database, &scene);
   } catch (const SqliteError& error) {

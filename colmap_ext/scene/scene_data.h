@@ -61,6 +61,8 @@ struct SceneDataOptions {
   // Start from the two-view geometries, the priors and gravity as they were
   // before adasfm_global changed them, where it did.
   bool use_original_two_view_geometries = false;
+  // Times, priors and gravity of the images.
+  bool read_priors = true;
   // Pairs with fewer inlier matches are left out.
   int min_num_matches = 15;
 };

@@ -17,9 +17,10 @@ synthetic                      core
 partition                      core
 
 sensors/io                     core
+sensors/log_cleaning           core sensors/io
 sensors/preintegration         core sensors/io
 sensors/smoother               core sensors/io sensors/preintegration
-sensors/calibration_check      core sensors/io
+sensors/calibration_check      core sensors/io sensors/preintegration
 sensors                        core sensors/...
 
 global/view_graph              core

@@ -7,8 +7,6 @@
 #include "core/so3.h"
 
 namespace adasfm {
-namespace {
-
 std::string AxesToString(const Eigen::Matrix3d& axes) {
   const char* names = "xyz";
   std::string text;
@@ -23,8 +21,6 @@ std::string AxesToString(const Eigen::Matrix3d& axes) {
   }
   return text;
 }
-
-}  // namespace
 
 std::vector<CalibrationMistake> ListCalibrationMistakes(
     const Eigen::Matrix3d& cam_from_imu) {

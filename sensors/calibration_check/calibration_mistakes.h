@@ -23,6 +23,9 @@ struct CalibrationMistake {
 std::vector<CalibrationMistake> ListCalibrationMistakes(
     const Eigen::Matrix3d& cam_from_imu);
 
+// "x = y, y = -x, z = z".
+std::string AxesToString(const Eigen::Matrix3d& axes);
+
 // What is wrong and what to do about it; empty for kNone.
 std::string DescribeMistake(const CalibrationMistake& mistake);
 

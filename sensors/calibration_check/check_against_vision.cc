@@ -20,6 +20,11 @@ constexpr double kTie = 0.9;
 // A refusal needs evidence. The best of some 10,000 wrong explanations (50 at
 // 200 shifts) is by chance e^9 times likelier than the right one; twice that.
 constexpr double kMinEvidence = 20.0;
+// Cameras' rotations per gyroscope's that are tried: those nearer to 1 are
+// within what a poor focal length does.
+constexpr double kTurnScales[] = {0.1, 0.125, 0.167, 0.2,  0.25, 0.33,
+                                  0.4, 0.5,   0.6,   0.67, 1.5,  1.75,
+                                  2.0, 2.5,   3.0,   4.0,  5.0,  8.0};
 
 std::string Figures(const VisionCheck& check) {
   return FormatFigures(
@@ -47,6 +52,7 @@ class VisionComparer {
   // Whether there is one.
   bool NameMistake(VisionCheck* check) const;
   bool IsWorseThanNone() const;
+  void CheckTurnScale(VisionCheck* check) const;
   void CheckTimeShift(VisionCheck* check) const;
   GyroscopeFilter FindFilter();
   // The first of the best explanations that beat the calibrated one.
@@ -135,6 +141,31 @@ bool VisionComparer::IsWorseThanNone() const {
          search_.Evidence(as_is_, none) >= kMinEvidence;
 }
 
+void VisionComparer::CheckTurnScale(VisionCheck* check) const {
+  const RotationComparison shifted = search_.Compare(calibrated().shift_s);
+  Explanation best = calibrated();
+  double best_scale = 1.0;
+  for (const double scale : kTurnScales) {
+    Explanation scaled = calibrated();
+    scaled.mistake.map *= scale;
+    scaled.fit = ComputeRotationFit(shifted, scaled.mistake.map);
+    if (scaled.fit.cost >= best.fit.cost) continue;
+    best = scaled;
+    best_scale = scale;
+  }
+  if (best_scale == 1.0 ||
+      best.fit.cost > kClearlyBetter * calibrated().fit.cost ||
+      search_.Evidence(calibrated(), best) < kMinEvidence) {
+    return;
+  }
+  check->contradiction =
+      FormatFigures(
+          "the gyroscope turns %.2g times as much as the cameras: check the "
+          "unit and range of its driver, and the focal length",
+          1.0 / best_scale) +
+      Figures(*check);
+}
+
 void VisionComparer::CheckTimeShift(VisionCheck* check) const {
   check->time_shift_correction_s = calibrated().shift_s;
   const bool is_better = calibrated().fit.cost < kTie * as_is_.fit.cost &&
@@ -182,9 +213,12 @@ VisionCheck VisionComparer::Run() {
         Figures(check);
     return check;
   }
-  // 5. What no time shift explains.
+  // 5. The gyroscope's scale.
+  CheckTurnScale(&check);
+  if (!check.contradiction.empty()) return check;
+  // 6. What no time shift explains.
   check.filter = FindFilter();
-  // 6. The time shift.
+  // 7. The time shift.
   CheckTimeShift(&check);
   return check;
 }

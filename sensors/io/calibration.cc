@@ -9,6 +9,7 @@
 #include <filesystem>
 #include <fstream>
 #include <map>
+#include <sstream>
 #include <stdexcept>
 
 #include "sensors/io/log_file.h"
@@ -53,10 +54,17 @@ class CalibrationReader {
     return section[name] ? Number(section, name) : fallback;
   }
 
-  double Positive(const YAML::Node& section, const std::string& name) const {
+  // A number in a range of all sensible sizes: where it stands for "none" or
+  // the unit is wrong, the estimate would overflow or be nonsense.
+  double InRange(const YAML::Node& section, const std::string& name, double min,
+                 double max, const char* unit) const {
     const double value = Number(section, name);
+    if (value >= min && value <= max) return value;
     if (value <= 0.0) Fail(name, "must be positive");
-    return value;
+    std::ostringstream text;
+    text << "is " << value << " " << unit << "; between " << min << " and "
+         << max << " is possible";
+    Fail(name, text.str());
   }
 
   Rigid3d Transform(const YAML::Node& section, const std::string& name) const {
@@ -110,15 +118,19 @@ class CalibrationReader {
 void ReadImuSection(const CalibrationReader& reader, const YAML::Node& imu,
                     SensorCalibration* calibration) {
   calibration->has_imu = true;
-  calibration->imu_rate_hz = reader.Positive(imu, "update_rate");
+  calibration->imu_rate_hz =
+      reader.InRange(imu, "update_rate", 1.0, 20000.0, "Hz");
+  // From a tenth of what the best fibre-optic and quartz sensors have to a
+  // hundred times what the poorest MEMS have.
   ImuNoise& noise = calibration->imu_noise;
-  noise.gyroscope_noise_density =
-      reader.Positive(imu, "gyroscope_noise_density");
-  noise.gyroscope_random_walk = reader.Positive(imu, "gyroscope_random_walk");
-  noise.accelerometer_noise_density =
-      reader.Positive(imu, "accelerometer_noise_density");
-  noise.accelerometer_random_walk =
-      reader.Positive(imu, "accelerometer_random_walk");
+  noise.gyroscope_noise_density = reader.InRange(imu, "gyroscope_noise_density",
+                                                 1e-8, 1.0, "rad/s/sqrt(Hz)");
+  noise.gyroscope_random_walk = reader.InRange(imu, "gyroscope_random_walk",
+                                               1e-12, 0.1, "rad/s^2/sqrt(Hz)");
+  noise.accelerometer_noise_density = reader.InRange(
+      imu, "accelerometer_noise_density", 1e-7, 10.0, "m/s^2/sqrt(Hz)");
+  noise.accelerometer_random_walk = reader.InRange(
+      imu, "accelerometer_random_walk", 1e-11, 1.0, "m/s^3/sqrt(Hz)");
 }
 
 void ReadWheelSection(const CalibrationReader& reader, const YAML::Node& wheel,
@@ -143,16 +155,18 @@ void ReadWheelSection(const CalibrationReader& reader, const YAML::Node& wheel,
   calibration->wheel_type = type->second;
   if (type->second == WheelType::kDifferential ||
       type->second == WheelType::kTicks) {
-    calibration->track_width_m = reader.Positive(wheel, "track_width");
+    calibration->track_width_m =
+        reader.InRange(wheel, "track_width", 0.01, 20.0, "m");
   }
   if (type->second == WheelType::kTicks) {
-    calibration->metres_per_tick = reader.Positive(wheel, "metres_per_tick");
+    calibration->metres_per_tick =
+        reader.InRange(wheel, "metres_per_tick", 1e-9, 10.0, "m");
   }
-  calibration->wheel_speed_noise = reader.Positive(wheel, "speed_noise");
-  calibration->wheel_yaw_rate_noise = reader.NumberOr(
-      wheel, "yaw_rate_noise", calibration->wheel_yaw_rate_noise);
-  if (calibration->wheel_yaw_rate_noise <= 0.0) {
-    reader.Fail("yaw_rate_noise", "must be positive");
+  calibration->wheel_speed_noise =
+      reader.InRange(wheel, "speed_noise", 1e-5, 20.0, "m/s");
+  if (wheel["yaw_rate_noise"]) {
+    calibration->wheel_yaw_rate_noise =
+        reader.InRange(wheel, "yaw_rate_noise", 1e-6, 10.0, "rad/s");
   }
   calibration->imu_from_wheel = reader.Transform(wheel, "T_imu_wheel");
 }
@@ -166,6 +180,9 @@ StatusOr<SensorCalibration> ReadSensorCalibration(const std::string& path) {
   }
   try {
     std::ifstream stream(path);
+    if (!stream) {
+      return Status::Error(path + ": cannot be opened; check its permissions");
+    }
     const YAML::Node root = YAML::Load(stream);
     const CalibrationReader reader(path);
     if (!root.IsMap()) reader.Fail("the file", "holds no YAML keys");

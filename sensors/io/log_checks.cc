@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 #include "core/median.h"
 #include "sensors/io/format_figures.h"
@@ -59,6 +60,20 @@ std::vector<Window> ComputeWindows(const std::vector<ImuSample>& samples) {
     begin = end;
   }
   return windows;
+}
+
+// Of all but the fastest twentieth, so that a few bad samples are no unit; with
+// the index of the fastest one.
+double ComputeRateRms(const std::vector<ImuSample>& samples, size_t* fastest) {
+  std::vector<double> squares;
+  for (const ImuSample& sample : samples) {
+    squares.push_back(sample.angular_velocity.squaredNorm());
+  }
+  *fastest = std::max_element(squares.begin(), squares.end()) - squares.begin();
+  std::sort(squares.begin(), squares.end());
+  const size_t count = squares.size() - squares.size() / 20;
+  return std::sqrt(
+      std::accumulate(squares.begin(), squares.begin() + count, 0.0) / count);
 }
 
 Status CheckForceUnits(const std::vector<ImuSample>& samples,
@@ -144,16 +159,8 @@ Status CheckImuUnits(const std::vector<ImuSample>& samples,
   Status status = CheckForceUnits(samples, origin);
   if (!status.ok()) return status;
 
-  double rate_sum = 0.0;
   size_t largest = 0;
-  for (size_t i = 0; i < samples.size(); ++i) {
-    rate_sum += samples[i].angular_velocity.squaredNorm();
-    if (samples[i].angular_velocity.squaredNorm() >
-        samples[largest].angular_velocity.squaredNorm()) {
-      largest = i;
-    }
-  }
-  const double rate_rms = std::sqrt(rate_sum / samples.size());
+  const double rate_rms = ComputeRateRms(samples, &largest);
   if (rate_rms > kMaxRateRms) {
     return Status::Error(
         origin.Locate(largest) +

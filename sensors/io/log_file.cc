@@ -11,6 +11,8 @@
 namespace adasfm {
 namespace {
 
+constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";
+
 bool IsSpace(char c) { return c == ' ' || c == '\t' || c == '\r'; }
 
 std::string_view Trim(std::string_view text) {
@@ -40,6 +42,11 @@ StatusOr<LogFile> LogFile::Read(const std::string& path) {
   if (std::filesystem::is_directory(path, error)) {
     return Status::Error(path + ": is a folder; a file is expected");
   }
+  if (!std::filesystem::is_regular_file(path, error)) {
+    return Status::Error(path +
+                         ": is no regular file (a pipe or a device, or a link "
+                         "to itself); a file is expected");
+  }
   std::ifstream stream(path, std::ios::binary);
   if (!stream) {
     return Status::Error(path + ": cannot be opened; check its permissions");
@@ -52,6 +59,10 @@ StatusOr<LogFile> LogFile::Read(const std::string& path) {
 StatusOr<LogFile> LogFile::Parse(const std::string& path, std::string text) {
   LogFile file;
   file.path_ = path;
+  // Editors of Windows begin a text with this mark.
+  if (text.compare(0, kByteOrderMark.size(), kByteOrderMark) == 0) {
+    text.erase(0, kByteOrderMark.size());
+  }
   file.text_ = std::move(text);
   size_t number = 0;
   for (size_t begin = 0; begin < file.text_.size();) {

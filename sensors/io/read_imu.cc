@@ -10,10 +10,11 @@
 
 namespace adasfm {
 
-StatusOr<std::vector<ImuSample>> ReadImu(const std::string& path,
-                                         std::vector<std::string>* warnings) {
-  LogOrigin origin;
-  origin.path = path;
+StatusOr<std::vector<ImuSample>> ReadImuSamples(
+    const std::string& path, std::vector<std::string>* warnings,
+    LogOrigin* origin_out) {
+  LogOrigin& origin = *origin_out;
+  origin = {path, {}, "line"};
   std::vector<ImuSample> samples;
   std::vector<timestamp_t> times;
   std::error_code error;
@@ -39,7 +40,8 @@ StatusOr<std::vector<ImuSample>> ReadImu(const std::string& path,
       ImuSample sample;
       if (!ParseNanoseconds(line.fields[0], &sample.timestamp_ns)) {
         return file->Error(line.number,
-                           "column 1 is '" + std::string(line.fields[0]) +
+                           "column 1 is '" +
+                               std::string(line.fields[0].substr(0, 40)) +
                                "', not a time in whole nanoseconds");
       }
       double values[6];
@@ -52,8 +54,18 @@ StatusOr<std::vector<ImuSample>> ReadImu(const std::string& path,
     }
   }
   for (const ImuSample& sample : samples) times.push_back(sample.timestamp_ns);
-  Status status = CheckLogTimes(times, origin, warnings);
-  if (status.ok()) status = CheckImuUnits(samples, origin);
+  const Status status = CheckLogTimes(times, origin, warnings);
+  if (!status.ok()) return status;
+  return samples;
+}
+
+StatusOr<std::vector<ImuSample>> ReadImu(const std::string& path,
+                                         std::vector<std::string>* warnings) {
+  LogOrigin origin;
+  StatusOr<std::vector<ImuSample>> samples =
+      ReadImuSamples(path, warnings, &origin);
+  if (!samples.ok()) return samples;
+  const Status status = CheckImuUnits(*samples, origin);
   if (!status.ok()) return status;
   return samples;
 }

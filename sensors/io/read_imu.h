@@ -6,6 +6,7 @@
 
 #include "core/sensor_log.h"
 #include "core/status.h"
+#include "sensors/io/log_checks.h"
 
 namespace adasfm {
 
@@ -18,5 +19,11 @@ namespace adasfm {
 // null).
 StatusOr<std::vector<ImuSample>> ReadImu(
     const std::string& path, std::vector<std::string>* warnings = nullptr);
+
+// As above, but units are not checked (CheckImuUnits), so that bad samples can
+// be left out before. origin receives where the samples come from.
+StatusOr<std::vector<ImuSample>> ReadImuSamples(
+    const std::string& path, std::vector<std::string>* warnings,
+    LogOrigin* origin);
 
 }  // namespace adasfm

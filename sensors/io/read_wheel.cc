@@ -71,30 +71,6 @@ StatusOr<WheelType> FindType(const LogFile& file) {
 constexpr double kMaxSpeed = 120.0;
 constexpr double kMaxYawRate = 20.0;
 
-Status CheckSpeeds(const std::vector<WheelSample>& samples, WheelType type,
-                   const LogOrigin& origin) {
-  if (type == WheelType::kTicks) return Status::Ok();
-  const bool has_two_speeds = type == WheelType::kDifferential;
-  for (size_t i = 0; i < samples.size(); ++i) {
-    const WheelSample& sample = samples[i];
-    const double speed = std::max(
-        std::abs(sample.first), has_two_speeds ? std::abs(sample.second) : 0.0);
-    if (speed > kMaxSpeed) {
-      return Status::Error(origin.Locate(i) + ": a speed of " +
-                           std::to_string(speed) +
-                           " m/s; the log seems to be in km/h or mm/s (m/s "
-                           "are expected)");
-    }
-    if (type == WheelType::kVelocity && std::abs(sample.second) > kMaxYawRate) {
-      return Status::Error(origin.Locate(i) + ": a yaw rate of " +
-                           std::to_string(sample.second) +
-                           " rad/s; the log seems to be in deg/s (rad/s are "
-                           "expected)");
-    }
-  }
-  return Status::Ok();
-}
-
 // 4Seasons' times are whole nanoseconds, TUM's are decimal seconds.
 bool ParseTumTime(std::string_view field, timestamp_t* timestamp_ns) {
   if (field.size() >= 15 && field.find('.') == std::string_view::npos) {
@@ -136,6 +112,30 @@ StatusOr<std::vector<OdometryPose>> CheckPoseTimes(
 
 }  // namespace
 
+Status CheckWheelUnits(const std::vector<WheelSample>& samples, WheelType type,
+                       const LogOrigin& origin) {
+  if (type == WheelType::kTicks) return Status::Ok();
+  const bool has_two_speeds = type == WheelType::kDifferential;
+  for (size_t i = 0; i < samples.size(); ++i) {
+    const WheelSample& sample = samples[i];
+    const double speed = std::max(
+        std::abs(sample.first), has_two_speeds ? std::abs(sample.second) : 0.0);
+    if (speed > kMaxSpeed) {
+      return Status::Error(origin.Locate(i) + ": a speed of " +
+                           std::to_string(speed) +
+                           " m/s; the log seems to be in km/h or mm/s (m/s "
+                           "are expected)");
+    }
+    if (type == WheelType::kVelocity && std::abs(sample.second) > kMaxYawRate) {
+      return Status::Error(origin.Locate(i) + ": a yaw rate of " +
+                           std::to_string(sample.second) +
+                           " rad/s; the log seems to be in deg/s (rad/s are "
+                           "expected)");
+    }
+  }
+  return Status::Ok();
+}
+
 StatusOr<WheelType> ReadWheelType(const std::string& path) {
   if (IsRosbagPath(path)) return WheelType::kOdometry;
   const StatusOr<LogFile> file = LogFile::Read(path);
@@ -143,9 +143,10 @@ StatusOr<WheelType> ReadWheelType(const std::string& path) {
   return FindType(*file);
 }
 
-StatusOr<std::vector<WheelSample>> ReadWheel(
-    const std::string& path, WheelType expected_type,
-    std::vector<std::string>* warnings) {
+StatusOr<std::vector<WheelSample>> ReadWheel(const std::string& path,
+                                             WheelType expected_type,
+                                             std::vector<std::string>* warnings,
+                                             LogOrigin* origin_out) {
   if (IsRosbagPath(path)) {
     return Status::Error(path + ": a ROS bag holds nav_msgs/Odometry; set " +
                          "wheel0/type to odometry in the calibration");
@@ -172,9 +173,10 @@ StatusOr<std::vector<WheelSample>> ReadWheel(
     if (!status.ok()) return status;
     WheelSample sample;
     if (!ParseNanoseconds(line.fields[0], &sample.timestamp_ns)) {
-      return file->Error(line.number, "column 1 is '" +
-                                          std::string(line.fields[0]) +
-                                          "', not a time in whole nanoseconds");
+      return file->Error(line.number,
+                         "column 1 is '" +
+                             std::string(line.fields[0].substr(0, 40)) +
+                             "', not a time in whole nanoseconds");
     }
     double values[2] = {0.0, 0.0};
     status = ParseNumbers(*file, line, 1, is_speed ? 1 : 2, values);
@@ -186,8 +188,11 @@ StatusOr<std::vector<WheelSample>> ReadWheel(
     origin.line_numbers.push_back(line.number);
   }
   Status status = CheckLogTimes(times, origin, warnings);
-  if (status.ok()) status = CheckSpeeds(samples, *type, origin);
+  if (status.ok() && origin_out == nullptr) {
+    status = CheckWheelUnits(samples, *type, origin);
+  }
   if (!status.ok()) return status;
+  if (origin_out != nullptr) *origin_out = std::move(origin);
   return samples;
 }
 

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 
 #include <clocale>
 #include <filesystem>
@@ -169,6 +170,25 @@ TEST_F(Readers, GapsAreWarnings) {
   EXPECT_NE(warnings[0].find("line 302"), std::string::npos) << warnings[0];
 }
 
+// Editors of Windows write it.
+TEST_F(Readers, TakeAByteOrderMark) {
+  const std::string mark = "\xEF\xBB\xBF";
+  const auto imu =
+      ReadImu(Write("imu.csv", mark + RestingImu(300, 0.001, 9.81)));
+  ASSERT_TRUE(imu.ok()) << imu.status().message();
+  EXPECT_EQ(imu->size(), 300u);
+  const auto wheel =
+      ReadWheel(Write("wheel.csv", mark + "#timestamp [ns],v [m s^-1]\n10,1\n"),
+                WheelType::kSpeed);
+  EXPECT_TRUE(wheel.ok()) << wheel.status().message();
+}
+
+TEST_F(Readers, RefuseAPipe) {
+  const std::string path = folder_ + "/pipe";
+  ASSERT_EQ(mkfifo(path.c_str(), 0600), 0);
+  ExpectError(ReadImu(path).status(), path, {"no regular file"});
+}
+
 TEST_F(Readers, KittiOxts) {
   Write("oxts/timestamps.txt",
         "2011-09-26 13:02:25.594360375\n2011-09-26 13:02:25.604360375\n");
@@ -304,6 +324,11 @@ TEST_F(Readers, CalibrationErrors) {
        {"update_rate", "not a number"}},
       {Replaced(good, "5.0e-4", "-5.0e-4"),
        {"gyroscope_noise_density", "positive"}},
+      {Replaced(good, "5.0e-4", "1e-40"),
+       {"gyroscope_noise_density is 1e-40", "between 1e-08 and 1 "}},
+      {Replaced(good, "speed_noise: 0.05", "speed_noise: 1e200"),
+       {"speed_noise is 1e+200 m/s", "possible"}},
+      {Replaced(good, "2.0e-5", "1e-20"), {"gyroscope_random_walk is 1e-20"}},
       {Replaced(good, "  track_width: 1.2\n", ""), {"track_width", "missing"}},
       {Replaced(good, "type: differential", "type: tracked"),
        {"wheel0/type", "tracked"}}};

@@ -1,0 +1,285 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "sensors/calibration_check/check_wheels.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/so3.h"
+#include "sensors/calibration_check/calibration_mistakes.h"
+#include "sensors/calibration_check/motion_bins.h"
+#include "sensors/io/format_figures.h"
+
+namespace adasfm {
+namespace {
+
+// Clock errors looked for, and the smallest one that is named.
+constexpr double kMaxShiftS = 10.0;
+constexpr int kMinShiftBins = 2;
+// The best of 200 wrong shifts is by chance e^5 times likelier; see
+// check_against_vision.cc.
+constexpr double kMinEvidence = 20.0;
+// Windows overlap: so many bins count as one observation.
+constexpr double kBinsPerObservation = 4.0;
+// Gravity further than this from the wheel frame's z is no tilt of a road or
+// mount.
+constexpr double kMaxTiltDeg = 40.0;
+// Figures count when they correlate this well ...
+constexpr double kMinCorrelation = 0.7;
+// ... and so much moves.
+constexpr double kMinAcceleration = 0.3;  // m/s^2
+constexpr double kMinYawRate = 0.03;      // rad/s
+constexpr int kMinNumBins = 50;
+// Below it, where much moves, logs do not belong together; without a yaw rate
+// to compare only far below, since engines and rough ground shake.
+constexpr double kNoCorrelation = 0.5;
+constexpr double kNoForceCorrelation = 0.2;
+// Wheel directions beyond this are more than a mount that was badly measured.
+constexpr double kMaxTurnDeg = 30.0;
+// Factors within this are right, or are found by the smoother.
+constexpr double kMaxFactor = 1.5;
+
+class WheelChecker {
+ public:
+  WheelChecker(const MotionBins& bins, bool has_yaw,
+               const SensorCalibration& calibration)
+      : bins_(bins), has_yaw_(has_yaw), calibration_(calibration) {}
+
+  WheelCheck Run();
+
+ private:
+  double LogLikelihood(const WheelFit& fit) const;
+  bool ForceTells(const WheelFit& fit) const {
+    return fit.acceleration_rms > kMinAcceleration &&
+           fit.force_correlation > kMinCorrelation;
+  }
+  bool YawTells(const WheelFit& fit) const {
+    return has_yaw_ && fit.yaw_rate_rms > kMinYawRate &&
+           std::abs(fit.yaw_correlation) > kMinCorrelation;
+  }
+  std::string CheckGravity(const WheelCheck& check) const;
+  std::string CheckClock(const WheelFit& fit) const;
+  std::string CheckBelonging(const WheelFit& fit) const;
+  std::string CheckAxes(const WheelFit& fit) const;
+  std::string CheckDirection(const WheelFit& fit) const;
+  std::string CheckUnits(const WheelFit& fit,
+                         std::vector<std::string>* warnings) const;
+  // The accelerometer's axes that explain gravity and acceleration best.
+  std::string NameAxes() const;
+
+  const MotionBins& bins_;
+  bool has_yaw_;
+  const SensorCalibration& calibration_;
+};
+
+double WheelChecker::LogLikelihood(const WheelFit& fit) const {
+  const auto gain = [&](double correlation) {
+    return -0.5 * fit.num_windows / kBinsPerObservation *
+           std::log(1.0 - 0.999 * correlation * correlation);
+  };
+  // Acceleration has a sign; yaw may be that of exchanged wheels.
+  double sum = fit.acceleration_rms > kMinAcceleration
+                   ? gain(fit.forward_correlation)
+                   : 0.0;
+  if (has_yaw_ && fit.yaw_rate_rms > kMinYawRate) {
+    sum += gain(fit.yaw_correlation);
+  }
+  return sum;
+}
+
+std::string WheelChecker::NameAxes() const {
+  const Eigen::Matrix3d wheel_from_imu =
+      calibration_.imu_from_wheel.rotation.conjugate().toRotationMatrix();
+  std::string name;
+  double best = -1.0;
+  for (const CalibrationMistake& mistake :
+       ListCalibrationMistakes(Eigen::Matrix3d::Identity())) {
+    if (mistake.kind != CalibrationMistake::kAxes) continue;
+    const Eigen::Matrix3d axes =
+        wheel_from_imu * mistake.axes * wheel_from_imu.transpose();
+    const Eigen::Vector3d force = axes * bins_.MeanForce();
+    const double tilt_deg =
+        RadToDeg(std::acos(std::clamp(force.z() / force.norm(), -1.0, 1.0)));
+    if (tilt_deg > kMaxTiltDeg) continue;
+    const WheelFit fit = FitWheels(bins_, axes, 0);
+    // The sign of the acceleration as well.
+    const double score = std::cos(std::arg(fit.force)) * fit.force_correlation;
+    if (score <= best + 0.02) continue;
+    best = score;
+    name = AxesToString(mistake.axes);
+  }
+  return name;
+}
+
+std::string WheelChecker::CheckGravity(const WheelCheck& check) const {
+  const Eigen::Vector3d& force = check.mean_force;
+  const double tilt_deg =
+      RadToDeg(std::acos(std::clamp(force.z() / force.norm(), -1.0, 1.0)));
+  if (tilt_deg < kMaxTiltDeg) return "";
+  const std::string figures = FormatFigures(
+      " (gravity is %.0f deg off the wheel frame's z axis, which T_imu_wheel "
+      "must let point up; correlation of the yaw rates %.2f)",
+      tilt_deg, check.fit.yaw_correlation);
+  if (YawTells(check.fit) && std::abs(check.fit.yaw_correlation) > 0.9 &&
+      check.fit.yaw_correlation < 0.0 && tilt_deg > 180.0 - kMaxTiltDeg) {
+    return "T_imu_wheel is upside down: its third column must be the axis of "
+           "the IMU that points up" +
+           figures;
+  }
+  if (tilt_deg > 180.0 - kMaxTiltDeg) {
+    const bool only_z = ForceTells(check.fit) && check.fit.force.real() > 0.0;
+    return std::string("the accelerometer") + (only_z ? "'s z axis" : "") +
+           " has the other sign: at rest it must read +9.81 m/s^2 upwards "
+           "(specific force); multiply the log's " +
+           (only_z ? "z acceleration" : "accelerations") + " by -1" + figures;
+  }
+  const std::string axes = NameAxes();
+  return "the accelerometer's axes do not fit T_imu_wheel: " +
+         (axes.empty() ? std::string("check both")
+                       : "gravity and acceleration fit when the log's "
+                         "accelerations are read as " +
+                             axes) +
+         figures;
+}
+
+std::string WheelChecker::CheckClock(const WheelFit& fit) const {
+  const int max_shift =
+      static_cast<int>(std::lround(kMaxShiftS / MotionBins::kBinS));
+  const double as_logged = LogLikelihood(fit);
+  double best = as_logged;
+  int shift = 0;
+  for (int bins = -max_shift; bins <= max_shift; ++bins) {
+    const WheelFit shifted =
+        FitWheels(bins_, Eigen::Matrix3d::Identity(), bins);
+    if (shifted.num_windows < kMinNumBins) continue;
+    const double likelihood = LogLikelihood(shifted);
+    if (likelihood > best) {
+      best = likelihood;
+      shift = bins;
+    }
+  }
+  if (std::abs(shift) < kMinShiftBins || best < as_logged + kMinEvidence) {
+    return "";
+  }
+  return FormatFigures(
+      "the wheels' clock differs from the IMU's: both fit when %+.1f s are "
+      "added to the times of the wheel log (evidence e^%.0f)",
+      shift * MotionBins::kBinS, best - as_logged);
+}
+
+std::string WheelChecker::CheckBelonging(const WheelFit& fit) const {
+  const bool has_turns = has_yaw_ && fit.yaw_rate_rms > kMinYawRate;
+  const double bar = has_turns ? kNoCorrelation : kNoForceCorrelation;
+  if (fit.acceleration_rms < kMinAcceleration || fit.force_correlation > bar ||
+      fit.mirrored_correlation > kMinCorrelation ||
+      (has_turns && std::abs(fit.yaw_correlation) > bar)) {
+    return "";
+  }
+  return FormatFigures(
+      "the wheels' motion does not fit the IMU's at all (correlation of the "
+      "accelerations %.2f, of the yaw rates %.2f): is it the log of another "
+      "drive, or of another clock?",
+      fit.force_correlation, fit.yaw_correlation);
+}
+
+std::string WheelChecker::CheckAxes(const WheelFit& fit) const {
+  if (fit.acceleration_rms < kMinAcceleration ||
+      fit.mirrored_correlation < kMinCorrelation) {
+    return "";
+  }
+  // Of independent observations, as everywhere.
+  const auto misfit = [](double correlation) {
+    return std::log(1.0 - 0.999 * correlation * correlation);
+  };
+  const double evidence =
+      fit.num_windows / kBinsPerObservation *
+      (misfit(fit.force_correlation) - misfit(fit.mirrored_correlation));
+  if (evidence < kMinEvidence) return "";
+  return "the accelerometer's horizontal axes do not fit the wheels and the "
+         "gyroscope: they fit when the log's accelerations are read as " +
+         NameAxes() +
+         FormatFigures(" (correlation %.2f as logged, %.2f then)",
+                       fit.force_correlation, fit.mirrored_correlation);
+}
+
+std::string WheelChecker::CheckDirection(const WheelFit& fit) const {
+  if (!ForceTells(fit)) return "";
+  const double turn_deg = RadToDeg(std::arg(fit.force));
+  if (std::abs(turn_deg) < kMaxTurnDeg) return "";
+  if (std::abs(turn_deg) > 180.0 - kMaxTurnDeg) {
+    return YawTells(fit) && fit.yaw > 0.0
+               ? "the wheels drive backwards where the accelerometer drives "
+                 "forwards, but turn to the same side: T_imu_wheel is turned "
+                 "by 180 deg about z, or the wheels are negative and left and "
+                 "right exchanged"
+               : "the wheels count backwards: multiply the wheel log's speeds "
+                 "by -1 (or turn T_imu_wheel by 180 deg about z when only the "
+                 "forward speed has the other sign)";
+  }
+  return FormatFigures(
+      "T_imu_wheel looks turned about z by %.0f deg: its first column must be "
+      "the axis of the IMU that points forward (correlation %.2f)",
+      turn_deg, fit.force_correlation);
+}
+
+std::string WheelChecker::CheckUnits(const WheelFit& fit,
+                                     std::vector<std::string>* warnings) const {
+  if (!ForceTells(fit)) return "";
+  // Noise makes a factor too small only by the squared correlation.
+  const double low = std::abs(fit.force);
+  const double high = low / (fit.force_correlation * fit.force_correlation);
+  if (high < 1.0 / kMaxFactor || low > kMaxFactor) {
+    const double logged = 1.0 / std::sqrt(low * high);
+    const bool is_kmh = logged > 2.9 && logged < 4.4;
+    return FormatFigures(
+               "the wheel log's speeds are %.2g times those of the "
+               "accelerometer: ",
+               logged) +
+           (is_kmh ? "they look like km/h: divide them by 3.6 (m/s are "
+                     "expected)"
+                   : "check their unit (m/s are expected), metres_per_tick "
+                     "and the wheels' radius");
+  }
+  if (!YawTells(fit)) return "";
+  if (fit.yaw < 0.0) {
+    warnings->push_back(
+        "the wheels turn to the other side than the gyroscope: left and right "
+        "are exchanged in the wheel log");
+  } else if (fit.yaw > kMaxFactor || fit.yaw < 1.0 / kMaxFactor) {
+    warnings->push_back(FormatFigures(
+        "the wheels turn %.2f times as much as the gyroscope: check "
+        "track_width (now %.3g m), or the yaw rate's unit",
+        fit.yaw, calibration_.track_width_m));
+  }
+  return "";
+}
+
+WheelCheck WheelChecker::Run() {
+  WheelCheck check;
+  check.mean_force = bins_.MeanForce();
+  check.fit = FitWheels(bins_, Eigen::Matrix3d::Identity(), 0);
+  if (check.fit.num_windows < kMinNumBins) return check;
+  std::string& contradiction = check.contradiction;
+  // The one that would look like those after it comes first.
+  contradiction = CheckGravity(check);
+  if (contradiction.empty()) contradiction = CheckClock(check.fit);
+  if (contradiction.empty()) contradiction = CheckBelonging(check.fit);
+  if (contradiction.empty()) contradiction = CheckAxes(check.fit);
+  if (contradiction.empty()) contradiction = CheckDirection(check.fit);
+  if (contradiction.empty()) {
+    contradiction = CheckUnits(check.fit, &check.warnings);
+  }
+  return check;
+}
+
+}  // namespace
+
+WheelCheck CheckWheels(const std::vector<ImuSample>& imu,
+                       const std::vector<WheelSpeed>& speeds, bool has_yaw,
+                       const SensorCalibration& calibration) {
+  const MotionBins bins(imu, speeds,
+                        calibration.imu_from_wheel.rotation.conjugate());
+  if (bins.size() < kMinNumBins) return WheelCheck();
+  return WheelChecker(bins, has_yaw, calibration).Run();
+}
+
+}  // namespace adasfm

@@ -1,0 +1,60 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <complex>
+#include <string>
+#include <vector>
+
+#include "core/sensor_log.h"
+#include "sensors/io/calibration.h"
+#include "sensors/preintegration/wheel_odometry.h"
+
+namespace adasfm {
+
+// How the wheels' motion fits the IMU's over windows of 0.4 s.
+struct WheelFit {
+  int num_windows = 0;
+  // True horizontal acceleration per logged one, as a complex number in the
+  // wheel frame's plane: 1 when all is right, 1 / 3.6 for km/h, -1 for wheels
+  // that count backwards; and its correlation.
+  std::complex<double> force = 0.0;
+  double force_correlation = 0.0;
+  // The same against the mirrored acceleration (accelerometer with x and y
+  // exchanged).
+  double mirrored_correlation = 0.0;
+  // Logged yaw rate per gyroscope's, and its correlation.
+  double yaw = 0.0;
+  double yaw_correlation = 0.0;
+  // What tells them: rms of the logged acceleration, m/s^2, and of the
+  // gyroscope's yaw rate, rad/s.
+  double acceleration_rms = 0.0;
+  double yaw_rate_rms = 0.0;
+  // Of the forward acceleration alone.
+  double forward_correlation = 0.0;
+};
+
+struct WheelCheck {
+  WheelFit fit;  // at the clocks as logged
+  // Mean specific force in the wheel frame, whose z axis is up.
+  Eigen::Vector3d mean_force = Eigen::Vector3d::Zero();
+  // One line that names the mistake and what to do; empty when there is none.
+  std::string contradiction;
+  // What the estimate can live with.
+  std::vector<std::string> warnings;
+};
+
+// What: checks accelerometer, gyroscope and wheels against each other.
+// Inputs: logs in order of time on one clock, speeds of the wheel frame (x
+// forward, y left, z up), the calibration; has_yaw: the wheels tell the yaw.
+// Method: over windows the mean specific force must be gravity upwards plus
+// (dv/dt, v w_z) of the speeds v and the gyroscope's w_z, and the wheels' yaw
+// rate w_z. The mean force tells the accelerometer's sign and axes; one complex
+// regression of the horizontal force tells the wheels' unit, sign and
+// direction, correlations over shifts of up to 10 s tell the clock. A cause is
+// named when the figures leave no doubt, units first.
+// On failure: nothing is said when there is too little motion.
+WheelCheck CheckWheels(const std::vector<ImuSample>& imu,
+                       const std::vector<WheelSpeed>& speeds, bool has_yaw,
+                       const SensorCalibration& calibration);
+
+}  // namespace adasfm

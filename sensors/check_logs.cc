@@ -1,0 +1,172 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "sensors/check_logs.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/median.h"
+#include "sensors/calibration_check/check_wheels.h"
+#include "sensors/io/format_figures.h"
+#include "sensors/io/log_checks.h"
+
+namespace adasfm {
+namespace {
+
+constexpr double kMinImagePeriodS = 1e-3;
+constexpr double kMinImuRateHz = 40.0;
+// Below this the noise figure is another sensor's, or another unit's.
+constexpr double kMinNoiseShare = 0.2;
+constexpr double kMaxScaleError = 0.2;
+constexpr double kMaxScaleFactor = 2.0;
+
+template <typename Sample>
+bool Covers(const std::vector<Sample>& log, timestamp_t time_ns) {
+  return !log.empty() && time_ns >= log.front().timestamp_ns &&
+         time_ns <= log.back().timestamp_ns;
+}
+
+// The tenth of all windows of a second that are quietest end here: sigma of one
+// reading's white noise, from second differences. Windows that do not change at
+// all (wheels at rest) tell nothing.
+double QuietSigma(const std::vector<timestamp_t>& times_ns,
+                  const std::vector<Eigen::Vector3d>& readings, int num_axes) {
+  std::vector<double> sigmas;
+  size_t begin = 0;
+  for (size_t end = 1; end < readings.size(); ++end) {
+    if (SecondsFromNs(times_ns[end] - times_ns[begin]) < 1.0) continue;
+    std::vector<double> sizes;
+    for (size_t i = begin + 2; i < end; ++i) {
+      const Eigen::Vector3d second =
+          readings[i] - 2.0 * readings[i - 1] + readings[i - 2];
+      for (int axis = 0; axis < num_axes; ++axis) {
+        sizes.push_back(std::abs(second[axis]));
+      }
+    }
+    const double sigma = 1.4826 * UpperMedian(&sizes) / std::sqrt(6.0);
+    if (sigma > 0.0) sigmas.push_back(sigma);
+    begin = end;
+  }
+  if (sigmas.size() < 10) return 0.0;
+  std::sort(sigmas.begin(), sigmas.end());
+  return sigmas[sigmas.size() / 10];
+}
+
+void Raise(const char* name, double measured, double* figure,
+           std::vector<std::string>* warnings) {
+  if (*figure >= kMinNoiseShare * measured) return;
+  warnings->push_back(
+      std::string(name) +
+      FormatFigures(" is %.3g, but the log's noise in its quietest seconds is "
+                    "%.3g, which is used: correct the noise figures",
+                    *figure, measured));
+  *figure = measured;
+}
+
+}  // namespace
+
+Status CheckCoverage(const std::vector<timestamp_t>& times_ns,
+                     const MotionLogs& logs,
+                     std::vector<std::string>* warnings) {
+  const double period_s = ComputeMedianPeriod(times_ns);
+  if (times_ns.size() > 2 && period_s < kMinImagePeriodS) {
+    return Status::Error(FormatFigures(
+        "the images are %.3g s apart; their times look like microseconds: "
+        "multiply them by 1000 (nanoseconds are expected)",
+        period_s));
+  }
+  std::vector<timestamp_t> imu_times_ns;
+  for (const ImuSample& sample : logs.imu) {
+    imu_times_ns.push_back(sample.timestamp_ns);
+  }
+  const double imu_period_s = ComputeMedianPeriod(imu_times_ns);
+  if (imu_period_s > 1.0 / kMinImuRateHz) {
+    warnings->push_back(FormatFigures(
+        "the IMU runs at %.3g Hz; below %.3g Hz turns and bumps between its "
+        "samples are lost: record it faster",
+        1.0 / imu_period_s, kMinImuRateHz));
+  }
+  if (logs.wheel.empty() && logs.odometry.empty()) return Status::Ok();
+  const bool is_wheel = !logs.wheel.empty();
+  const size_t num_covered =
+      std::count_if(times_ns.begin(), times_ns.end(), [&](timestamp_t time_ns) {
+        return is_wheel ? Covers(logs.wheel, time_ns)
+                        : Covers(logs.odometry, time_ns);
+      });
+  if (2 * num_covered >= times_ns.size()) return Status::Ok();
+  const timestamp_t first = is_wheel ? logs.wheel.front().timestamp_ns
+                                     : logs.odometry.front().timestamp_ns;
+  const timestamp_t last = is_wheel ? logs.wheel.back().timestamp_ns
+                                    : logs.odometry.back().timestamp_ns;
+  const std::string text =
+      "the wheel log covers " +
+      (num_covered == 0 ? std::string("no image")
+                        : std::to_string(num_covered) + " of " +
+                              std::to_string(times_ns.size()) + " images") +
+      FormatFigures(": it runs from %.3f to %.3f s, ", SecondsFromNs(first),
+                    SecondsFromNs(last)) +
+      FormatFigures(
+          "the images on the IMU's clock from %.3f to %.3f s; check "
+          "the wheels' clock and whether the log was cut",
+          SecondsFromNs(times_ns.front()), SecondsFromNs(times_ns.back()));
+  if (num_covered == 0) return Status::Error(text);
+  warnings->push_back(text);
+  return Status::Ok();
+}
+
+std::string FindContradiction(const MotionLogs& logs,
+                              const SensorCalibration& calibration,
+                              std::vector<std::string>* warnings) {
+  if (logs.imu.empty() || logs.wheel.empty()) return "";
+  const bool has_yaw = calibration.wheel_type != WheelType::kSpeed;
+  const WheelCheck check =
+      CheckWheels(logs.imu, logs.wheel, has_yaw, calibration);
+  warnings->insert(warnings->end(), check.warnings.begin(),
+                   check.warnings.end());
+  return check.contradiction;
+}
+
+void RaiseNoiseFigures(const MotionLogs& logs, SensorCalibration* calibration,
+                       std::vector<std::string>* warnings) {
+  std::vector<timestamp_t> times_ns;
+  std::vector<Eigen::Vector3d> rates, forces;
+  for (const ImuSample& sample : logs.imu) {
+    times_ns.push_back(sample.timestamp_ns);
+    rates.push_back(sample.angular_velocity);
+    forces.push_back(sample.specific_force);
+  }
+  const double root_period = std::sqrt(ComputeMedianPeriod(times_ns));
+  ImuNoise& noise = calibration->imu_noise;
+  Raise("gyroscope_noise_density", root_period * QuietSigma(times_ns, rates, 3),
+        &noise.gyroscope_noise_density, warnings);
+  Raise("accelerometer_noise_density",
+        root_period * QuietSigma(times_ns, forces, 3),
+        &noise.accelerometer_noise_density, warnings);
+  if (calibration->wheel_type == WheelType::kTicks) return;
+  times_ns.clear();
+  std::vector<Eigen::Vector3d> speeds;
+  for (const WheelSpeed& speed : logs.wheel) {
+    times_ns.push_back(speed.timestamp_ns);
+    speeds.emplace_back(speed.speed, 0.0, 0.0);
+  }
+  // The mean of two wheels is less noisy than one.
+  const double num_wheels =
+      calibration->wheel_type == WheelType::kDifferential ? 2.0 : 1.0;
+  Raise("speed_noise", std::sqrt(num_wheels) * QuietSigma(times_ns, speeds, 1),
+        &calibration->wheel_speed_noise, warnings);
+}
+
+std::string DescribeWheelScale(double scale, bool* is_error) {
+  *is_error = !(scale > 1.0 / kMaxScaleFactor && scale < kMaxScaleFactor);
+  if (std::abs(scale - 1.0) <= kMaxScaleError) return "";
+  const bool is_kmh = scale > 0.2 && scale < 0.35;
+  return FormatFigures(
+             "the wheels' scale is %.4g: a metre of the wheel log is "
+             "%.3g true metres; ",
+             scale, scale) +
+         (is_kmh ? "the log looks like km/h (divide by 3.6)"
+                 : "check the speeds' unit, the wheels' radius, "
+                   "metres_per_tick, the wheels' clock and whether the log "
+                   "belongs to this drive");
+}
+
+}  // namespace adasfm
