@@ -16,6 +16,10 @@ void AddPathOptions(PriorImportPaths* paths, CommandOptions* command) {
   command->AddRequired("sensors_path", &paths->sensors_path,
                        "YAML file with the calibration of the sensors");
   AddLogOptions(paths, command);
+  command->AddDefault("bag_path", &paths->bag_path,
+                      "a ROS 2 bag (.mcap, .db3 or its folder) or a ROS 1 bag "
+                      "with the logs that no path is given for");
+  AddBagTopicOptions(&paths->bag_topics, command);
 }
 
 void AddFusionOptions(OdometryFusionOptions* fusion, CommandOptions* command) {

@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <chrono>
 #include <map>
+#include <memory>
+#include <optional>
 #include <tuple>
 #include <utility>
 
@@ -12,6 +14,7 @@
 #include "colmap_ext/scene/scene_data.h"
 #include "colmap_ext/scene/two_view_poses.h"
 #include "global/two_view/refine_relative_poses.h"
+#include "sensors/bags/bag_reader.h"
 #include "sensors/io/read_image_times.h"
 #include "sensors/io/read_imu.h"
 #include "sensors/io/read_wheel.h"
@@ -126,6 +129,36 @@ StatusOr<std::vector<ImageStamp>> StampImages(const std::string& path,
   return stamps;
 }
 
+// Gives the logs of the bag as paths with their topics. Wheels only where the
+// calibration has some.
+Status UseBag(const SensorCalibration& calibration, PriorImportPaths* paths) {
+  const std::string& bag_path = paths->bag_path;
+  const StatusOr<std::unique_ptr<BagReader>> bag = OpenBag(bag_path);
+  if (!bag.ok()) return bag.status();
+  const auto use = [&](const StatusOr<std::optional<BagTopic>>& topic,
+                       std::string* path) {
+    if (!topic.ok()) return topic.status();
+    if (topic->has_value()) *path = bag_path + ":" + (*topic)->name;
+    return Status::Ok();
+  };
+  const std::vector<BagTopic>& topics = (*bag)->Topics();
+  const BagTopicNames& names = paths->bag_topics;
+  Status status;
+  if (paths->imu_path.empty()) {
+    status = use(FindImuTopic(bag_path, topics, names.imu), &paths->imu_path);
+  }
+  if (status.ok() && paths->wheel_path.empty() && calibration.has_wheel) {
+    status = use(
+        FindWheelTopic(bag_path, topics, names.wheel, calibration.wheel_type),
+        &paths->wheel_path);
+  }
+  if (!status.ok()) return status;
+  if (!paths->imu_path.empty() || !paths->wheel_path.empty()) return status;
+  return Status::Error(bag_path +
+                       ": no topic of type sensor_msgs/Imu, nor of the wheels "
+                       "that the calibration has");
+}
+
 Status ReadLogs(const PriorImportPaths& paths,
                 const SensorCalibration& calibration, SensorLogs* logs,
                 std::vector<std::string>* warnings) {
@@ -223,11 +256,13 @@ bool PriorImportOptions::IsValid(std::string* error) const {
   return estimation.IsValid(error);
 }
 
-StatusOr<PriorImport> ComputePriorImport(const PriorImportPaths& paths,
+StatusOr<PriorImport> ComputePriorImport(const PriorImportPaths& given_paths,
                                          const PriorImportOptions& options) {
-  if (paths.imu_path.empty() && paths.wheel_path.empty()) {
+  PriorImportPaths paths = given_paths;
+  if (paths.imu_path.empty() && paths.wheel_path.empty() &&
+      paths.bag_path.empty()) {
     return Status::Error(
-        "no sensor log; give --imu_path, --wheel_path or both");
+        "no sensor log; give --imu_path, --wheel_path or both, or --bag_path");
   }
   Status status = CheckDatabase(paths.database_path);
   if (!status.ok()) return status;
@@ -235,6 +270,8 @@ StatusOr<PriorImport> ComputePriorImport(const PriorImportPaths& paths,
       ReadSensorCalibration(paths.sensors_path);
   if (!calibration.ok()) return calibration.status();
   const auto start = std::chrono::steady_clock::now();
+  if (!paths.bag_path.empty()) status = UseBag(*calibration, &paths);
+  if (!status.ok()) return status;
   PriorImport import;
   SensorLogs logs;
   status = ReadLogs(paths, *calibration, &logs, &import.warnings);

@@ -7,6 +7,7 @@
 #include "colmap_ext/database/prior_tables.h"
 #include "core/status.h"
 #include "sensors/estimate_priors.h"
+#include "sensors/io/bag_topics.h"
 
 namespace adasfm {
 
@@ -17,6 +18,9 @@ struct PriorImportPaths {
   std::string imu_path;
   std::string wheel_path;
   std::string sensors_path;
+  // A bag with the logs that have no path of their own.
+  std::string bag_path;
+  BagTopicNames bag_topics;
 };
 
 struct PriorImportOptions {

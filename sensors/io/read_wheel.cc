@@ -6,7 +6,7 @@
 
 #include "sensors/io/log_checks.h"
 #include "sensors/io/log_file.h"
-#include "sensors/io/read_rosbag.h"
+#include "sensors/io/read_bag.h"
 
 namespace adasfm {
 namespace {
@@ -95,6 +95,17 @@ Status CheckSpeeds(const std::vector<WheelSample>& samples, WheelType type,
   return Status::Ok();
 }
 
+Status CheckSamples(const std::vector<WheelSample>& samples, WheelType type,
+                    const LogOrigin& origin,
+                    std::vector<std::string>* warnings) {
+  std::vector<timestamp_t> times;
+  for (const WheelSample& sample : samples) {
+    times.push_back(sample.timestamp_ns);
+  }
+  const Status status = CheckLogTimes(times, origin, warnings);
+  return status.ok() ? CheckSpeeds(samples, type, origin) : status;
+}
+
 // 4Seasons' times are whole nanoseconds, TUM's are decimal seconds.
 bool ParseTumTime(std::string_view field, timestamp_t* timestamp_ns) {
   if (field.size() >= 15 && field.find('.') == std::string_view::npos) {
@@ -137,7 +148,6 @@ StatusOr<std::vector<OdometryPose>> CheckPoseTimes(
 }  // namespace
 
 StatusOr<WheelType> ReadWheelType(const std::string& path) {
-  if (IsRosbagPath(path)) return WheelType::kOdometry;
   const StatusOr<LogFile> file = LogFile::Read(path);
   if (!file.ok()) return file.status();
   return FindType(*file);
@@ -146,9 +156,15 @@ StatusOr<WheelType> ReadWheelType(const std::string& path) {
 StatusOr<std::vector<WheelSample>> ReadWheel(
     const std::string& path, WheelType expected_type,
     std::vector<std::string>* warnings) {
-  if (IsRosbagPath(path)) {
-    return Status::Error(path + ": a ROS bag holds nav_msgs/Odometry; set " +
-                         "wheel0/type to odometry in the calibration");
+  if (IsBagPath(path)) {
+    StatusOr<std::vector<WheelSample>> bag =
+        ReadBagWheel(path, expected_type, warnings);
+    if (!bag.ok()) return bag;
+    const Status status = CheckSamples(
+        *bag, expected_type, LogOrigin::Numbered(path, bag->size(), "message"),
+        warnings);
+    if (!status.ok()) return status;
+    return bag;
   }
   const StatusOr<LogFile> file = LogFile::Read(path);
   if (!file.ok()) return file.status();
@@ -164,7 +180,6 @@ StatusOr<std::vector<WheelSample>> ReadWheel(
   LogOrigin origin;
   origin.path = path;
   std::vector<WheelSample> samples;
-  std::vector<timestamp_t> times;
   for (size_t i = 0; i < file->num_lines(); ++i) {
     const LogLine line = file->Line(i);
     Status status =
@@ -182,19 +197,17 @@ StatusOr<std::vector<WheelSample>> ReadWheel(
     sample.first = values[0];
     sample.second = values[1];
     samples.push_back(sample);
-    times.push_back(sample.timestamp_ns);
     origin.line_numbers.push_back(line.number);
   }
-  Status status = CheckLogTimes(times, origin, warnings);
-  if (status.ok()) status = CheckSpeeds(samples, *type, origin);
+  const Status status = CheckSamples(samples, *type, origin, warnings);
   if (!status.ok()) return status;
   return samples;
 }
 
 StatusOr<std::vector<OdometryPose>> ReadOdometry(
     const std::string& path, std::vector<std::string>* warnings) {
-  if (IsRosbagPath(path)) {
-    StatusOr<std::vector<OdometryPose>> bag = ReadRosbagOdometry(path);
+  if (IsBagPath(path)) {
+    StatusOr<std::vector<OdometryPose>> bag = ReadBagOdometry(path, warnings);
     if (!bag.ok()) return bag.status();
     const LogOrigin origin = LogOrigin::Numbered(path, bag->size(), "message");
     return CheckPoseTimes(std::move(*bag), origin, warnings);
