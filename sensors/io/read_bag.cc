@@ -278,6 +278,16 @@ StatusOr<BagLogs> ReadOneLog(const std::string& text, const Find& find,
                      warnings == nullptr ? &ignored : warnings);
 }
 
+// A topic's messages may all lie where the file is damaged.
+template <typename Sample>
+StatusOr<std::vector<Sample>> RequireSamples(const std::string& path,
+                                             std::vector<Sample> samples) {
+  if (!samples.empty()) return samples;
+  return Status::Error(path +
+                       ": none of the topic's messages can be read; the bag "
+                       "is cut short or damaged");
+}
+
 Status RequireTopic(const StatusOr<std::optional<BagTopic>>& found,
                     const std::string& path, const std::string& type,
                     std::optional<BagTopic>* topic) {
@@ -393,14 +403,14 @@ StatusOr<std::vector<ImuSample>> ReadBagImu(
       },
       std::nullopt, warnings);
   if (!logs.ok()) return logs.status();
-  return std::move(logs->imu);
+  return RequireSamples(path, std::move(logs->imu));
 }
 
 StatusOr<std::vector<OdometryPose>> ReadBagOdometry(
     const std::string& path, std::vector<std::string>* warnings) {
   StatusOr<BagLogs> logs = ReadWheelLog(path, WheelType::kOdometry, warnings);
   if (!logs.ok()) return logs.status();
-  return std::move(logs->odometry);
+  return RequireSamples(path, std::move(logs->odometry));
 }
 
 StatusOr<std::vector<WheelSample>> ReadBagWheel(
@@ -408,7 +418,7 @@ StatusOr<std::vector<WheelSample>> ReadBagWheel(
     std::vector<std::string>* warnings) {
   StatusOr<BagLogs> logs = ReadWheelLog(path, type, warnings);
   if (!logs.ok()) return logs.status();
-  return std::move(logs->wheel);
+  return RequireSamples(path, std::move(logs->wheel));
 }
 
 }  // namespace adasfm
