@@ -299,13 +299,12 @@ Status Reconstructor::Priors() {
       return Status::Ok();
     }
     ProgressIn(kPriors, "priors")("reading the logs", 0.0);
-    const PriorImportPaths paths = {database_path_,
-                                    paths_.image_times_path,
-                                    paths_.imu_path,
-                                    paths_.wheel_path,
-                                    paths_.sensors_path,
-                                    {},
-                                    {}};
+    PriorImportPaths paths;
+    paths.database_path = database_path_;
+    paths.image_times_path = paths_.image_times_path;
+    paths.imu_path = paths_.imu_path;
+    paths.wheel_path = paths_.wheel_path;
+    paths.sensors_path = paths_.sensors_path;
     const StatusOr<PriorImport> import =
         ImportPriors(options_.priors, paths, database_path_ + ".priors.json");
     if (!import.ok()) return import.status();
