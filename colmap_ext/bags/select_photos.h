@@ -6,7 +6,7 @@
 
 #include "core/status.h"
 #include "core/types.h"
-#include "sensors/io/read_bag.h"
+#include "sensors/io/bag_logs.h"
 
 namespace adasfm {
 

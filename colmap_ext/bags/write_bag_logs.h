@@ -4,7 +4,7 @@
 #include <string>
 
 #include "core/status.h"
-#include "sensors/io/read_bag.h"
+#include "sensors/io/bag_logs.h"
 
 namespace adasfm {
 

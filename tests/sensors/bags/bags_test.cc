@@ -8,6 +8,7 @@
 
 #include <filesystem>
 
+#include "sensors/io/bag_logs.h"
 #include "sensors/io/read_bag.h"
 #include "sensors/io/read_imu.h"
 #include "sensors/io/read_wheel.h"
