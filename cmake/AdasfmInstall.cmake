@@ -144,7 +144,7 @@ mapping on ordinary COLMAP databases. Goes beside the package colmap.")
 set(CPACK_DEBIAN_DEV_PACKAGE_NAME libadasfm-dev)
 set(CPACK_DEBIAN_DEV_PACKAGE_SECTION libdevel)
 set(CPACK_DEBIAN_DEV_PACKAGE_DEPENDS
-  "libeigen3-dev, libceres-dev, libyaml-cpp-dev, libmetis-dev, libopencv-dev, nlohmann-json3-dev")
+  "libeigen3-dev, libceres-dev, libyaml-cpp-dev, libmetis-dev, libopencv-dev, libsqlite3-dev, liblz4-dev, libzstd-dev, nlohmann-json3-dev")
 set(CPACK_COMPONENT_DEV_DESCRIPTION
   "Libraries, headers and a CMake package: sensor fusion, rotation and
 translation averaging and graph partition for Structure from Motion.")

@@ -33,7 +33,7 @@ packages=(
   # do not depend on the number of cores.
   libopenblas-serial-dev
   # Ours.
-  libopencv-dev libyaml-cpp-dev nlohmann-json3-dev
+  libopencv-dev libyaml-cpp-dev nlohmann-json3-dev libzstd-dev
   librosbag-storage-dev libsensor-msgs-dev libnav-msgs-dev
   libgtest-dev libgmock-dev libbenchmark-dev
   # For the scripts that draw tables and compare models.

@@ -12,10 +12,30 @@
 namespace adasfm {
 namespace {
 
-void AddPaths(AutomaticReconstructionPaths* paths, CommandOptions* command) {
-  command->AddRequired("image_path", &paths->image_path,
-                       "folder of the photos or, with --data_format, root "
-                       "folder of the recording");
+void AddBagOptions(BagExtractionOptions* bag,
+                   AutomaticReconstructionPaths* paths,
+                   CommandOptions* command) {
+  command->AddDefault("bag_path", &paths->bag_path,
+                      "in place of --image_path: a ROS 2 bag (.mcap, .db3 or "
+                      "its folder) or a ROS 1 bag with photos, logs and "
+                      "calibration");
+  AddBagTopicOptions(&bag->topics, command);
+  command->AddDefault("image_topic", &bag->topics.image,
+                      "topic of the photos in the bag; when empty, the only "
+                      "one");
+  command->AddDefault("image_step", &bag->photos.image_step,
+                      "every so many photos of the bag are used");
+  command->AddDefault("image_distance_m", &bag->photos.image_distance_m,
+                      "photos of the bag are this far apart by its wheels, or "
+                      "10 degrees of turn [m]; 0: all");
+}
+
+void AddPaths(AutomaticReconstructionOptions* options,
+              AutomaticReconstructionPaths* paths, CommandOptions* command) {
+  command->AddDefault("image_path", &paths->image_path,
+                      "folder of the photos or, with --data_format, root "
+                      "folder of the recording");
+  AddBagOptions(&options->bag, paths, command);
   command->AddRequired("workspace_path", &paths->workspace_path,
                        "folder for all results; the same command on it again "
                        "continues");
@@ -69,8 +89,8 @@ Status RunAdasfmAutomaticReconstructor(int argc, char** argv) {
   CommandOptions command(
       "adasfm_automatic_reconstructor",
       "From a folder of photos, and the logs of an IMU and wheels where there "
-      "are any, to a model and a report about it.");
-  AddPaths(&paths, &command);
+      "are any, or from a ROS bag, to a model and a report about it.");
+  AddPaths(&options, &paths, &command);
   AddFeatureOptions(&options.features, &command);
   command.AddDefault("refine_intrinsics", &options.refine_intrinsics,
                      "adjust focal length and distortion: 0, 1, or -1: when "

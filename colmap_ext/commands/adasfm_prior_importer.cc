@@ -13,9 +13,18 @@ namespace {
 void AddPathOptions(PriorImportPaths* paths, CommandOptions* command) {
   command->AddRequired("database_path", &paths->database_path,
                        "COLMAP database with the images");
-  command->AddRequired("sensors_path", &paths->sensors_path,
-                       "YAML file with the calibration of the sensors");
+  command->AddDefault("sensors_path", &paths->sensors_path,
+                      "YAML file with the calibration of the sensors; a "
+                      "trajectory of the camera itself needs none");
   AddLogOptions(paths, command);
+  command->AddDefault("bag_path", &paths->bag_path,
+                      "a ROS 2 bag (.mcap, .db3 or its folder) or a ROS 1 bag "
+                      "with the logs that no path is given for");
+  AddBagTopicOptions(&paths->bag_topics, command);
+  command->AddDefault("trajectory_path", &paths->trajectory_path,
+                      "in place of logs: metric poses as a TUM trajectory or "
+                      "a COLMAP model, of which the motions between images "
+                      "are used");
 }
 
 void AddFusionOptions(OdometryFusionOptions* fusion, CommandOptions* command) {
@@ -87,6 +96,16 @@ void AddOptions(PriorImportOptions* options, CommandOptions* command) {
   add("max_visual_gap", &options->max_visual_gap,
       "two-view rotations are taken from images at most this many apart");
   AddFusionOptions(&estimation->fusion, command);
+  TrajectoryPriorOptions* trajectory = &options->trajectory;
+  command->AddDefault("AdaSfmTrajectory.sigma_m_per_m",
+                      &trajectory->sigma_m_per_m,
+                      "error of the trajectory's translation between two "
+                      "images, 1 sigma [m/m]");
+  command->AddDefault(
+      "AdaSfmTrajectory.sigma_deg_per_m", &trajectory->sigma_deg_per_m,
+      "error of its rotation between two images, 1 sigma [deg/m]");
+  command->AddDefault("AdaSfmTrajectory.max_gap_s", &trajectory->max_gap_s,
+                      "longest gap of the trajectory to bridge [s]");
 }
 
 }  // namespace

@@ -16,11 +16,23 @@ void AddLogOptions(Paths* paths, CommandOptions* command) {
   command->AddDefault(
       "imu_path", &paths->imu_path,
       "IMU log: EuRoC CSV, 4Seasons imu.txt, a KITTI oxts folder "
-      "or a ROS 1 bag; none when empty");
+      "or a ROS bag; none when empty");
   command->AddDefault(
       "wheel_path", &paths->wheel_path,
       "wheel log, told apart by its header line, a TUM odometry "
-      "trajectory or a ROS 1 bag with one; none when empty");
+      "trajectory or a ROS bag; none when empty");
+}
+
+// --imu_topic and --wheel_topic, for commands that read bags. Names has members
+// imu and wheel.
+template <typename Names>
+void AddBagTopicOptions(Names* names, CommandOptions* command) {
+  command->AddDefault("imu_topic", &names->imu,
+                      "topic of the IMU in the bag; when empty, the only one; "
+                      "'none' leaves it out");
+  command->AddDefault("wheel_topic", &names->wheel,
+                      "topic of odometry, twists or joint states in the bag; "
+                      "when empty, the only one; 'none' leaves it out");
 }
 
 }  // namespace adasfm

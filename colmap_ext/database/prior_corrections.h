@@ -5,8 +5,8 @@
 #include <optional>
 #include <vector>
 
-#include "colmap_ext/io/sqlite.h"
 #include "core/relative_pose_prior.h"
+#include "core/sqlite.h"
 
 namespace adasfm {
 

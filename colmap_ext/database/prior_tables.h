@@ -5,8 +5,8 @@
 #include <string>
 #include <vector>
 
-#include "colmap_ext/io/sqlite.h"
 #include "core/relative_pose_prior.h"
+#include "core/sqlite.h"
 #include "core/status.h"
 #include "core/types.h"
 

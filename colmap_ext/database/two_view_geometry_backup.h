@@ -6,7 +6,7 @@
 
 #include "colmap_ext/database/prior_corrections.h"
 #include "colmap_ext/host/database.h"
-#include "colmap_ext/io/sqlite.h"
+#include "core/sqlite.h"
 #include "core/status.h"
 #include "core/types.h"
 

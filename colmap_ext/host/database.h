@@ -11,8 +11,8 @@
 #include <string>
 #include <vector>
 
-#include "colmap_ext/io/sqlite.h"
 #include "core/rigid3d.h"
+#include "core/sqlite.h"
 #include "core/status.h"
 #include "core/types.h"
 

@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <functional>
 
-#include "colmap_ext/io/sqlite.h"
+#include "core/sqlite.h"
 #include "core/types.h"
 
 namespace adasfm {

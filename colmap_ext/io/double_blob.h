@@ -4,7 +4,7 @@
 #include <cstddef>
 #include <string>
 
-#include "colmap_ext/io/sqlite.h"
+#include "core/sqlite.h"
 
 namespace adasfm {
 

@@ -82,6 +82,14 @@ Status StepJournal::Finish(const std::string& name, double seconds) {
   return Write();
 }
 
+Status StepJournal::KeepOnly(const std::string& name) {
+  steps_.erase(
+      std::remove_if(steps_.begin(), steps_.end(),
+                     [&name](const Step& step) { return step.name != name; }),
+      steps_.end());
+  return Write();
+}
+
 StatusOr<double> StepJournal::Run(const std::string& name,
                                   const StepInputs& inputs,
                                   const std::function<Status()>& reset,

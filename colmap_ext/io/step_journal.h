@@ -45,6 +45,8 @@ class StepJournal {
   // Written at once. Begin forgets the steps after this one.
   Status Begin(const std::string& name, const StepInputs& inputs);
   Status Finish(const std::string& name, double seconds);
+  // Forgets all steps but this one.
+  Status KeepOnly(const std::string& name);
 
   // Does the step, unless it is done with these inputs: `reset`, unless it was
   // begun with them, removes what other inputs left; `work` does it, continuing

@@ -4,17 +4,24 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <filesystem>
 #include <map>
+#include <memory>
+#include <optional>
 #include <tuple>
 #include <utility>
 
 #include "colmap_ext/host/camera.h"
 #include "colmap_ext/host/database.h"
+#include "colmap_ext/host/model.h"
+#include "colmap_ext/host/pose_conversion.h"
 #include "colmap_ext/priors/read_sensor_logs.h"
 #include "colmap_ext/scene/scene_data.h"
 #include "colmap_ext/scene/two_view_poses.h"
 #include "global/two_view/refine_relative_poses.h"
+#include "sensors/bags/bag_reader.h"
 #include "sensors/io/read_image_times.h"
+#include "sensors/io/read_wheel.h"
 
 namespace adasfm {
 namespace {
@@ -126,6 +133,36 @@ StatusOr<std::vector<ImageStamp>> StampImages(const std::string& path,
   return stamps;
 }
 
+// Gives the logs of the bag as paths with their topics. Wheels only where the
+// calibration has some.
+Status UseBag(const SensorCalibration& calibration, PriorImportPaths* paths) {
+  const std::string& bag_path = paths->bag_path;
+  const StatusOr<std::unique_ptr<BagReader>> bag = OpenBag(bag_path);
+  if (!bag.ok()) return bag.status();
+  const auto use = [&](const StatusOr<std::optional<BagTopic>>& topic,
+                       std::string* path) {
+    if (!topic.ok()) return topic.status();
+    if (topic->has_value()) *path = bag_path + ":" + (*topic)->name;
+    return Status::Ok();
+  };
+  const std::vector<BagTopic>& topics = (*bag)->Topics();
+  const BagTopicNames& names = paths->bag_topics;
+  Status status;
+  if (paths->imu_path.empty()) {
+    status = use(FindImuTopic(bag_path, topics, names.imu), &paths->imu_path);
+  }
+  if (status.ok() && paths->wheel_path.empty() && calibration.has_wheel) {
+    status = use(
+        FindWheelTopic(bag_path, topics, names.wheel, calibration.wheel_type),
+        &paths->wheel_path);
+  }
+  if (!status.ok()) return status;
+  if (!paths->imu_path.empty() || !paths->wheel_path.empty()) return status;
+  return Status::Error(bag_path +
+                       ": no topic of type sensor_msgs/Imu, nor of the wheels "
+                       "that the calibration has");
+}
+
 void KeepNearPairs(const std::vector<ImageStamp>& stamps, int max_gap,
                    std::vector<ScenePair>* pairs) {
   std::map<image_t, int> ranks;
@@ -218,6 +255,78 @@ Status CheckEstimate(const PriorEstimate& estimate,
                        kRemedy);
 }
 
+// The poses of the images by a trajectory's times or a model's names.
+StatusOr<std::map<image_t, Rigid3d>> ReadTrajectoryPoses(
+    const PriorImportPaths& paths, const SceneData& scene,
+    const std::vector<ImageStamp>& stamps, double max_gap_s) {
+  const std::string& path = paths.trajectory_path;
+  std::map<image_t, Rigid3d> poses;
+  if (std::filesystem::is_directory(path)) {
+    const StatusOr<colmap::Reconstruction> model = ReadModel(path);
+    if (!model.ok()) return model.status();
+    const ImageFinder finder(scene);
+    for (const auto& [model_id, cam_from_world] : CamsFromWorld(*model)) {
+      const image_t image_id = finder.Find(model->Image(model_id).Name());
+      if (image_id != kInvalidImageId) poses[image_id] = cam_from_world;
+    }
+  } else {
+    SensorCalibration calibration;
+    if (!paths.sensors_path.empty()) {
+      StatusOr<SensorCalibration> read =
+          ReadSensorCalibration(paths.sensors_path);
+      if (!read.ok()) return read.status();
+      calibration = std::move(read).value();
+    }
+    const StatusOr<std::vector<OdometryPose>> trajectory = ReadOdometry(path);
+    if (!trajectory.ok()) return trajectory.status();
+    poses = InterpolateTrajectory(
+        *trajectory, calibration.cam_from_imu,
+        std::llround(1e9 * calibration.timeshift_cam_imu_s), stamps, max_gap_s);
+  }
+  if (poses.size() > 1) return poses;
+  return Status::Error(path + ": gives poses to " +
+                       std::to_string(poses.size()) + " of " +
+                       std::to_string(stamps.size()) +
+                       " images; compare its names or its clock with the "
+                       "images'");
+}
+
+// Priors of a trajectory, without logs and without a smoother.
+StatusOr<PriorImport> ImportTrajectory(const PriorImportPaths& paths,
+                                       const PriorImportOptions& options) {
+  if (!paths.imu_path.empty() || !paths.wheel_path.empty() ||
+      !paths.bag_path.empty()) {
+    return Status::Error(
+        "--trajectory_path stands for all logs; to smooth a trajectory "
+        "with an IMU give it as --wheel_path of type odometry");
+  }
+  const auto start = std::chrono::steady_clock::now();
+  const StatusOr<SceneData> scene = ReadScene(paths.database_path);
+  if (!scene.ok()) return scene.status();
+  PriorImport import;
+  const StatusOr<std::vector<ImageStamp>> stamps =
+      StampImages(paths.image_times_path, *scene, &import);
+  if (!stamps.ok()) return stamps.status();
+  const StatusOr<std::map<image_t, Rigid3d>> poses =
+      ReadTrajectoryPoses(paths, *scene, *stamps, options.trajectory.max_gap_s);
+  if (!poses.ok()) return poses.status();
+  import.tables.priors =
+      ComputeTrajectoryPriors(*stamps, *poses, options.trajectory);
+  SensorSummary& summary = import.summary;
+  summary.num_images = stamps->size();
+  summary.num_images_in_logs = poses->size();
+  summary.num_priors = import.tables.priors.size();
+  summary.prior_ratio = static_cast<double>(summary.num_priors) /
+                        std::max<size_t>(1, stamps->size() - 1);
+  for (const RelativePosePrior& prior : import.tables.priors) {
+    summary.distance_m += prior.cam2_from_cam1.translation.norm();
+  }
+  import.seconds =
+      std::chrono::duration<double>(std::chrono::steady_clock::now() - start)
+          .count();
+  return import;
+}
+
 }  // namespace
 
 bool PriorImportOptions::IsValid(std::string* error) const {
@@ -226,21 +335,31 @@ bool PriorImportOptions::IsValid(std::string* error) const {
              std::to_string(max_visual_gap) + "; it must be positive";
     return false;
   }
-  return estimation.IsValid(error);
+  return estimation.IsValid(error) && trajectory.IsValid(error);
 }
 
-StatusOr<PriorImport> ComputePriorImport(const PriorImportPaths& paths,
+StatusOr<PriorImport> ComputePriorImport(const PriorImportPaths& given_paths,
                                          const PriorImportOptions& options) {
-  if (paths.imu_path.empty() && paths.wheel_path.empty()) {
-    return Status::Error(
-        "no sensor log; give --imu_path, --wheel_path or both");
-  }
+  PriorImportPaths paths = given_paths;
   Status status = CheckDatabase(paths.database_path);
   if (!status.ok()) return status;
+  if (!paths.trajectory_path.empty()) return ImportTrajectory(paths, options);
+  if (paths.imu_path.empty() && paths.wheel_path.empty() &&
+      paths.bag_path.empty()) {
+    return Status::Error(
+        "no sensor log; give --imu_path, --wheel_path or both, --bag_path or "
+        "--trajectory_path");
+  }
+  if (paths.sensors_path.empty()) {
+    return Status::Error(
+        "sensor logs need the calibration of the sensors; give --sensors_path");
+  }
   const StatusOr<SensorCalibration> calibration =
       ReadSensorCalibration(paths.sensors_path);
   if (!calibration.ok()) return calibration.status();
   const auto start = std::chrono::steady_clock::now();
+  if (!paths.bag_path.empty()) status = UseBag(*calibration, &paths);
+  if (!status.ok()) return status;
   PriorImport import;
   SensorLogs logs;
   status = ReadSensorLogs(paths, *calibration, &logs, &import);

@@ -8,6 +8,8 @@
 #include "core/status.h"
 #include "sensors/estimate_priors.h"
 #include "sensors/log_cleaning/log_fault.h"
+#include "sensors/io/bag_topics.h"
+#include "sensors/trajectory_priors.h"
 
 namespace adasfm {
 
@@ -18,10 +20,17 @@ struct PriorImportPaths {
   std::string imu_path;
   std::string wheel_path;
   std::string sensors_path;
+  // A bag with the logs that have no path of their own.
+  std::string bag_path;
+  BagTopicNames bag_topics;
+  // A metric trajectory in place of logs: TUM (world_from_body; the body is the
+  // IMU of the calibration or, without one, the camera) or a COLMAP model.
+  std::string trajectory_path;
 };
 
 struct PriorImportOptions {
   PriorEstimationOptions estimation;
+  TrajectoryPriorOptions trajectory;
   // Two-view rotations are taken from images at most this many apart in time:
   // rotations grow with the gap, but so does the chance of a wrong pair.
   int max_visual_gap = 3;

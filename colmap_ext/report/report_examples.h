@@ -4,9 +4,9 @@
 #include <string>
 #include <vector>
 
-#include "colmap_ext/io/sqlite.h"
 #include "colmap_ext/report/report_pairs.h"
 #include "colmap_ext/report/report_scene.h"
+#include "core/sqlite.h"
 
 namespace adasfm {
 

@@ -6,8 +6,8 @@
 #include <utility>
 #include <vector>
 
-#include "colmap_ext/io/sqlite.h"
 #include "colmap_ext/report/report_scene.h"
+#include "core/sqlite.h"
 
 namespace adasfm {
 

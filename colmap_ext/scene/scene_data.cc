@@ -7,7 +7,7 @@
 #include "colmap_ext/database/prior_tables.h"
 #include "colmap_ext/database/two_view_geometry_backup.h"
 #include "colmap_ext/host/database.h"
-#include "colmap_ext/io/sqlite.h"
+#include "core/sqlite.h"
 
 namespace adasfm {
 namespace {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "colmap_ext/workspace/automatic_reconstruction.h"
 
+#include <filesystem>
 #include <sstream>
 #include <stdexcept>
 
@@ -13,12 +14,59 @@
 #include "colmap_ext/workspace/open_workspace.h"
 #include "colmap_ext/workspace/prepare_reconstruction.h"
 #include "colmap_ext/workspace/reset_workspace.h"
+#include "sensors/io/calibration.h"
 
 namespace adasfm {
 namespace {
 
 // Steps whose files are replaced have nothing to remove beforehand.
 Status KeepAll() { return Status::Ok(); }
+
+// What the files of a bag depend on. A bag of gigabytes is told by its size.
+StatusOr<StepInputs> DigestBag(const std::string& path,
+                               const BagExtractionOptions& options) {
+  namespace fs = std::filesystem;
+  const fs::path bag(path);
+  std::error_code error;
+  std::vector<std::string> names = {bag.filename().string()};
+  std::string folder = bag.parent_path().string();
+  if (fs::is_directory(bag, error)) {
+    const StatusOr<std::vector<std::string>> files = ListFilesRecursively(path);
+    if (!files.ok()) return files.status();
+    names = *files;
+    folder = path;
+  }
+  return StepInputs{
+      {"bag", DigestFiles(folder, names)},
+      {"image_topic", options.topics.image},
+      {"imu_topic", options.topics.imu},
+      {"wheel_topic", options.topics.wheel},
+      {"image_step", std::to_string(options.photos.image_step)},
+      {"image_distance_m", std::to_string(options.photos.image_distance_m)},
+      {"has_calibration", std::to_string(options.has_calibration)},
+      {"wheel_type", options.wheel_type.has_value()
+                         ? std::to_string(static_cast<int>(*options.wheel_type))
+                         : "by message"}};
+}
+
+// What the user gives wins.
+void UseBagFiles(const BagFiles& files, AutomaticReconstructionOptions* options,
+                 AutomaticReconstructionPaths* paths) {
+  const auto fill = [](const std::string& value, std::string* path) {
+    if (path->empty()) *path = value;
+  };
+  fill(files.image_path, &paths->image_path);
+  fill(files.image_times_path, &paths->image_times_path);
+  fill(files.imu_path, &paths->imu_path);
+  fill(files.wheel_path, &paths->wheel_path);
+  fill(files.sensors_path, &paths->sensors_path);
+  FeatureOptions& features = options->features;
+  // One topic is one camera.
+  if (features.single_camera == -1) features.single_camera = 1;
+  if (!features.camera_params.empty() || files.camera.params.empty()) return;
+  features.camera_model = files.camera.model;
+  features.camera_params = files.camera.params;
+}
 
 class Reconstructor {
  public:
@@ -50,9 +98,9 @@ class Reconstructor {
     double begin;
     double end;
   };
-  static constexpr Range kFeatures{0.0, 0.2}, kMatching{0.2, 0.75},
-      kPriors{0.75, 0.77}, kCoarse{0.77, 0.85}, kModel{0.85, 0.99},
-      kReport{0.99, 1.0};
+  static constexpr Range kBag{0.0, 0.0}, kFeatures{0.0, 0.2},
+      kMatching{0.2, 0.75}, kPriors{0.75, 0.77}, kCoarse{0.77, 0.85},
+      kModel{0.85, 0.99}, kReport{0.99, 1.0};
 
   std::string InWorkspace(const std::string& name) const {
     return paths_.workspace_path + "/" + name;
@@ -82,6 +130,7 @@ class Reconstructor {
   }
 
   Status Prepare();
+  Status Bag();
   Status Features();
   Status ExtractAll(const std::vector<std::string>& names);
   Status Matching();
@@ -102,8 +151,16 @@ class Reconstructor {
 Status Reconstructor::Prepare() {
   std::string error;
   if (!options_.IsValid(&error)) throw std::invalid_argument(error);
+  if (paths_.bag_path.empty() == paths_.image_path.empty()) {
+    return Status::Error(
+        "give the photos as either --image_path or --bag_path");
+  }
   Status status = PrepareOutputFolder(InWorkspace("logs"));
-  if (status.ok()) status = PrepareReconstruction(&options_, &paths_);
+  // A bag's photos and logs are input as any others once they are files.
+  const bool has_bag = !paths_.bag_path.empty();
+  if (status.ok() && !has_bag) {
+    status = PrepareReconstruction(&options_, &paths_);
+  }
   if (!status.ok()) return status;
   database_path_ = InWorkspace("database.db");
   result_.model_path = InWorkspace("sparse/0");
@@ -112,7 +169,35 @@ Status Reconstructor::Prepare() {
       OpenWorkspace(paths_.workspace_path, options_.restart, message_);
   if (!journal.ok()) return journal.status();
   journal_ = std::move(journal).value();
-  return Status::Ok();
+  if (!has_bag) return Status::Ok();
+  status = Bag();
+  return status.ok() ? PrepareReconstruction(&options_, &paths_) : status;
+}
+
+Status Reconstructor::Bag() {
+  BagExtractionOptions& bag = options_.bag;
+  bag.has_calibration = !paths_.sensors_path.empty();
+  if (bag.has_calibration) {
+    const StatusOr<SensorCalibration> calibration =
+        ReadSensorCalibration(paths_.sensors_path);
+    if (!calibration.ok()) return calibration.status();
+    if (calibration->has_wheel) bag.wheel_type = calibration->wheel_type;
+  }
+  StatusOr<StepInputs> inputs = DigestBag(paths_.bag_path, bag);
+  if (!inputs.ok()) return inputs.status();
+  const std::string folder = BagFolder(paths_.workspace_path);
+  const Status status = RunStep(
+      kBagStep, *inputs, [&folder] { return RemoveBagFiles(folder); },
+      [&] {
+        const StatusOr<BagExtraction> extraction =
+            ExtractBag(paths_.bag_path, bag, folder, ProgressIn(kBag, "bag"));
+        if (!extraction.ok()) return extraction.status();
+        Warn(extraction->warnings);
+        message_(extraction->summary);
+        return Status::Ok();
+      });
+  if (status.ok()) UseBagFiles(FindBagFiles(folder), &options_, &paths_);
+  return status;
 }
 
 Status Reconstructor::ExtractAll(const std::vector<std::string>& names) {
@@ -147,8 +232,9 @@ Status Reconstructor::ExtractAll(const std::vector<std::string>& names) {
 }
 
 Status Reconstructor::Features() {
-  const StatusOr<std::vector<std::string>> names =
-      ListFilesRecursively(paths_.image_path, paths_.workspace_path);
+  // The workspace may lie among the photos, or the photos of a bag in it.
+  const StatusOr<std::vector<std::string>> names = ListFilesRecursively(
+      paths_.image_path, paths_.bag_path.empty() ? paths_.workspace_path : "");
   if (!names.ok()) return names.status();
   if (names->empty()) {
     return Status::Error("the folder " + paths_.image_path +
@@ -213,9 +299,12 @@ Status Reconstructor::Priors() {
       return Status::Ok();
     }
     ProgressIn(kPriors, "priors")("reading the logs", 0.0);
-    const PriorImportPaths paths = {database_path_, paths_.image_times_path,
-                                    paths_.imu_path, paths_.wheel_path,
-                                    paths_.sensors_path};
+    PriorImportPaths paths;
+    paths.database_path = database_path_;
+    paths.image_times_path = paths_.image_times_path;
+    paths.imu_path = paths_.imu_path;
+    paths.wheel_path = paths_.wheel_path;
+    paths.sensors_path = paths_.sensors_path;
     const StatusOr<PriorImport> import =
         ImportPriors(options_.priors, paths, database_path_ + ".priors.json");
     if (!import.ok()) return import.status();
@@ -280,8 +369,9 @@ bool AutomaticReconstructionOptions::IsValid(std::string* error) const {
              " must be -1, 0 or 1";
     return false;
   }
-  return features.IsValid(error) && pairs.IsValid(error) &&
-         priors.IsValid(error) && global.IsValid(error) && map.IsValid(error);
+  return bag.photos.IsValid(error) && features.IsValid(error) &&
+         pairs.IsValid(error) && priors.IsValid(error) &&
+         global.IsValid(error) && map.IsValid(error);
 }
 
 StatusOr<AutomaticReconstructionResult> ReconstructAutomatically(

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "colmap_ext/adasfm_pipeline.h"
+#include "colmap_ext/bags/extract_bag.h"
 #include "colmap_ext/host/features.h"
 #include "colmap_ext/io/step_journal.h"
 #include "colmap_ext/pairs/select_pairs.h"
@@ -14,6 +15,9 @@
 namespace adasfm {
 
 struct AutomaticReconstructionOptions {
+  // Of what is taken out of a bag; the calibration's part follows from the
+  // paths.
+  BagExtractionOptions bag;
   FeatureOptions features;
   PairSelectionOptions pairs;
   PriorImportOptions priors;
@@ -33,6 +37,9 @@ struct AutomaticReconstructionOptions {
 
 // Empty paths: there is no such file.
 struct AutomaticReconstructionPaths {
+  // A recording that gives everything that is not given here, in place of
+  // image_path (sensors/bags/bag_reader.h).
+  std::string bag_path;
   std::string image_path;
   std::string workspace_path;
   // euroc, 4seasons, kitti or tum: image_path is the root folder of such a
@@ -57,6 +64,7 @@ struct AutomaticReconstructionResult {
 
 // From a folder of photos, and sensor logs where there are any, to the model
 // and its report, in the workspace:
+//   0  bag        photos, logs, calibration of a bag   bag/
 //   1  features   cameras, keypoints, descriptors      database.db
 //   2  matching   pair selection, matches, geometries  database.db
 //   3  priors     sensor logs                          database.db

@@ -4,7 +4,7 @@
 #include <filesystem>
 #include <vector>
 
-#include "colmap_ext/io/sqlite.h"
+#include "core/sqlite.h"
 
 namespace adasfm {
 namespace {

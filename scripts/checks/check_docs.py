@@ -211,9 +211,9 @@ class Checker:
                 for suffix, unit in UNITS.items():
                     if option.name.endswith('_' + suffix) and not re.search(
                             unit, option.help):
-                        # _m_s is no _s.
-                        if suffix == 's' and option.name.endswith(
-                                ('_m_s', '_rad_s')):
+                        # _m_s is no _s, and _per_m is what stands before it.
+                        if option.name.endswith(
+                                ('_m_s', '_rad_s', '_per_m')):
                             continue
                         fail(where, 'has no unit in its help: ' + option.help)
 

@@ -5,8 +5,8 @@
 
 #include "sensors/io/log_checks.h"
 #include "sensors/io/log_file.h"
+#include "sensors/io/read_bag.h"
 #include "sensors/io/read_kitti_oxts.h"
-#include "sensors/io/read_rosbag.h"
 
 namespace adasfm {
 
@@ -18,8 +18,8 @@ StatusOr<std::vector<ImuSample>> ReadImuSamples(
   std::vector<ImuSample> samples;
   std::vector<timestamp_t> times;
   std::error_code error;
-  if (IsRosbagPath(path)) {
-    StatusOr<std::vector<ImuSample>> bag = ReadRosbagImu(path);
+  if (IsBagPath(path)) {
+    StatusOr<std::vector<ImuSample>> bag = ReadBagImu(path, warnings);
     if (!bag.ok()) return bag.status();
     samples = std::move(*bag);
     origin = LogOrigin::Numbered(path, samples.size(), "message");

@@ -12,7 +12,7 @@ namespace adasfm {
 
 // Reads an IMU log: EuRoC CSV (commas), 4Seasons imu.txt (spaces), both
 // "ns wx wy wz ax ay az"; a KITTI raw oxts folder (timestamps.txt and
-// data/); or a ROS 1 bag (sensors/io/read_rosbag.h). Times that go back,
+// data/); or a ROS bag (sensors/io/read_bag.h). Times that go back,
 // duplicates, NaN, a wrong number of columns, degrees for radians, g for m/s^2
 // and |a| at rest off by more than 5 % are errors that name file, line, cause
 // and remedy. Gaps of more than three periods are added to warnings (may be

@@ -3,10 +3,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "sensors/io/log_checks.h"
 #include "sensors/io/log_file.h"
-#include "sensors/io/read_rosbag.h"
+#include "sensors/io/read_bag.h"
 
 namespace adasfm {
 namespace {
@@ -137,19 +138,44 @@ Status CheckWheelUnits(const std::vector<WheelSample>& samples, WheelType type,
 }
 
 StatusOr<WheelType> ReadWheelType(const std::string& path) {
-  if (IsRosbagPath(path)) return WheelType::kOdometry;
   const StatusOr<LogFile> file = LogFile::Read(path);
   if (!file.ok()) return file.status();
   return FindType(*file);
 }
 
+namespace {
+
+// Units are left to who takes the origin along (CheckWheelUnits).
+Status CheckSamples(const std::vector<WheelSample>& samples, WheelType type,
+                    LogOrigin origin, std::vector<std::string>* warnings,
+                    LogOrigin* origin_out) {
+  std::vector<timestamp_t> times;
+  for (const WheelSample& sample : samples) {
+    times.push_back(sample.timestamp_ns);
+  }
+  Status status = CheckLogTimes(times, origin, warnings);
+  if (status.ok() && origin_out == nullptr) {
+    status = CheckWheelUnits(samples, type, origin);
+  }
+  if (status.ok() && origin_out != nullptr) *origin_out = std::move(origin);
+  return status;
+}
+
+}  // namespace
+
 StatusOr<std::vector<WheelSample>> ReadWheel(const std::string& path,
                                              WheelType expected_type,
                                              std::vector<std::string>* warnings,
                                              LogOrigin* origin_out) {
-  if (IsRosbagPath(path)) {
-    return Status::Error(path + ": a ROS bag holds nav_msgs/Odometry; set " +
-                         "wheel0/type to odometry in the calibration");
+  if (IsBagPath(path)) {
+    StatusOr<std::vector<WheelSample>> bag =
+        ReadBagWheel(path, expected_type, warnings);
+    if (!bag.ok()) return bag;
+    const Status status = CheckSamples(
+        *bag, expected_type, LogOrigin::Numbered(path, bag->size(), "message"),
+        warnings, origin_out);
+    if (!status.ok()) return status;
+    return bag;
   }
   const StatusOr<LogFile> file = LogFile::Read(path);
   if (!file.ok()) return file.status();
@@ -165,7 +191,6 @@ StatusOr<std::vector<WheelSample>> ReadWheel(const std::string& path,
   LogOrigin origin;
   origin.path = path;
   std::vector<WheelSample> samples;
-  std::vector<timestamp_t> times;
   for (size_t i = 0; i < file->num_lines(); ++i) {
     const LogLine line = file->Line(i);
     Status status =
@@ -184,22 +209,18 @@ StatusOr<std::vector<WheelSample>> ReadWheel(const std::string& path,
     sample.first = values[0];
     sample.second = values[1];
     samples.push_back(sample);
-    times.push_back(sample.timestamp_ns);
     origin.line_numbers.push_back(line.number);
   }
-  Status status = CheckLogTimes(times, origin, warnings);
-  if (status.ok() && origin_out == nullptr) {
-    status = CheckWheelUnits(samples, *type, origin);
-  }
+  const Status status =
+      CheckSamples(samples, *type, std::move(origin), warnings, origin_out);
   if (!status.ok()) return status;
-  if (origin_out != nullptr) *origin_out = std::move(origin);
   return samples;
 }
 
 StatusOr<std::vector<OdometryPose>> ReadOdometry(
     const std::string& path, std::vector<std::string>* warnings) {
-  if (IsRosbagPath(path)) {
-    StatusOr<std::vector<OdometryPose>> bag = ReadRosbagOdometry(path);
+  if (IsBagPath(path)) {
+    StatusOr<std::vector<OdometryPose>> bag = ReadBagOdometry(path, warnings);
     if (!bag.ok()) return bag.status();
     const LogOrigin origin = LogOrigin::Numbered(path, bag->size(), "message");
     return CheckPoseTimes(std::move(*bag), origin, warnings);

@@ -27,8 +27,8 @@ Status CheckWheelUnits(const std::vector<WheelSample>& samples, WheelType type,
                        const LogOrigin& origin);
 
 // Reads a trajectory of lines "t tx ty tz qx qy qz qw", t in seconds (TUM) or
-// nanoseconds (4Seasons' result.txt), or a ROS 1 bag
-// (sensors/io/read_rosbag.h).
+// nanoseconds (4Seasons' result.txt), or a ROS bag
+// (sensors/io/read_bag.h).
 StatusOr<std::vector<OdometryPose>> ReadOdometry(
     const std::string& path, std::vector<std::string>* warnings = nullptr);
 

@@ -7,7 +7,7 @@
 #include "colmap_ext/host/database.h"
 #include "colmap_ext/host/model.h"
 #include "colmap_ext/io/double_blob.h"
-#include "colmap_ext/io/sqlite.h"
+#include "core/sqlite.h"
 #include "tests/testing/colmap_ext/command_line_fixture.h"
 
 namespace adasfm {

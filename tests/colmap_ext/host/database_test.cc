@@ -4,8 +4,8 @@
 #include <gtest/gtest.h>
 
 #include "colmap_ext/datasets/write_synthetic_world.h"
-#include "colmap_ext/io/sqlite.h"
 #include "colmap_ext/scene/scene_data.h"
+#include "core/sqlite.h"
 #include "tests/testing/colmap_ext/temporary_folder.h"
 
 namespace adasfm {

@@ -1,61 +1,49 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include <algorithm>
-#include <cmath>
-#include <cstring>
+#include <utility>
 
 #include "memory_file.h"
-#include "sensors/io/ros_messages.h"
+#include "sensors/bags/ros_messages.h"
 
+namespace adasfm {
 namespace {
 
-// The next bytes of the input as a value; zero beyond its end.
-class Bytes {
- public:
-  Bytes(const uint8_t* data, size_t size) : data_(data), size_(size) {}
+// What a message points to must be there.
+void Touch(const ByteSpan& bytes) {
+  uint64_t sum = 0;
+  for (size_t i = 0; i < bytes.size; ++i) sum += bytes.data[i];
+  volatile uint64_t sink = sum;
+  (void)sink;
+}
 
-  template <typename T>
-  Bytes& operator>>(T& value) {
-    const size_t count = std::min(sizeof(T), size_);
-    value = T();
-    if (count > 0) std::memcpy(&value, data_, count);
-    data_ += count;
-    size_ -= count;
-    return *this;
+template <typename Message>
+void Parse(RosEncoding encoding, const ByteSpan& bytes) {
+  Message message;
+  if (!ParseRosMessage(encoding, bytes, &message)) return;
+  if constexpr (std::is_same_v<Message, RosImage>) Touch(message.pixels);
+  if constexpr (std::is_same_v<Message, RosCompressedImage>) {
+    Touch(message.file);
   }
+}
 
- private:
-  const uint8_t* data_;
-  size_t size_;
-};
+template <typename... Messages>
+void ParseAll(RosEncoding encoding, const ByteSpan& bytes) {
+  (Parse<Messages>(encoding, bytes), ...);
+}
 
 }  // namespace
+}  // namespace adasfm
 
-// The bytes are the fields of a message as ROS hands it over: what stands
-// before that, its deserialisation, is not this project's.
+// Any bytes as a message of every type, in both serialisations: what the .db3
+// and MCAP readers hand over.
 extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   using namespace adasfm;
-  sensor_msgs::Imu imu;
-  auto& rate = imu.angular_velocity;
-  auto& force = imu.linear_acceleration;
-  Bytes(data, size) >> imu.header.stamp.sec >> imu.header.stamp.nsec >>
-      rate.x >> rate.y >> rate.z >> force.x >> force.y >> force.z;
-  ImuSample sample;
-  if (ConvertRosMessage(imu, &sample).empty()) {
-    Require(sample.timestamp_ns > 0);
-    Require(sample.angular_velocity.allFinite());
-    Require(sample.specific_force.allFinite());
-  }
-  nav_msgs::Odometry odometry;
-  auto& position = odometry.pose.pose.position;
-  auto& q = odometry.pose.pose.orientation;
-  Bytes(data, size) >> odometry.header.stamp.sec >>
-      odometry.header.stamp.nsec >> position.x >> position.y >> position.z >>
-      q.x >> q.y >> q.z >> q.w;
-  OdometryPose pose;
-  if (ConvertRosMessage(odometry, &pose).empty()) {
-    Require(pose.timestamp_ns > 0);
-    Require(pose.world_from_body.translation.allFinite());
-    Require(std::abs(pose.world_from_body.rotation.norm() - 1.0) < 1e-9);
+  const ByteSpan bytes{data, size};
+  for (const RosEncoding encoding : {RosEncoding::kCdr, RosEncoding::kRos1}) {
+    ParseAll<RosImu, RosImage, RosCompressedImage, RosCameraInfo, RosNavSatFix,
+             RosJointState, RosTwist, RosOdometry, std::vector<RosTransform>>(
+        encoding, bytes);
+    RosHeader header;
+    ParseRosHeader(encoding, bytes, &header);
   }
   return 0;
 }

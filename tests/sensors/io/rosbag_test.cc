@@ -4,8 +4,8 @@
 #include <filesystem>
 #include <fstream>
 
+#include "sensors/bags/ros1_bag.h"
 #include "sensors/io/read_imu.h"
-#include "sensors/io/read_rosbag.h"
 #include "sensors/io/read_wheel.h"
 
 #ifdef ADASFM_HAS_ROSBAG
@@ -38,17 +38,9 @@ class Rosbag : public testing::Test {
       testing::UnitTest::GetInstance()->current_test_info()->name() + ".bag";
 };
 
-TEST_F(Rosbag, PathsAreToldByTheirName) {
-  EXPECT_TRUE(IsRosbagPath("drive.bag"));
-  EXPECT_TRUE(IsRosbagPath("a/drive.bag:/imu/data"));
-  EXPECT_FALSE(IsRosbagPath("imu.csv"));
-  EXPECT_FALSE(IsRosbagPath(".bag"));
-  EXPECT_EQ(*ReadWheelType("drive.bag"), WheelType::kOdometry);
-}
-
 TEST_F(Rosbag, MissingFilesAndOtherWheelTypesAreErrors) {
   ExpectImuError(path_, "no such file");
-  const auto wheel = ReadWheel(path_, WheelType::kSpeed);
+  const auto wheel = ReadWheel(path_, WheelType::kDifferential);
   ASSERT_FALSE(wheel.ok());
   EXPECT_NE(wheel.status().message().find("odometry"), std::string::npos);
 }
@@ -125,7 +117,7 @@ TEST_F(Rosbag, TopicsMustBeClear) {
     rosbag::Bag bag(path_, rosbag::bagmode::Append);
     Write(&bag, "/imu/raw", ImuMessage(0));
   }
-  ExpectImuError(path_, path_ + ":/imu/data");
+  ExpectImuError(path_, "--imu_topic /imu/data");
   EXPECT_TRUE(ReadImu(path_ + ":/imu/data").ok());
 }
 
@@ -171,7 +163,7 @@ TEST_F(Rosbag, OtherFilesAndCutBagsAreErrors) {
 #else
 
 TEST_F(Rosbag, WithoutTheLibraryTheErrorSaysSo) {
-  EXPECT_FALSE(CanReadRosbags());
+  EXPECT_FALSE(CanReadRos1Bags());
   std::ofstream(path_) << "#ROSBAG V2.0\n";
   ExpectImuError(path_, "librosbag-storage-dev");
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "colmap_ext/io/sqlite.h"
+#include "core/sqlite.h"
 
 #include <sqlite3.h>
 

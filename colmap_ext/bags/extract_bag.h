@@ -1,0 +1,58 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "colmap_ext/bags/camera_from_info.h"
+#include "colmap_ext/bags/select_photos.h"
+#include "core/progress.h"
+#include "core/sensor_log.h"
+#include "core/status.h"
+#include "sensors/io/bag_topics.h"
+
+namespace adasfm {
+
+struct BagExtractionOptions {
+  BagTopicNames topics;
+  PhotoSelectionOptions photos;
+  // Whether the user has a calibration, and the type of its wheels if it has
+  // any: then the bag's mounting is not needed.
+  bool has_calibration = false;
+  std::optional<WheelType> wheel_type;
+};
+
+// What an extraction left in its folder; empty where the bag does not have it.
+struct BagFiles {
+  std::string image_path;        // folder images/, "<stamp in ns>.png" or .jpg
+  std::string image_times_path;  // image_times.csv
+  std::string imu_path;          // imu.csv
+  std::string wheel_path;        // wheel.csv
+  std::string sensors_path;      // sensors.yaml: mounting from /tf_static
+  CameraText camera;             // camera.txt: from CameraInfo
+};
+
+struct BagExtraction {
+  std::string summary;  // one line
+  std::vector<std::string> warnings;
+};
+
+// Writes a bag's photos, their times, logs and calibration as files
+// (docs/reference/formats.md) into the folder: one pass for the logs, one for
+// the photos. Photos that are there already are not written again, so that an
+// interrupted extraction continues. What the bag lacks is named in one warning;
+// a mounting that sensor logs need, and that neither the bag nor the user
+// gives, is an error.
+StatusOr<BagExtraction> ExtractBag(const std::string& bag_path,
+                                   const BagExtractionOptions& options,
+                                   const std::string& folder,
+                                   const ProgressCallback& progress);
+
+// The files of a finished extraction.
+BagFiles FindBagFiles(const std::string& folder);
+
+// Removes what extractions write, and nothing else.
+Status RemoveBagFiles(const std::string& folder);
+
+}  // namespace adasfm

@@ -1,0 +1,114 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "colmap_ext/bags/select_photos.h"
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include "core/so3.h"
+
+namespace adasfm {
+namespace {
+
+// Photos further apart in direction than this share too little.
+constexpr double kMaxTurnRad = DegToRad(10.0);
+// Speeds are not carried on over a longer gap of their log.
+constexpr double kMaxStepS = 1.0;
+
+// How far the machine has driven and turned until a time.
+struct Way {
+  timestamp_t timestamp_ns = 0;
+  double distance_m = 0.0;
+  double turn_rad = 0.0;
+};
+
+std::vector<Way> WayOfPoses(const std::vector<OdometryPose>& poses) {
+  std::vector<Way> ways;
+  Way way;
+  for (size_t i = 0; i < poses.size(); ++i) {
+    if (i > 0) {
+      const Rigid3d step =
+          poses[i - 1].world_from_body.Inverse() * poses[i].world_from_body;
+      way.distance_m += step.translation.norm();
+      way.turn_rad += LogSo3(step.rotation).norm();
+    }
+    way.timestamp_ns = poses[i].timestamp_ns;
+    ways.push_back(way);
+  }
+  return ways;
+}
+
+std::vector<Way> WayOfSpeeds(const std::vector<WheelSample>& samples) {
+  std::vector<Way> ways;
+  Way way;
+  for (size_t i = 0; i < samples.size(); ++i) {
+    if (i > 0) {
+      const double step_s = std::min(
+          kMaxStepS,
+          SecondsFromNs(samples[i].timestamp_ns - samples[i - 1].timestamp_ns));
+      way.distance_m += std::abs(samples[i].first) * step_s;
+      way.turn_rad += std::abs(samples[i].second) * step_s;
+    }
+    way.timestamp_ns = samples[i].timestamp_ns;
+    ways.push_back(way);
+  }
+  return ways;
+}
+
+// Empty when the log has no metres.
+std::vector<Way> FindWay(const BagLogs& logs) {
+  if (!logs.odometry.empty()) return WayOfPoses(logs.odometry);
+  if (logs.wheel_type == WheelType::kTicks) return {};
+  return WayOfSpeeds(logs.wheel);
+}
+
+// The last known way before or at a time; the first one before that.
+const Way& WayAt(const std::vector<Way>& ways, timestamp_t time_ns) {
+  const auto after = std::upper_bound(
+      ways.begin(), ways.end(), time_ns,
+      [](timestamp_t time, const Way& way) { return time < way.timestamp_ns; });
+  return after == ways.begin() ? ways.front() : *(after - 1);
+}
+
+}  // namespace
+
+bool PhotoSelectionOptions::IsValid(std::string* error) const {
+  if (image_step < 1) {
+    *error = "image_step = " + std::to_string(image_step) + " must be positive";
+    return false;
+  }
+  if (!(image_distance_m >= 0.0) || !std::isfinite(image_distance_m)) {
+    *error = "image_distance_m = " + std::to_string(image_distance_m) +
+             " must not be negative";
+    return false;
+  }
+  return true;
+}
+
+StatusOr<std::set<timestamp_t>> SelectPhotos(
+    const BagLogs& logs, const PhotoSelectionOptions& options) {
+  std::set<timestamp_t> selected;
+  const std::vector<Way> ways = FindWay(logs);
+  if (options.image_distance_m > 0.0 && ways.empty()) {
+    return Status::Error(
+        "--image_distance_m needs a topic of odometry or twists in the bag; "
+        "use --image_step");
+  }
+  const Way* last = nullptr;
+  for (size_t i = 0; i < logs.image_times_ns.size(); i += options.image_step) {
+    const timestamp_t time_ns = logs.image_times_ns[i];
+    if (options.image_distance_m > 0.0) {
+      const Way& way = WayAt(ways, time_ns);
+      const bool is_near =
+          last != nullptr &&
+          way.distance_m - last->distance_m < options.image_distance_m &&
+          way.turn_rad - last->turn_rad < kMaxTurnRad;
+      if (is_near) continue;
+      last = &way;
+    }
+    selected.insert(time_ns);
+  }
+  return selected;
+}
+
+}  // namespace adasfm
