@@ -11,6 +11,7 @@
 #include <thread>
 #include <utility>
 
+#include "colmap_ext/host/database_schema.h"
 #include "colmap_ext/io/capture_output.h"
 #include "core/parallel.h"
 
@@ -78,6 +79,8 @@ Status ExtractFeatures(const FeatureOptions& options,
                        const std::string& database_path,
                        const std::string& log_path,
                        const ProgressCallback& progress) {
+  const Status opens = CheckLibraryOpens(database_path);
+  if (!opens.ok()) return opens;
   int num_done = 0;
   colmap::ImageReaderOptions reader;
   reader.database_path = database_path;
@@ -108,6 +111,8 @@ Status MatchPairs(const FeatureOptions& options,
                   const std::vector<ImagePair>& pairs,
                   const std::string& database_path, const std::string& log_path,
                   const ProgressCallback& progress) {
+  const Status opens = CheckLibraryOpens(database_path);
+  if (!opens.ok()) return opens;
   colmap::SiftMatchingOptions sift;
   sift.num_threads = options.num_threads;
   sift.use_gpu = UsesGpu(options);
