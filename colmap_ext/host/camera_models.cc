@@ -26,6 +26,10 @@ const std::map<int, std::string>& NewerModels() {
 
 }  // namespace
 
+bool IsNewerCameraModel(int model_id) {
+  return NewerModels().count(model_id) > 0;
+}
+
 std::string CameraModelName(int model_id) {
   if (colmap::ExistsCameraModelWithId(model_id)) {
     return colmap::CameraModelIdToName(model_id);
@@ -55,7 +59,7 @@ Status CheckCameraModels(const std::string& path, SqliteConnection* database) {
   statement.BindInt(2, kFisheye);
   while (statement.Step()) {
     const int model_id = statement.Int(1);
-    if (NewerModels().count(model_id) == 0) continue;
+    if (!IsNewerCameraModel(model_id)) continue;
     return Status::Error(path + ": camera " + std::to_string(statement.Int(0)) +
                          " has the model " + CameraModelName(model_id) +
                          ", which this program does not have; extract the "

@@ -11,6 +11,8 @@ namespace adasfm {
 
 // Camera models that newer COLMAPs have and the linked library has not.
 
+bool IsNewerCameraModel(int model_id);
+
 // COLMAP's name of any model up to version 4.2, as "PINHOLE"; "number N" for
 // another.
 std::string CameraModelName(int model_id);
