@@ -310,7 +310,8 @@ TEST_F(SelectPairsTest, LearnedDescriptorsOfTheDatabaseAreFloats) {
   };
   expect_error("UPDATE descriptors SET type = 2 WHERE image_id > 10",
                "another type");
-  expect_error("UPDATE descriptors SET type = 7", "--descriptors_path");
+  expect_error("UPDATE descriptors SET type = 7",
+               "--AdaSfMPairs.descriptors_path");
 }
 
 TEST_F(SelectPairsTest, WrongInputIsOneLine) {
