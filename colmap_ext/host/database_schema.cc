@@ -68,8 +68,8 @@ Status CheckLibraryOpens(const std::string& database_path) {
         database_path + " was written by a newer COLMAP (it has the table " +
         tables.front() +
         "), and this program extracts and matches with COLMAP 3.8's library, "
-        "which would damage it; extract and match with the COLMAP that made "
-        "it, then run adasfm_global and adasfm_mapper");
+        "which would damage it; set ADASFM_HOST_COLMAP to the COLMAP that "
+        "made it");
   } catch (const SqliteError& sqlite_error) {
     return Status::Error(database_path + ": " + sqlite_error.what());
   }

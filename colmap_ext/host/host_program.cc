@@ -1,13 +1,18 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "colmap_ext/host/host_program.h"
 
+#include <fcntl.h>
+#include <signal.h>
+#include <sys/wait.h>
 #include <unistd.h>
 #include <util/version.h>
 
+#include <chrono>
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>
 #include <sstream>
+#include <thread>
 
 #include "colmap_ext/host/database_schema.h"
 
@@ -17,6 +22,8 @@ namespace {
 namespace fs = std::filesystem;
 
 using Version = std::pair<int, int>;
+
+constexpr std::chrono::milliseconds kPollInterval(100);
 
 std::string FindOnPath() {
   const char* path = std::getenv("PATH");
@@ -70,22 +77,72 @@ std::string FindHostProgram() {
   return found.empty() ? ADASFM_HOST_COLMAP : found;
 }
 
-std::string ReadHostVersion(const std::string& path) {
+std::string ReadHostHelp(const std::string& path,
+                         const std::string& arguments) {
   if (!IsProgram(path) || IsThisProgram(path)) return "";
-  FILE* pipe = popen((Quote(path) + " help 2> /dev/null").c_str(), "r");
+  FILE* pipe = popen((Quote(path) + " " + arguments + " 2>&1").c_str(), "r");
   if (pipe == nullptr) return "";
-  char line[256] = "";
-  const bool has_line = std::fgets(line, sizeof(line), pipe) != nullptr;
-  // The rest is read, as the host would end with an error otherwise.
-  char rest[4096];
-  while (std::fread(rest, 1, sizeof(rest), pipe) > 0) {
+  std::string text;
+  char block[4096];
+  for (size_t size; (size = std::fread(block, 1, sizeof(block), pipe)) > 0;) {
+    text.append(block, size);
   }
   pclose(pipe);
+  return text;
+}
+
+std::string ReadHostVersion(const std::string& path) {
+  std::istringstream lines(ReadHostHelp(path, "help"));
   std::string name, version;
-  std::istringstream words(has_line ? line : "");
-  words >> name >> version;
+  lines >> name >> version;
   return name == "COLMAP" && ParseColmapVersion(version).has_value() ? version
                                                                      : "";
+}
+
+Status RunHost(const std::string& path,
+               const std::vector<std::string>& arguments,
+               const std::string& log_path,
+               const std::function<void()>& report) {
+  if (!IsProgram(path) || IsThisProgram(path)) {
+    return Status::Error("the host's colmap, " + path +
+                         ", is not another program; set the environment "
+                         "variable ADASFM_HOST_COLMAP to COLMAP's own colmap");
+  }
+  const int log =
+      open(log_path.c_str(), O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0666);
+  if (log < 0) return Status::Error("cannot write " + log_path);
+  std::vector<char*> words = {const_cast<char*>(path.c_str())};
+  for (const std::string& argument : arguments) {
+    words.push_back(const_cast<char*>(argument.c_str()));
+  }
+  words.push_back(nullptr);
+  const pid_t child = fork();
+  if (child == 0) {
+    dup2(log, STDOUT_FILENO);
+    dup2(log, STDERR_FILENO);
+    execv(path.c_str(), words.data());
+    _exit(EXIT_FAILURE);
+  }
+  close(log);
+  if (child < 0) return Status::Error("cannot start " + path);
+  int status = 0;
+  try {
+    while (waitpid(child, &status, WNOHANG) == 0) {
+      std::this_thread::sleep_for(kPollInterval);
+      report();
+    }
+  } catch (...) {
+    kill(child, SIGTERM);
+    waitpid(child, &status, 0);
+    throw;
+  }
+  if (WIFEXITED(status) && WEXITSTATUS(status) == EXIT_SUCCESS) {
+    return Status::Ok();
+  }
+  // Ctrl-C on a terminal reaches the program too.
+  report();
+  return Status::Error("the host's colmap, " + path + ", failed in " +
+                       arguments.front() + "; see " + log_path);
 }
 
 std::optional<Version> ParseColmapVersion(const std::string& version) {

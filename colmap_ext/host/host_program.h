@@ -1,9 +1,13 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <functional>
 #include <optional>
 #include <string>
 #include <utility>
+#include <vector>
+
+#include "core/status.h"
 
 namespace adasfm {
 
@@ -19,6 +23,18 @@ bool IsProgram(const std::string& path);
 
 // The running program: handing over to ourselves would never end.
 bool IsThisProgram(const std::string& path);
+
+// What `path arguments` prints on both streams; empty for what is no program.
+std::string ReadHostHelp(const std::string& path, const std::string& arguments);
+
+// Runs the program to its end; what it prints goes to the end of log_path.
+// `report` is called ten times a second; when it throws, the program is stopped
+// first. An error, which names the log, when the program cannot be started or
+// fails.
+Status RunHost(const std::string& path,
+               const std::vector<std::string>& arguments,
+               const std::string& log_path,
+               const std::function<void()>& report);
 
 // The version that the first line of its help says; empty when it says none.
 std::string ReadHostVersion(const std::string& path);

@@ -12,6 +12,7 @@
 
 #include "colmap_ext/host/database_schema.h"
 #include "colmap_ext/host/features.h"
+#include "colmap_ext/host/host_features.h"
 #include "core/parallel.h"
 
 namespace adasfm {
@@ -172,7 +173,10 @@ StatusOr<ImageRegistration> RegisterImages(
     const std::vector<std::string>& names, const std::string& database_path,
     const ProgressCallback& progress) {
   const Status opens = CheckLibraryOpens(database_path);
-  if (!opens.ok()) return opens;
+  if (!opens.ok()) {
+    if (UsesHostProgram()) return ReadRegistration(names, database_path);
+    return opens;
+  }
   ImageWriter writer(options, database_path);
   for (size_t begin = 0; begin < names.size(); begin += kReadBlockSize) {
     const size_t count = std::min(kReadBlockSize, names.size() - begin);

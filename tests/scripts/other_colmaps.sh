@@ -179,6 +179,18 @@ for name in "${hosts[@]}"; do
     "$camera" "$world"
 done
 
+for name in "${hosts[@]:1}"; do
+  echo "== adasfm_automatic_reconstructor with COLMAP $name, interrupted and again"
+  reconstruct=(env ADASFM_HOST_COLMAP="${programs[$name]}"
+    "$ours" adasfm_automatic_reconstructor --image_path "$photos"
+    --workspace_path "$work/auto-$name" --camera_model PINHOLE
+    --camera_params "$camera" --max_num_features 500)
+  timeout -s INT 4 "${reconstruct[@]}" > "$work/log" 2>&1 || true
+  call adasfm_automatic_reconstructor "${reconstruct[@]}"
+  call model_analyzer "$ours" model_analyzer --path "$work/auto-$name/sparse/0"
+  grep -q 'Registered images: 8' "$work/log" || fail "images are missing"
+done
+
 if [ -n "${programs[3.10]:-}" ] && [[ $newest == 4.* ]]; then
   echo '== Warnings'
   warns 3.8 "$work/3.10/original.db" '3.10 or later'
