@@ -29,7 +29,7 @@ DescriptorMatrix DescriptorsFromRow(const SqliteStatement& statement) {
     ThrowDescriptorError(image_id,
                          "descriptors of the type " + std::to_string(type) +
                              ", which this program does not have; give "
-                             "--AdaSfMPairs.descriptors_path instead");
+                             "--AdaSfmPairs.descriptors_path instead");
   }
   const int64_t value_size = type == kSift ? 1 : sizeof(float);
   if (num_rows < 0 || num_bytes_per_row < 0 ||

@@ -311,7 +311,7 @@ TEST_F(SelectPairsTest, LearnedDescriptorsOfTheDatabaseAreFloats) {
   expect_error("UPDATE descriptors SET type = 2 WHERE image_id > 10",
                "another type");
   expect_error("UPDATE descriptors SET type = 7",
-               "--AdaSfMPairs.descriptors_path");
+               "--AdaSfmPairs.descriptors_path");
 }
 
 TEST_F(SelectPairsTest, WrongInputIsOneLine) {
