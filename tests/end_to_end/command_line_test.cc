@@ -128,6 +128,8 @@ TEST_F(CommandLineTest, EveryCommandExplainsItself) {
     EXPECT_NE(run.out.find("--log_level"), std::string::npos) << command.name;
     ExpectError(std::string(command.name) + " --no_such_option 1",
                 "no_such_option");
+    // The one command that works on nothing.
+    if (std::string(command.name) == "adasfm_version") continue;
     ExpectError(command.name, "required but missing");
   }
 }
