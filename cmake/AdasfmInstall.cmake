@@ -136,7 +136,7 @@ set(CPACK_DEBIAN_FILE_NAME DEB-DEFAULT)
 set(CPACK_DEBIAN_PACKAGE_SECTION science)
 set(CPACK_DEBIAN_RUNTIME_PACKAGE_NAME colmap-adasfm)
 set(CPACK_DEBIAN_RUNTIME_PACKAGE_SHLIBDEPS ON)
-set(CPACK_DEBIAN_RUNTIME_PACKAGE_RECOMMENDS "colmap (>= 3.8), colmap (<< 3.9)")
+set(CPACK_DEBIAN_RUNTIME_PACKAGE_RECOMMENDS colmap)
 set(CPACK_COMPONENT_RUNTIME_DESCRIPTION
   "The adasfm_* commands: photos, and the logs of an IMU and wheels, to one
 metric model. Priors from sensor logs, coarse global SfM and partitioned

@@ -10,6 +10,7 @@
 
 #include "colmap_ext/coarse/global_report.h"
 #include "colmap_ext/database/two_view_geometry_backup.h"
+#include "colmap_ext/host/frames.h"
 #include "colmap_ext/host/model.h"
 #include "colmap_ext/host/model_folder.h"
 #include "colmap_ext/host/pose_conversion.h"
@@ -58,13 +59,14 @@ PriorCorrections CollectCorrections(const CoarsePoses& poses) {
 Status WriteGlobalResult(const GlobalStageOptions& options,
                          const std::string& database_path,
                          const std::string& output_path, const SceneData& scene,
+                         const DatabaseFrames& frames,
                          const CoarseModelReport& report) {
   const GlobalStageResult& result = report.result;
   std::vector<const colmap::Reconstruction*> models;
   for (const CoarseModel& model : result.models) {
     models.push_back(&model.reconstruction);
   }
-  Status status = WriteModelFolder(output_path, models);
+  Status status = WriteModelFolder(output_path, models, frames.frames);
   if (status.ok()) {
     status = WriteTextFile(output_path + "/removed_pairs.txt",
                            FormatRemovedPairs(scene, result.removed_pairs));
@@ -160,30 +162,32 @@ MapperStageOptions ResolveOptions(const MapOptions& options,
   return stage;
 }
 
-Status MergeAndWrite(const std::string& output_path, MapperStage* stage) {
+Status MergeAndWrite(const std::string& output_path,
+                     const DatabaseFrames& frames, MapperStage* stage) {
   const StatusOr<colmap::Reconstruction> model =
       stage->Merge(/*require_all_parts=*/true);
   if (!model.ok()) return model.status();
-  const Status status = WriteModelFolder(output_path, {&*model});
+  const Status status = WriteModelFolder(output_path, {&*model}, frames.frames);
   if (!status.ok()) return status;
   return WriteTextFile(output_path + "/summary.json",
                        FormatMapperSummaryJson(stage->Summary()));
 }
 
-Status RunMapperSteps(const MapRequest& request, MapperStage* stage) {
+Status RunMapperSteps(const MapRequest& request, const DatabaseFrames& frames,
+                      MapperStage* stage) {
   switch (request.steps) {
     case MapperSteps::kPlan:
       return stage->Plan();
     case MapperSteps::kPart:
       return stage->RunPart(request.part_index);
     case MapperSteps::kMerge:
-      return MergeAndWrite(request.output_path, stage);
+      return MergeAndWrite(request.output_path, frames, stage);
     case MapperSteps::kAll:
       break;
   }
   Status status = stage->Plan();
   if (status.ok()) status = stage->RunAllParts();
-  if (status.ok()) status = MergeAndWrite(request.output_path, stage);
+  if (status.ok()) status = MergeAndWrite(request.output_path, frames, stage);
   return status;
 }
 
@@ -239,6 +243,8 @@ StatusOr<CoarseModelReport> EstimateCoarseModel(
   scene_options.min_num_matches = options.poses.min_num_inliers;
   const StatusOr<SceneData> scene = ReadSceneData(database_path, scene_options);
   if (!scene.ok()) return scene.status();
+  const StatusOr<DatabaseFrames> frames = ReadDatabaseFrames(database_path);
+  if (!frames.ok()) return frames.status();
   std::ostringstream text;
   text << scene->images.size() << " images, " << scene->pairs.size()
        << " verified pairs, " << scene->priors.size() << " priors";
@@ -246,6 +252,7 @@ StatusOr<CoarseModelReport> EstimateCoarseModel(
 
   CoarseModelReport report;
   report.warnings = scene->warnings;
+  if (frames->has_camera_rigs) report.warnings.push_back(kCameraRigsWarning);
   if (scene->priors.empty()) report.warnings.push_back(kNoPriorsWarning);
   StatusOr<GlobalStageResult> result =
       RunGlobalStage(options, *scene, progress);
@@ -256,8 +263,8 @@ StatusOr<CoarseModelReport> EstimateCoarseModel(
     report.warnings.push_back(std::move(warning));
   }
   report.seconds = seconds();
-  status =
-      WriteGlobalResult(options, database_path, output_path, *scene, report);
+  status = WriteGlobalResult(options, database_path, output_path, *scene,
+                             *frames, report);
   if (!status.ok()) return status;
   report.result.steps.push_back(
       {"writing", seconds() - report.seconds, "models and matches"});
@@ -282,9 +289,13 @@ StatusOr<MapReport> MapParts(const MapOptions& options,
   report.warnings.insert(report.warnings.begin(), scene->warnings.begin(),
                          scene->warnings.end());
   if (scene->priors.empty()) report.warnings.push_back(kNoPriorsWarning);
+  const StatusOr<DatabaseFrames> frames =
+      ReadDatabaseFrames(request.database_path);
+  if (!frames.ok()) return frames.status();
+  if (frames->has_camera_rigs) report.warnings.push_back(kCameraRigsWarning);
   MapperStage stage(ResolveOptions(options, *scene), *scene, *coarse,
                     request.output_path, progress);
-  status = RunMapperSteps(request, &stage);
+  status = RunMapperSteps(request, *frames, &stage);
   if (!status.ok()) return status;
   report.summary = stage.Summary();
   return report;

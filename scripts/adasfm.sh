@@ -21,12 +21,18 @@ photos=$1 workspace=$2 camera_model=$3 camera_params=$4 sensors=${5:-}
 database=$workspace/database.db
 mkdir -p "$workspace"
 
+# COLMAP 3.13 and later have these options in other groups.
+extraction=SiftExtraction matching=SiftMatching
+if grep -q FeatureExtraction.use_gpu <<< "$("$colmap" feature_extractor -h 2>&1)"; then
+  extraction=FeatureExtraction matching=FeatureMatching
+fi
+
 # Keypoints and descriptors; the camera's parameters are kept as given.
 "$colmap" feature_extractor \
   --database_path "$database" --image_path "$photos" \
   --ImageReader.single_camera 1 --ImageReader.camera_model "$camera_model" \
   --ImageReader.camera_params "$camera_params" \
-  --SiftExtraction.max_num_features 2048 --SiftExtraction.use_gpu 0
+  --SiftExtraction.max_num_features 2048 --"$extraction.use_gpu" 0
 
 # Which pairs to match: neighbours in time and similar images.
 "$colmap" adasfm_pair_generator \
@@ -35,7 +41,7 @@ mkdir -p "$workspace"
 # Matching and verification of these pairs.
 "$colmap" matches_importer \
   --database_path "$database" --match_list_path "$workspace/pairs.txt" \
-  --match_type pairs --SiftMatching.use_gpu 0
+  --match_type pairs --"$matching.use_gpu" 0
 
 # Sensor logs become priors in the database.
 if [ -n "$sensors" ]; then

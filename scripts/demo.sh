@@ -21,14 +21,20 @@ mkdir -p "$output"
 database=$output/database.db
 camera=$(sed -nE 's/^ *intrinsics: *\[(.*)\]/\1/p' "$output/sensors.yaml" | tr -d ' ')
 
+# COLMAP 3.13 and later have these options in other groups.
+extraction=SiftExtraction matching=SiftMatching
+if grep -q FeatureExtraction.use_gpu <<< "$("$colmap" feature_extractor -h 2>&1)"; then
+  extraction=FeatureExtraction matching=FeatureMatching
+fi
+
 say '2/6 Extracting and matching features with COLMAP (about 2 minutes)'
 "$colmap" feature_extractor --database_path "$database" \
   --image_path "$output/images" --ImageReader.single_camera 1 \
   --ImageReader.camera_model PINHOLE --ImageReader.camera_params "$camera" \
-  --SiftExtraction.use_gpu 0 --SiftExtraction.max_num_features 2000 \
+  --"$extraction.use_gpu" 0 --SiftExtraction.max_num_features 2000 \
   > "$output/features.log" 2>&1
 "$colmap" sequential_matcher --database_path "$database" \
-  --SequentialMatching.overlap 8 --SiftMatching.use_gpu 0 \
+  --SequentialMatching.overlap 8 --"$matching.use_gpu" 0 \
   > "$output/matches.log" 2>&1
 
 say '3/6 Importing the IMU and wheel logs as priors'

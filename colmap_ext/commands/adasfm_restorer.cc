@@ -28,7 +28,9 @@ Status RunAdasfmRestorer(int argc, char** argv) {
   }
   if (summary->num_outdated > 0) {
     std::cout << "Left as they are, because COLMAP wrote them anew since: "
-              << summary->num_outdated << std::endl;
+              << summary->num_outdated << " (the table "
+              << kTwoViewGeometryBackupTable << " still has their older rows)"
+              << std::endl;
   }
   return Status::Ok();
 }

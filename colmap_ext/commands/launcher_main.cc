@@ -8,50 +8,31 @@
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
-#include <filesystem>
 #include <iostream>
-#include <sstream>
 #include <string>
 
 #include "colmap_ext/commands/registry.h"
+#include "colmap_ext/host/host_program.h"
 
 namespace {
 
-namespace fs = std::filesystem;
+using adasfm::FindHostProgram;
+using adasfm::IsProgram;
+using adasfm::IsThisProgram;
 
 constexpr char kHostVariable[] = "ADASFM_HOST_COLMAP";
 
-bool IsProgram(const std::string& path) {
-  std::error_code error;
-  return fs::is_regular_file(path, error) && access(path.c_str(), X_OK) == 0;
-}
-
-// Handing over to ourselves would never end.
-bool IsThisProgram(const std::string& path) {
-  std::error_code error;
-  return fs::equivalent(path, "/proc/self/exe", error);
-}
-
-// The first colmap on the PATH that is another program; empty without one.
-std::string FindOnPath() {
-  const char* path = std::getenv("PATH");
-  std::istringstream folders(path == nullptr ? "" : path);
-  std::string folder;
-  while (std::getline(folders, folder, ':')) {
-    const std::string candidate = folder + "/colmap";
-    if (IsProgram(candidate) && !IsThisProgram(candidate)) return candidate;
+// The database that a command line names; empty without one.
+std::string FindDatabasePath(char** argv) {
+  const std::string name = "--database_path";
+  for (; *argv != nullptr; ++argv) {
+    const std::string argument = *argv;
+    if (argument == name) return argv[1] == nullptr ? "" : argv[1];
+    if (argument.rfind(name + "=", 0) == 0) {
+      return argument.substr(name.size() + 1);
+    }
   }
   return "";
-}
-
-// The host that the environment names, else the one that we were built with,
-// else the one on the PATH: a package does not know where it will be.
-std::string HostPath() {
-  const char* chosen = std::getenv(kHostVariable);
-  if (chosen != nullptr && *chosen != '\0') return chosen;
-  if (IsProgram(ADASFM_HOST_COLMAP)) return ADASFM_HOST_COLMAP;
-  const std::string found = FindOnPath();
-  return found.empty() ? ADASFM_HOST_COLMAP : found;
 }
 
 // Whether the host can be run; otherwise prints why not.
@@ -76,8 +57,11 @@ bool CheckHost(const std::string& path) {
 
 // Replaces this process, so that exit code and signals are the host's.
 int HandOver(char** argv) {
-  const std::string path = HostPath();
+  const std::string path = FindHostProgram();
   if (!CheckHost(path)) return EXIT_FAILURE;
+  const std::string conflict =
+      adasfm::FindHostConflict(path, FindDatabasePath(argv));
+  if (!conflict.empty()) std::cerr << "WARNING: " << conflict << std::endl;
   std::cout.flush();
   execv(path.c_str(), argv);
   std::cerr << "ERROR: cannot run the host's colmap, " << path << ": "
@@ -87,7 +71,7 @@ int HandOver(char** argv) {
 
 // Runs the host's help in a child; false when that was not possible.
 bool ShowHostHelp(char** argv) {
-  const std::string path = HostPath();
+  const std::string path = FindHostProgram();
   if (!CheckHost(path)) return false;
   std::cout.flush();
   const pid_t child = fork();

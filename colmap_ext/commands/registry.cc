@@ -27,6 +27,8 @@ const std::vector<Command>& Commands() {
        RunAdasfmRestorer},
       {"adasfm_synthesizer", "makes a drive with ground truth",
        RunAdasfmSynthesizer},
+      {"adasfm_version", "versions of this program and of its COLMAP",
+       RunAdasfmVersion},
   };
   return commands;
 }

@@ -18,6 +18,7 @@ Status RunAdasfmPriorImporter(int argc, char** argv);
 Status RunAdasfmReporter(int argc, char** argv);
 Status RunAdasfmRestorer(int argc, char** argv);
 Status RunAdasfmSynthesizer(int argc, char** argv);
+Status RunAdasfmVersion(int argc, char** argv);
 
 // All commands, by name. A new command is one line in registry.cc.
 const std::vector<Command>& Commands();

@@ -1,27 +1,43 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "colmap_ext/database/two_view_geometry_backup.h"
 
+#include <algorithm>
 #include <map>
 #include <optional>
+#include <utility>
 
 #include "colmap_ext/database/prior_tables.h"
+#include "colmap_ext/host/database_schema.h"
 
 namespace adasfm {
 namespace {
 
-constexpr char kColumns[] =
-    "pair_id, rows, cols, data, config, F, E, H, qvec, tvec";
-
+// Like two_view_geometries, all of whose columns it has, those of a newer
+// COLMAP too. written_digest belongs to the row that took this one's place;
+// NULL when none did.
 void CreateTable(SqliteConnection* database) {
   CreateMetaTable(database);
-  // written_digest belongs to the row that took this one's place; NULL when
-  // none did.
   database->Execute(
       "CREATE TABLE IF NOT EXISTS adasfm_two_view_geometries ("
       "pair_id INTEGER PRIMARY KEY NOT NULL, rows INTEGER NOT NULL, "
       "cols INTEGER NOT NULL, data BLOB, config INTEGER NOT NULL, F BLOB, "
       "E BLOB, H BLOB, qvec BLOB, tvec BLOB, name1 TEXT NOT NULL, "
       "name2 TEXT NOT NULL, written_digest INTEGER)");
+  for (const std::string& column : database->Columns("two_view_geometries")) {
+    if (HasColumn(database, kTwoViewGeometryBackupTable, column)) continue;
+    database->Execute("ALTER TABLE adasfm_two_view_geometries ADD COLUMN \"" +
+                      column + "\" BLOB");
+  }
+}
+
+// The columns that both tables have, as a list for a statement.
+std::string CommonColumns(SqliteConnection* database) {
+  std::string list;
+  for (const std::string& column : database->Columns("two_view_geometries")) {
+    if (!HasColumn(database, kTwoViewGeometryBackupTable, column)) continue;
+    list += (list.empty() ? "\"" : ", \"") + column + "\"";
+  }
+  return list;
 }
 
 // FNV-1a, 64 bits.
@@ -39,16 +55,20 @@ class Digest {
   uint64_t value_ = 0xcbf29ce484222325ull;
 };
 
-// Digests of the present two_view_geometries.
+// Digests of the present two_view_geometries. A matrix or pose that is missing
+// counts as zeros: COLMAP 4 replaces the zeros of an older file by NULL when it
+// opens it.
 class RowDigester {
  public:
   explicit RowDigester(SqliteConnection* database)
       : statement_(database,
-                   std::string("SELECT ") + kColumns +
-                       " FROM two_view_geometries WHERE pair_id = ?") {}
+                   "SELECT pair_id, rows, cols, data, config, F, E, H, qvec, "
+                   "tvec FROM two_view_geometries WHERE pair_id = ?") {}
 
   // None when there is no row.
   std::optional<int64_t> Compute(int64_t pair_id) {
+    static constexpr std::pair<int, int64_t> kBlobs[] = {
+        {3, 0}, {5, 72}, {6, 72}, {7, 72}, {8, 32}, {9, 24}};
     statement_.Reset();
     statement_.BindInt(1, pair_id);
     if (!statement_.Step()) return std::nullopt;
@@ -57,10 +77,16 @@ class RowDigester {
       const int64_t value = statement_.Int(column);
       digest.Add(&value, sizeof(value));
     }
-    for (const int column : {3, 5, 6, 7, 8, 9}) {
+    for (const auto& [column, full_num_bytes] : kBlobs) {
       const int64_t num_bytes = statement_.NumBytes(column);
-      digest.Add(&num_bytes, sizeof(num_bytes));
-      digest.Add(statement_.Blob(column), num_bytes);
+      if (num_bytes > 0) {
+        digest.Add(&num_bytes, sizeof(num_bytes));
+        digest.Add(statement_.Blob(column), num_bytes);
+      } else {
+        const std::string zeros(full_num_bytes, '\0');
+        digest.Add(&full_num_bytes, sizeof(full_num_bytes));
+        digest.Add(zeros.data(), zeros.size());
+      }
     }
     return digest.Value();
   }
@@ -120,19 +146,76 @@ std::vector<int64_t> FindCurrentRows(SqliteConnection* database,
   return current;
 }
 
+bool AreZeros(const double* values, int num_values) {
+  return std::all_of(values, values + num_values,
+                     [](double value) { return value == 0.0; });
+}
+
+// The doubles of a column; zeros when the row has none there.
+std::vector<double> ReadDoubles(const SqliteStatement& statement, int column,
+                                int num_values) {
+  std::vector<double> values(num_values, 0.0);
+  if (statement.NumBytes(column) == num_values * sizeof(double)) {
+    const auto* data = static_cast<const char*>(statement.Blob(column));
+    std::copy(data, data + num_values * sizeof(double),
+              reinterpret_cast<char*>(values.data()));
+  }
+  return values;
+}
+
+// Writes NULL for the matrices and poses of a row that mean "none" in a file of
+// COLMAP 3 (zeros, and the pose of no rotation and no translation), as COLMAP 4
+// does with such a file.
+void ClearMissing(int64_t pair_id, SqliteConnection* database) {
+  std::vector<std::string> cleared;
+  {
+    SqliteStatement statement(database,
+                              "SELECT F, E, H, qvec, tvec FROM "
+                              "two_view_geometries WHERE pair_id = ?");
+    statement.BindInt(1, pair_id);
+    if (!statement.Step()) return;
+    int column = 0;
+    for (const char* name : {"F", "E", "H"}) {
+      const std::vector<double> matrix = ReadDoubles(statement, column++, 9);
+      if (AreZeros(matrix.data(), 9)) cleared.push_back(name);
+    }
+    const std::vector<double> q = ReadDoubles(statement, 3, 4);
+    const std::vector<double> t = ReadDoubles(statement, 4, 3);
+    const bool is_identity =
+        q[0] == 1.0 && AreZeros(q.data() + 1, 3) && AreZeros(t.data(), 3);
+    if (AreZeros(q.data(), 4) || is_identity) {
+      cleared.insert(cleared.end(), {"qvec", "tvec"});
+    }
+  }
+  for (const std::string& column : cleared) {
+    SqliteStatement statement(database, "UPDATE two_view_geometries SET " +
+                                            column +
+                                            " = NULL WHERE pair_id = ?");
+    statement.BindInt(1, pair_id);
+    statement.Step();
+  }
+}
+
 RestoreSummary RestoreRows(SqliteConnection* database) {
   RestoreSummary summary;
   const std::vector<int64_t> pair_ids =
       FindCurrentRows(database, &summary.num_outdated);
   if (pair_ids.empty() && summary.num_outdated == 0) return summary;
-  SqliteStatement statement(
-      database, std::string("INSERT OR REPLACE INTO two_view_geometries (") +
-                    kColumns + ") SELECT " + kColumns +
+  const std::string columns = CommonColumns(database);
+  SqliteStatement restore(
+      database, "INSERT OR REPLACE INTO two_view_geometries (" + columns +
+                    ") SELECT " + columns +
                     " FROM adasfm_two_view_geometries WHERE pair_id = ?");
+  SqliteStatement forget(
+      database, "DELETE FROM adasfm_two_view_geometries WHERE pair_id = ?");
+  const bool missing_is_null = StoresMissingAsNull(database);
   for (const int64_t pair_id : pair_ids) {
-    statement.Reset();
-    statement.BindInt(1, pair_id);
-    statement.Step();
+    for (SqliteStatement* statement : {&restore, &forget}) {
+      statement->Reset();
+      statement->BindInt(1, pair_id);
+      statement->Step();
+    }
+    if (missing_is_null) ClearMissing(pair_id, database);
   }
   summary.num_restored = pair_ids.size();
   return summary;
@@ -140,9 +223,11 @@ RestoreSummary RestoreRows(SqliteConnection* database) {
 
 void KeepRows(const std::vector<ImagePair>& pairs, SqliteConnection* database) {
   const std::map<image_t, std::string> names = ReadNames(database);
+  const std::string columns = CommonColumns(database);
   SqliteStatement statement(
-      database, std::string("INSERT INTO adasfm_two_view_geometries SELECT ") +
-                    kColumns +
+      database, "INSERT OR REPLACE INTO adasfm_two_view_geometries (" +
+                    columns + ", name1, name2, written_digest) SELECT " +
+                    columns +
                     ", ?, ?, NULL FROM two_view_geometries WHERE pair_id = ?");
   for (const ImagePair& pair : pairs) {
     const auto name1 = names.find(pair.image_id1);
@@ -200,9 +285,9 @@ Status RewriteTwoViewGeometries(const std::string& database_path,
   try {
     SqliteConnection database(database_path, SqliteConnection::Mode::kWrite);
     SqliteTransaction transaction(&database);
+    AddPoseColumns(&database);
     CreateTable(&database);
     RestoreRows(&database);
-    database.Execute("DELETE FROM adasfm_two_view_geometries");
     KeepRows(pairs, &database);
     RemoveRows(removed, &database);
     WriteTwoViewGeometries(&database, rows);
@@ -232,7 +317,9 @@ StatusOr<RestoreSummary> RestoreTwoViewGeometries(
     SqliteConnection database(database_path, SqliteConnection::Mode::kWrite);
     SqliteTransaction transaction(&database);
     RestoreSummary summary = RestoreRows(&database);
-    database.Execute("DROP TABLE IF EXISTS adasfm_two_view_geometries");
+    if (summary.num_outdated == 0) {
+      database.Execute("DROP TABLE IF EXISTS adasfm_two_view_geometries");
+    }
     summary.priors_restored = HasPriorCorrections(&database);
     RemovePriorCorrections(&database);
     transaction.Commit();

@@ -15,7 +15,8 @@ namespace adasfm {
 // The table adasfm_two_view_geometries keeps the rows that were replaced or
 // removed, byte for byte (docs/reference/formats.md). A kept row counts for as
 // long as the row in its place is the one we wrote: when COLMAP has verified
-// the pair anew since, the present row is the original.
+// the pair anew since, the present row is the original. COLMAP 4 may open, and
+// so convert, the file in between.
 
 // Puts `rows` in the place of the pairs' two-view geometries, removes those of
 // `removed`, and writes the corrections of priors, all in one transaction. What
@@ -34,9 +35,11 @@ struct RestoreSummary {
   bool priors_restored = false;
 };
 
-// Puts all originals back and drops the tables, that of corrected priors too,
-// in one transaction. Without them there is nothing to do, and nothing is
-// changed.
+// Puts all originals that count back and drops the tables, that of corrected
+// priors too, in one transaction. Originals that do not count stay in their
+// table. In a file of COLMAP 4's form, matrices and poses of zeros come back as
+// NULL, as that form says "none". Without the tables there is nothing to do,
+// and nothing is changed.
 StatusOr<RestoreSummary> RestoreTwoViewGeometries(
     const std::string& database_path);
 

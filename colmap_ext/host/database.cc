@@ -4,52 +4,16 @@
 #include <base/camera_models.h>
 #include <base/database.h>
 
-#include <algorithm>
 #include <cstring>
 #include <filesystem>
+
+#include "colmap_ext/host/camera_models.h"
+#include "colmap_ext/host/database_schema.h"
 
 namespace adasfm {
 namespace {
 
 using RowMajorMatrix3d = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
-
-// What every version of COLMAP that the host can read has.
-const std::map<std::string, std::vector<std::string>>& RequiredColumns() {
-  static const std::map<std::string, std::vector<std::string>> columns = {
-      {"cameras", {"camera_id", "model", "width", "height", "params"}},
-      {"images", {"image_id", "name", "camera_id"}},
-      {"keypoints", {"image_id", "rows", "cols", "data"}},
-      {"matches", {"pair_id", "rows", "cols", "data"}},
-      {"two_view_geometries",
-       {"pair_id", "rows", "cols", "data", "config", "F", "E", "H", "qvec",
-        "tvec"}},
-  };
-  return columns;
-}
-
-Status CheckTables(const std::string& path, SqliteConnection* database) {
-  for (const auto& [table, required] : RequiredColumns()) {
-    const std::vector<std::string> columns = database->Columns(table);
-    for (const std::string& column : required) {
-      if (std::find(columns.begin(), columns.end(), column) != columns.end()) {
-        continue;
-      }
-      const std::string missing =
-          columns.empty() ? "table " + table : "column " + table + "." + column;
-      return Status::Error(path + " is not a database of COLMAP: " + missing +
-                           " is missing; check --database_path");
-    }
-  }
-  // COLMAP 3.11 moved the pose priors out of the images, 3.12 added rigs; the
-  // host would write into tables that it does not know.
-  for (const char* table : {"pose_priors", "rigs", "frames"}) {
-    if (!database->HasTable(table)) continue;
-    return Status::Error(
-        path + " was written by a newer COLMAP (it has the table " + table +
-        "); make the database with the COLMAP 3.8 that this program runs on");
-  }
-  return Status::Ok();
-}
 
 [[noreturn]] void ThrowRowError(const std::string& table, int64_t row,
                                 const std::string& what) {
@@ -134,7 +98,7 @@ Status CheckDatabase(const std::string& database_path) {
   }
   try {
     SqliteConnection database(database_path, SqliteConnection::Mode::kRead);
-    return CheckTables(database_path, &database);
+    return CheckColumns(database_path, &database);
   } catch (const SqliteError& sqlite_error) {
     return Status::Error(database_path + " is not a database of COLMAP (" +
                          sqlite_error.what() + "); check --database_path");
@@ -160,20 +124,28 @@ std::map<camera_t, colmap::Camera> ReadCameras(SqliteConnection* database) {
       "FROM cameras ORDER BY camera_id");
   while (statement.Step()) {
     const int64_t camera_id = statement.Int(0);
-    if (!colmap::ExistsCameraModelWithId(statement.Int(1))) {
+    int model_id = statement.Int(1);
+    std::vector<double> params(statement.NumBytes(4) / sizeof(double));
+    if (!params.empty()) {
+      std::memcpy(params.data(), statement.Blob(4),
+                  params.size() * sizeof(double));
+    }
+    ConvertCameraModel(&model_id, &params);
+    if (!colmap::ExistsCameraModelWithId(model_id)) {
       ThrowRowError("cameras", camera_id,
-                    "unknown camera model " + std::to_string(statement.Int(1)));
+                    "unknown camera model " + CameraModelName(model_id));
     }
     colmap::Camera camera;
     camera.SetCameraId(camera_id);
-    camera.SetModelId(statement.Int(1));
+    camera.SetModelId(model_id);
     camera.SetWidth(statement.Int(2));
     camera.SetHeight(statement.Int(3));
     camera.SetPriorFocalLength(statement.Int(5) != 0);
-    if (statement.NumBytes(4) != camera.NumParams() * sizeof(double)) {
+    if (params.size() != camera.NumParams() ||
+        statement.NumBytes(4) % sizeof(double) != 0) {
       ThrowRowError("cameras", camera_id, "wrong number of parameters");
     }
-    std::memcpy(camera.ParamsData(), statement.Blob(4), statement.NumBytes(4));
+    camera.SetParams(params);
     cameras.emplace(camera_id, std::move(camera));
   }
   return cameras;
@@ -251,10 +223,14 @@ std::vector<FeatureMatch> ReadMatchesOfPair(SqliteConnection* database,
 std::vector<DatabaseTwoViewGeometry> ReadTwoViewGeometries(
     SqliteConnection* database, const std::string& table, int min_num_matches) {
   std::vector<DatabaseTwoViewGeometry> rows;
+  // COLMAP 3.6 has no poses.
+  const std::string poses =
+      HasColumn(database, table, "qvec") && HasColumn(database, table, "tvec")
+          ? "qvec, tvec"
+          : "NULL, NULL";
   SqliteStatement statement(
-      database,
-      "SELECT pair_id, rows, cols, data, config, E, qvec, tvec FROM " + table +
-          " WHERE rows >= ? ORDER BY pair_id");
+      database, "SELECT pair_id, rows, cols, data, config, E, " + poses +
+                    " FROM " + table + " WHERE rows >= ? ORDER BY pair_id");
   statement.BindInt(1, min_num_matches);
   while (statement.Step()) {
     DatabaseTwoViewGeometry row;

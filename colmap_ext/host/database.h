@@ -18,11 +18,12 @@
 
 namespace adasfm {
 
-// The host's database, read over a connection of our own: COLMAP's class
-// converts a file when it opens it, and ends the process on bad rows.
+// The database of any COLMAP since 3.6, read over a connection of our own:
+// COLMAP's class converts a file when it opens it, and ends the process on bad
+// rows and on files of a newer COLMAP.
 
-// An error for a missing file, one that is no SQLite database, one that is not
-// COLMAP's, and one of a newer COLMAP than the host. Changes nothing.
+// An error for a missing file, one that is no SQLite database, and one that is
+// not COLMAP's. Changes nothing.
 Status CheckDatabase(const std::string& database_path);
 
 // The key of a pair in the host's tables, and back.
@@ -39,7 +40,7 @@ struct DatabaseTwoViewGeometry {
   ImagePair pair;
   int config = 0;
   std::vector<FeatureMatch> inlier_matches;
-  // None when the row has none (zeros).
+  // None when the row has none (NULL or zeros).
   std::optional<Eigen::Matrix3d> essential_matrix;
   std::optional<Rigid3d> cam2_from_cam1;
 };
@@ -47,6 +48,7 @@ struct DatabaseTwoViewGeometry {
 // The functions below throw SqliteError, naming table and row, for rows that
 // COLMAP could not have written.
 
+// Models that the linked library lacks are converted (camera_models.h).
 std::map<camera_t, colmap::Camera> ReadCameras(SqliteConnection* database);
 
 // Sorted by id.
@@ -83,7 +85,8 @@ std::vector<DatabaseTwoViewGeometry> ReadTwoViewGeometries(
     SqliteConnection* database, const std::string& table, int min_num_matches);
 
 // A new row for two_view_geometries: configuration CALIBRATED, E of the pose
-// with a translation of unit length, and F of E and the calibration matrices.
+// with a translation of unit length, F of E and the calibration matrices, and
+// no H.
 struct NewTwoViewGeometry {
   ImagePair pair;
   std::vector<FeatureMatch> inlier_matches;

@@ -4,27 +4,78 @@
 #include <cstring>
 #include <string>
 
+#include "colmap_ext/host/database_schema.h"
+
 namespace adasfm {
+namespace {
+
+// COLMAP 4's descriptors.type: SIFT has one byte a number; ALIKED's two kinds
+// have floats in the same table of bytes.
+constexpr int64_t kSift = 0;
+constexpr int64_t kLastAliked = 2;
+
+[[noreturn]] void ThrowDescriptorError(int64_t image_id,
+                                       const std::string& what) {
+  throw SqliteError("table descriptors, row " + std::to_string(image_id) +
+                    ": " + what);
+}
+
+DescriptorMatrix DescriptorsFromRow(const SqliteStatement& statement) {
+  const int64_t image_id = statement.Int(0);
+  const int64_t num_rows = statement.Int(1);
+  const int64_t num_bytes_per_row = statement.Int(2);
+  const int64_t type = statement.Int(4);
+  if (type < kSift || type > kLastAliked) {
+    ThrowDescriptorError(image_id,
+                         "descriptors of the type " + std::to_string(type) +
+                             ", which this program does not have; give "
+                             "--AdaSfmPairs.descriptors_path instead");
+  }
+  const int64_t value_size = type == kSift ? 1 : sizeof(float);
+  if (num_rows < 0 || num_bytes_per_row < 0 ||
+      num_bytes_per_row % value_size != 0 ||
+      statement.NumBytes(3) != num_rows * num_bytes_per_row) {
+    ThrowDescriptorError(image_id, "malformed descriptors");
+  }
+  DescriptorMatrix descriptors(num_rows, num_bytes_per_row / value_size);
+  if (descriptors.size() == 0) return descriptors;
+  if (type == kSift) {
+    descriptors =
+        Eigen::Map<const Eigen::Matrix<unsigned char, Eigen::Dynamic,
+                                       Eigen::Dynamic, Eigen::RowMajor>>(
+            static_cast<const unsigned char*>(statement.Blob(3)),
+            descriptors.rows(), descriptors.cols())
+            .cast<float>();
+    return descriptors;
+  }
+  std::memcpy(descriptors.data(), statement.Blob(3),
+              descriptors.size() * sizeof(float));
+  if (!descriptors.allFinite()) {
+    ThrowDescriptorError(image_id, "a descriptor that is not finite");
+  }
+  return descriptors;
+}
+
+}  // namespace
 
 void ReadDescriptors(
     SqliteConnection* database,
-    const std::function<void(image_t, const DescriptorBytes&)>& function) {
-  SqliteStatement statement(
-      database,
-      "SELECT image_id, rows, cols, data FROM descriptors ORDER BY image_id");
+    const std::function<void(image_t, const DescriptorMatrix&)>& function) {
+  const bool has_type = HasColumn(database, "descriptors", "type");
+  SqliteStatement statement(database,
+                            std::string("SELECT image_id, rows, cols, data, ") +
+                                (has_type ? "type" : "0") +
+                                " FROM descriptors ORDER BY image_id");
+  int64_t first_type = -1;
   while (statement.Step()) {
-    const int64_t num_rows = statement.Int(1);
-    const int64_t num_columns = statement.Int(2);
-    const int64_t num_bytes = statement.NumBytes(3);
-    if (num_rows < 0 || num_columns < 0 ||
-        num_bytes != num_rows * num_columns) {
-      throw SqliteError("table descriptors, row " +
-                        std::to_string(statement.Int(0)) +
-                        ": malformed descriptors");
+    const DescriptorMatrix descriptors = DescriptorsFromRow(statement);
+    if (descriptors.size() == 0) continue;
+    if (first_type < 0) first_type = statement.Int(4);
+    if (statement.Int(4) != first_type) {
+      ThrowDescriptorError(
+          statement.Int(0),
+          "descriptors of another type than those of the images before");
     }
-    if (num_bytes == 0) continue;
-    DescriptorBytes descriptors(num_rows, num_columns);
-    std::memcpy(descriptors.data(), statement.Blob(3), num_bytes);
     function(statement.Int(0), descriptors);
   }
 }

@@ -2,7 +2,6 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <cstdint>
 #include <functional>
 
 #include "core/sqlite.h"
@@ -10,15 +9,17 @@
 
 namespace adasfm {
 
-// One local descriptor a row, as the database holds them (SIFT: 128 bytes).
-using DescriptorBytes =
-    Eigen::Matrix<uint8_t, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+// One local descriptor a row: the 128 bytes of SIFT as numbers, or the floats
+// of a learned descriptor.
+using DescriptorMatrix =
+    Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
 // Calls function(image_id, descriptors) for every image that has any, in order
 // of the ids; one image is in memory at a time. Throws SqliteError, naming the
-// row, for rows that COLMAP could not have written.
+// row, for rows that COLMAP could not have written, for descriptors of unknown
+// type, and for images with descriptors of different types.
 void ReadDescriptors(
     SqliteConnection* database,
-    const std::function<void(image_t, const DescriptorBytes&)>& function);
+    const std::function<void(image_t, const DescriptorMatrix&)>& function);
 
 }  // namespace adasfm

@@ -11,6 +11,8 @@
 #include <thread>
 #include <utility>
 
+#include "colmap_ext/host/database_schema.h"
+#include "colmap_ext/host/host_features.h"
 #include "colmap_ext/io/capture_output.h"
 #include "core/parallel.h"
 
@@ -78,6 +80,12 @@ Status ExtractFeatures(const FeatureOptions& options,
                        const std::string& database_path,
                        const std::string& log_path,
                        const ProgressCallback& progress) {
+  if (UsesHostProgram()) {
+    return ExtractFeaturesByHost(options, image_path, database_path, log_path,
+                                 progress);
+  }
+  const Status opens = CheckLibraryOpens(database_path);
+  if (!opens.ok()) return opens;
   int num_done = 0;
   colmap::ImageReaderOptions reader;
   reader.database_path = database_path;
@@ -108,6 +116,11 @@ Status MatchPairs(const FeatureOptions& options,
                   const std::vector<ImagePair>& pairs,
                   const std::string& database_path, const std::string& log_path,
                   const ProgressCallback& progress) {
+  if (UsesHostProgram()) {
+    return MatchPairsByHost(options, pairs, database_path, log_path, progress);
+  }
+  const Status opens = CheckLibraryOpens(database_path);
+  if (!opens.ok()) return opens;
   colmap::SiftMatchingOptions sift;
   sift.num_threads = options.num_threads;
   sift.use_gpu = UsesGpu(options);

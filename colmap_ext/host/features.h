@@ -11,9 +11,10 @@
 namespace adasfm {
 
 // Features and matches by the host's own classes, into a database of its own
-// making. Work that is in the database already is not done again, so that an
-// interrupted run continues. Interruption (core/interruption.h) by the progress
-// callback leaves the database whole.
+// making; with the environment variable ADASFM_HOST_COLMAP by that program
+// instead (host_features.h). Work that is in the database already is not done
+// again, so that an interrupted run continues. Interruption
+// (core/interruption.h) by the progress callback leaves the database whole.
 
 struct FeatureOptions {
   std::string camera_model = "SIMPLE_RADIAL";

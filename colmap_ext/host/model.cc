@@ -8,6 +8,8 @@
 #include <filesystem>
 #include <fstream>
 
+#include "colmap_ext/host/camera_models.h"
+
 namespace adasfm {
 namespace {
 
@@ -77,6 +79,23 @@ bool IsCamerasFile(const std::string& path) {
   return walker.AtEnd();
 }
 
+// The name of the first camera model that the linked library lacks and a newer
+// COLMAP has; empty without one.
+std::string FindNewerCameraModel(const std::string& path) {
+  BinaryWalker walker(path);
+  uint64_t count = 0;
+  walker.Read(&count);
+  int32_t model_id = 0;
+  while (walker.Skip(4) && walker.Read(&model_id)) {
+    if (IsNewerCameraModel(model_id)) return CameraModelName(model_id);
+    if (!colmap::ExistsCameraModelWithId(model_id) || !walker.Skip(16) ||
+        !walker.SkipArray(colmap::CameraModelNumParams(model_id), 8)) {
+      break;
+    }
+  }
+  return "";
+}
+
 bool IsImagesFile(const std::string& path) {
   BinaryWalker walker(path);
   uint64_t count = 0;
@@ -143,6 +162,14 @@ StatusOr<colmap::Reconstruction> ReadModel(const std::string& path) {
   }
   if (is_binary) {
     const fs::path folder(path);
+    const std::string newer =
+        FindNewerCameraModel((folder / "cameras.bin").string());
+    if (!newer.empty()) {
+      return Status::Error("the model in " + path +
+                           " has a camera of the model " + newer +
+                           ", which this program does not have; make the "
+                           "model with another camera model");
+    }
     const std::pair<std::string, bool (*)(const std::string&)> files[] = {
         {(folder / "cameras.bin").string(), IsCamerasFile},
         {(folder / "images.bin").string(), IsImagesFile},

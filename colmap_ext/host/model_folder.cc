@@ -22,9 +22,14 @@ bool IsWritten(const fs::path& path, size_t num_records, size_t record_size) {
          fs::file_size(path) >= sizeof(num_written) + num_records * record_size;
 }
 
-bool WriteModel(const colmap::Reconstruction& model, const fs::path& path) {
+bool WriteModel(const colmap::Reconstruction& model,
+                const std::map<image_t, FrameOfImage>& frames,
+                const fs::path& path) {
   fs::create_directories(path);
   model.WriteBinary(path.string());
+  if (!frames.empty() && !WriteFrameFiles(model, frames, path.string())) {
+    return false;
+  }
   // Least bytes of a record: see COLMAP's file formats.
   return IsWritten(path / "cameras.bin", model.NumCameras(), 24) &&
          IsWritten(path / "images.bin", model.NumRegImages(), 73) &&
@@ -35,13 +40,14 @@ bool WriteModel(const colmap::Reconstruction& model, const fs::path& path) {
 
 Status WriteModelFolder(
     const std::string& output_path,
-    const std::vector<const colmap::Reconstruction*>& models) {
+    const std::vector<const colmap::Reconstruction*>& models,
+    const std::map<image_t, FrameOfImage>& frames) {
   const fs::path folder(output_path);
   const fs::path temporary = folder / kTemporaryName;
   try {
     fs::remove_all(temporary);
     for (size_t i = 0; i < models.size(); ++i) {
-      if (!WriteModel(*models[i], temporary / std::to_string(i))) {
+      if (!WriteModel(*models[i], frames, temporary / std::to_string(i))) {
         fs::remove_all(temporary);
         return Status::Error("cannot write a model to " + output_path +
                              "; check the free space");

@@ -10,7 +10,9 @@
 #include <optional>
 #include <tuple>
 
+#include "colmap_ext/host/database_schema.h"
 #include "colmap_ext/host/features.h"
+#include "colmap_ext/host/host_features.h"
 #include "core/parallel.h"
 
 namespace adasfm {
@@ -170,6 +172,11 @@ StatusOr<ImageRegistration> RegisterImages(
     const FeatureOptions& options, const std::string& image_path,
     const std::vector<std::string>& names, const std::string& database_path,
     const ProgressCallback& progress) {
+  const Status opens = CheckLibraryOpens(database_path);
+  if (!opens.ok()) {
+    if (UsesHostProgram()) return ReadRegistration(names, database_path);
+    return opens;
+  }
   ImageWriter writer(options, database_path);
   for (size_t begin = 0; begin < names.size(); begin += kReadBlockSize) {
     const size_t count = std::min(kReadBlockSize, names.size() - begin);

@@ -31,7 +31,6 @@ void WriteTwoViewGeometry(const colmap::Camera& camera1,
   const RowMajorMatrix3d E = Hat(tvec) * rotation.toRotationMatrix();
   const RowMajorMatrix3d F = camera2.CalibrationMatrix().inverse().transpose() *
                              E * camera1.CalibrationMatrix().inverse();
-  const RowMajorMatrix3d H = RowMajorMatrix3d::Zero();
   statement->Reset();
   statement->BindInt(1, PairIdFromImagePair(row.pair));
   statement->BindInt(2, row.inlier_matches.size());
@@ -40,9 +39,8 @@ void WriteTwoViewGeometry(const colmap::Camera& camera1,
   statement->BindInt(4, colmap::TwoViewGeometry::CALIBRATED);
   BindMatrix(statement, 5, F);
   BindMatrix(statement, 6, E);
-  BindMatrix(statement, 7, H);
-  BindMatrix(statement, 8, qvec);
-  BindMatrix(statement, 9, tvec);
+  BindMatrix(statement, 7, qvec);
+  BindMatrix(statement, 8, tvec);
   statement->Step();
 }
 
@@ -58,7 +56,7 @@ void WriteTwoViewGeometries(SqliteConnection* database,
   SqliteStatement statement(
       database,
       "INSERT OR REPLACE INTO two_view_geometries (pair_id, rows, cols, data, "
-      "config, F, E, H, qvec, tvec) VALUES (?, ?, 2, ?, ?, ?, ?, ?, ?, ?)");
+      "config, F, E, H, qvec, tvec) VALUES (?, ?, 2, ?, ?, ?, ?, NULL, ?, ?)");
   for (const NewTwoViewGeometry& row : rows) {
     WriteTwoViewGeometry(cameras.at(camera_ids.at(row.pair.image_id1)),
                          cameras.at(camera_ids.at(row.pair.image_id2)), row,

@@ -35,7 +35,7 @@ RowMatrixXf SampleDescriptors(const GlobalDescriptorOptions& options,
   std::vector<RowMatrixXf> samples;
   Eigen::Index num_rows = 0;
   int index = 0;
-  ReadDescriptors(database, [&](image_t, const DescriptorBytes& descriptors) {
+  ReadDescriptors(database, [&](image_t, const DescriptorMatrix& descriptors) {
     if (index++ % stride != 0) return;
     if (!samples.empty() && descriptors.cols() != samples[0].cols()) {
       throw SqliteError("descriptors of different lengths");
@@ -44,7 +44,7 @@ RowMatrixXf SampleDescriptors(const GlobalDescriptorOptions& options,
         std::min<int>(num_per_image, descriptors.rows()), descriptors.rows());
     RowMatrixXf sample(rows.size(), descriptors.cols());
     for (size_t i = 0; i < rows.size(); ++i) {
-      sample.row(i) = descriptors.row(rows[i]).cast<float>();
+      sample.row(i) = descriptors.row(rows[i]);
     }
     num_rows += sample.rows();
     samples.push_back(std::move(sample));
@@ -65,13 +65,13 @@ void ForEachVlad(
     SqliteConnection* database,
     const std::function<void(int, image_t, const Eigen::RowVectorXf&)>&
         function) {
-  std::vector<std::pair<image_t, DescriptorBytes>> block;
+  std::vector<std::pair<image_t, DescriptorMatrix>> block;
   std::vector<Eigen::RowVectorXf> vlads;
   int num_done = 0;
   const auto flush = [&] {
     vlads.resize(block.size());
     ParallelFor(num_threads, block.size(), [&](size_t i) {
-      vlads[i] = ComputeVlad(vocabulary, block[i].second.cast<float>());
+      vlads[i] = ComputeVlad(vocabulary, block[i].second);
     });
     for (size_t i = 0; i < block.size(); ++i) {
       function(num_done++, block[i].first, vlads[i]);
@@ -80,7 +80,7 @@ void ForEachVlad(
   };
   int index = 0;
   ReadDescriptors(database,
-                  [&](image_t image_id, const DescriptorBytes& descriptors) {
+                  [&](image_t image_id, const DescriptorMatrix& descriptors) {
                     if (index++ % stride != 0) return;
                     block.emplace_back(image_id, descriptors);
                     if (block.size() == kBlockSize) flush();

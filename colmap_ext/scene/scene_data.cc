@@ -6,6 +6,7 @@
 #include "colmap_ext/database/prior_corrections.h"
 #include "colmap_ext/database/prior_tables.h"
 #include "colmap_ext/database/two_view_geometry_backup.h"
+#include "colmap_ext/host/camera_models.h"
 #include "colmap_ext/host/database.h"
 #include "core/sqlite.h"
 
@@ -144,6 +145,8 @@ StatusOr<SceneData> ReadSceneData(const std::string& database_path,
   SceneData scene;
   try {
     SqliteConnection database(database_path, SqliteConnection::Mode::kRead);
+    const Status models = CheckCameraModels(database_path, &database);
+    if (!models.ok()) return models;
     scene.cameras = ReadCameras(&database);
     ReadSceneImages(&database, &scene);
     if (options.read_priors) ReadScenePriors(&database, options, &scene);

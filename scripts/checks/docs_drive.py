@@ -7,6 +7,7 @@ import struct
 import subprocess
 import sys
 
+from benchmarking.host_options import feature_groups
 from docs_bag import write_drive_bag
 from pair_recall import MAX_NUM_IMAGES
 
@@ -80,13 +81,15 @@ def write_program(path, text):
 def write_learned(colmap, folder, camera):
     """features/, matches.txt, vectors.txt and an HDF5 file as if made by
     networks; they are SIFT's, and descriptors that go by the order."""
+    extraction, matching = feature_groups(os.path.abspath(colmap))
     call(colmap, folder, 'feature_extractor', '--database_path', 'learned.db',
          '--image_path', 'photos', '--ImageReader.single_camera', '1',
          '--ImageReader.camera_model', 'PINHOLE', '--ImageReader.camera_params',
-         camera, '--SiftExtraction.use_gpu', '0',
+         camera, '--%s.use_gpu' % extraction, '0',
          '--SiftExtraction.max_num_features', '500')
     call(colmap, folder, 'sequential_matcher', '--database_path', 'learned.db',
-         '--SequentialMatching.overlap', '4', '--SiftMatching.use_gpu', '0')
+         '--SequentialMatching.overlap', '4',
+         '--%s.use_gpu' % matching, '0')
     database = sqlite3.connect(folder / 'learned.db')
     names = dict(database.execute('SELECT image_id, name FROM images'))
     write_features(database, names, folder / 'features')

@@ -132,6 +132,33 @@ TEST_F(AutomaticTest, PhotosAndSensorsThenAgainThenWithOtherOptions) {
   ExpectModel();
 }
 
+TEST_F(AutomaticTest, TheUsersColmapExtractsAndMatches) {
+  const std::string version = Call("adasfm_version").out;
+  std::smatch match;
+  ASSERT_TRUE(std::regex_search(version, match,
+                                std::regex("Host: +COLMAP \\S+ \\((.*)\\)")))
+      << version;
+  const std::string host = match[1].str();
+  // It fails half-way: one line, which names the log.
+  const std::string wrapper = WriteScript(
+      "[ \"$1\" = matches_importer ] && [ \"$2\" != -h ] && "
+      "echo broken && exit 3\nexec " +
+      host + " \"$@\"\n");
+  ExpectError(Photos(), "failed in matches_importer; see " + workspace_,
+              "ADASFM_HOST_COLMAP=" + wrapper);
+  EXPECT_TRUE(
+      Contains(ReadBytes(workspace_ + "/logs/features.log"), "Processed file"));
+  EXPECT_TRUE(Contains(ReadBytes(workspace_ + "/logs/matching.log"), "broken"));
+  // Again with one that works: the features stay.
+  const Run run = Call(Photos(), "ADASFM_HOST_COLMAP=" + host);
+  EXPECT_EQ(run.ExitCode(), 0) << run.err;
+  EXPECT_TRUE(Contains(run.out, "features: done before")) << run.out;
+  ExpectModel();
+  for (const auto& entry : fs::directory_iterator(workspace_ + "/logs")) {
+    EXPECT_EQ(entry.path().extension(), ".log") << entry.path();
+  }
+}
+
 TEST_F(AutomaticTest, TheWorkspaceMayLieAmongThePhotos) {
   const std::string photos = folder_.File("phötos of a day");
   fs::copy(drive_->File("images"), photos);

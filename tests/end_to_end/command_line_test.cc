@@ -12,6 +12,7 @@
 #include "colmap_ext/commands/registry.h"
 #include "colmap_ext/database/prior_tables.h"
 #include "colmap_ext/datasets/write_synthetic_world.h"
+#include "core/sqlite.h"
 #include "tests/testing/colmap_ext/command_line_fixture.h"
 #include "tests/testing/paths.h"
 
@@ -49,6 +50,64 @@ TEST_F(CommandLineTest, HostThatCannotRun) {
               std::string("ADASFM_HOST_COLMAP=") + LauncherPath());
 }
 
+TEST_F(CommandLineTest, VersionNamesLibraryAndHost) {
+  const Run own = Call("adasfm_version");
+  EXPECT_EQ(own.ExitCode(), 0);
+  EXPECT_NE(own.out.find("Library: COLMAP 3.8"), std::string::npos) << own.out;
+  const std::string host =
+      WriteScript("echo 'COLMAP 4.2.1 (Commit Unknown)'\n");
+  const Run other = Call("adasfm_version", "ADASFM_HOST_COLMAP=" + host);
+  EXPECT_NE(other.out.find("Host:    COLMAP 4.2.1 (" + host + ")"),
+            std::string::npos)
+      << other.out;
+  const Run none = Call("adasfm_version", "ADASFM_HOST_COLMAP=/nowhere/colmap");
+  EXPECT_EQ(none.ExitCode(), 0);
+  EXPECT_NE(none.out.find("/nowhere/colmap is no program"), std::string::npos);
+}
+
+TEST_F(CommandLineTest, WarnsBeforeTheHostSpoilsADatabase) {
+  const std::string database = folder_.File("it's.db");
+  const std::string quoted = "\"" + database + "\"";
+  const auto warning = [&](const std::string& version,
+                           const std::string& arguments) {
+    const std::string host =
+        WriteScript("echo 'COLMAP " + version + " -- Structure'\n");
+    return Call("mapper " + arguments, "ADASFM_HOST_COLMAP=" + host).err;
+  };
+  const std::string given = "--database_path " + quoted;
+  EXPECT_EQ(warning("3.8", given), "");  // no file yet
+  ASSERT_EQ(
+      Call("adasfm_synthesizer --num_images 4 --output_path " + folder_.Path())
+          .ExitCode(),
+      0);
+  std::filesystem::rename(folder_.File("database.db"), database);
+  EXPECT_EQ(warning("3.8", given), "");
+
+  const auto execute = [&](const std::string& sql) {
+    SqliteConnection(database, SqliteConnection::Mode::kWrite).Execute(sql);
+  };
+  execute(
+      "ALTER TABLE images DROP COLUMN prior_qw;"
+      "CREATE TABLE pose_priors (image_id INTEGER, position BLOB);");
+  for (const std::string& arguments :
+       {given, "--image_path x --database_path=" + quoted}) {
+    const std::string text = warning("3.8", arguments);
+    EXPECT_EQ(text.rfind("WARNING: " + database, 0), 0) << text;
+    EXPECT_NE(text.find("is of COLMAP 3.10 or later"), std::string::npos);
+  }
+  EXPECT_EQ(warning("3.10-dev", given), "");
+  EXPECT_EQ(warning("3.13.0", given), "");
+  EXPECT_NE(warning("4.2.1", given).find("ADD COLUMN position_covariance"),
+            std::string::npos);
+  execute("CREATE TABLE frames (frame_id INTEGER);");
+  EXPECT_NE(warning("3.11", given).find("3.12 or later"), std::string::npos);
+  execute(
+      "ALTER TABLE pose_priors DROP COLUMN image_id;"
+      "ALTER TABLE pose_priors ADD COLUMN corr_data_id INTEGER;");
+  EXPECT_NE(warning("3.13", given).find("4.0 or later"), std::string::npos);
+  EXPECT_EQ(warning("4.2.1", given), "");
+}
+
 TEST_F(CommandLineTest, HelpListsBoth) {
   for (const char* arguments : {"", "help", "-h", "--help"}) {
     const Run run = Call(arguments);
@@ -69,6 +128,8 @@ TEST_F(CommandLineTest, EveryCommandExplainsItself) {
     EXPECT_NE(run.out.find("--log_level"), std::string::npos) << command.name;
     ExpectError(std::string(command.name) + " --no_such_option 1",
                 "no_such_option");
+    // The one command that works on nothing.
+    if (std::string(command.name) == "adasfm_version") continue;
     ExpectError(command.name, "required but missing");
   }
 }

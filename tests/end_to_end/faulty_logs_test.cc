@@ -11,8 +11,8 @@
 #include <vector>
 
 #include "colmap_ext/database/prior_tables.h"
-#include "colmap_ext/io/sqlite.h"
 #include "core/so3.h"
+#include "core/sqlite.h"
 #include "tests/testing/colmap_ext/command_line_fixture.h"
 
 namespace adasfm {

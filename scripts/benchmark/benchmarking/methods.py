@@ -5,6 +5,7 @@ import json
 import os
 import shutil
 
+from benchmarking.host_options import solver_group
 from benchmarking.limit import write_true_poses
 from benchmarking.process import Failed, run
 from benchmarking.trajectories import write_prior_trajectory
@@ -92,10 +93,11 @@ def run_limit(folder, source, args):
        points, '--Mapper.ba_global_max_refinements', '1',
        '--Mapper.ba_global_max_num_iterations', '1'], log_path,
       args.timeout)}
+  solver = solver_group(host)
   steps['adjust'] = run(
       [host, 'bundle_adjuster', '--input_path', points, '--output_path',
-       output, '--BundleAdjustment.function_tolerance', '1e-6',
-       '--BundleAdjustment.max_num_iterations', '200'] +
+       output, '--%s.function_tolerance' % solver, '1e-6',
+       '--%s.max_num_iterations' % solver, '200'] +
       fixed_intrinsics('BundleAdjustment.'), log_path, args.timeout)
   return output, steps
 

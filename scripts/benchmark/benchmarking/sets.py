@@ -5,6 +5,7 @@ import os
 import re
 import shutil
 
+from benchmarking.host_options import feature_groups
 from benchmarking.process import run
 
 
@@ -77,15 +78,16 @@ def make_database(name, folder, args):
   temporary = database + '.part'
   if os.path.exists(temporary):
     os.remove(temporary)
+  extraction, matching = feature_groups(args.colmap)
   run([args.colmap, 'feature_extractor', '--database_path', temporary,
        '--image_path', os.path.join(source, 'images'),
        '--ImageReader.single_camera', '1',
        '--ImageReader.camera_model', 'PINHOLE', '--ImageReader.camera_params',
        camera_params(os.path.join(source, 'sensors.yaml')),
-       '--SiftExtraction.use_gpu', '0',
+       '--%s.use_gpu' % extraction, '0',
        '--SiftExtraction.max_num_features', '2000'], log_path)
   run([args.colmap, 'sequential_matcher', '--database_path', temporary,
-       '--SequentialMatching.overlap', '8', '--SiftMatching.use_gpu', '0'],
+       '--SequentialMatching.overlap', '8', '--%s.use_gpu' % matching, '0'],
       log_path)
   os.rename(temporary, database)
   return source

@@ -4,6 +4,9 @@
 #include <base/database.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <filesystem>
+
 #include "colmap_ext/datasets/write_synthetic_world.h"
 #include "colmap_ext/scene/scene_data.h"
 #include "core/so3.h"
@@ -58,6 +61,52 @@ class TwoViewGeometryBackupTest : public testing::Test {
     }
     return text;
   }
+
+  void CopyTo(const std::string& name) {
+    std::filesystem::copy_file(path_, folder_.File(name));
+  }
+
+  // What COLMAP 4 does to a file of COLMAP 3.8 when it opens it.
+  void MigrateToColmap4() {
+    Execute(
+        "ALTER TABLE two_view_geometries ADD COLUMN camera1 BLOB;"
+        "ALTER TABLE two_view_geometries ADD COLUMN camera2 BLOB;"
+        "ALTER TABLE descriptors ADD COLUMN type INTEGER NOT NULL DEFAULT 0;"
+        "UPDATE two_view_geometries SET qvec = NULL, tvec = NULL WHERE "
+        "hex(qvec) IN ('', " +
+        kZeroPose + ", " + kNegativeZeroPose +
+        ") OR (hex(qvec) = " + kIdentity + " AND tvec = zeroblob(24));");
+    for (const std::string matrix : {"F", "E", "H"}) {
+      Execute("UPDATE two_view_geometries SET " + matrix + " = NULL WHERE " +
+              matrix + " IN (X'', zeroblob(72));");
+    }
+    Execute("PRAGMA user_version = 4020100;");
+  }
+
+  // Poses that mean "none" in COLMAP 3, and matrices, on pairs of every kind.
+  void WriteMissingPoses() {
+    const std::string every =
+        " WHERE pair_id IN (SELECT pair_id FROM "
+        "(SELECT pair_id, row_number() OVER (ORDER BY pair_id) AS n FROM "
+        "two_view_geometries) WHERE n % 4 = ";
+    Execute(
+        "UPDATE two_view_geometries SET E = zeroblob(72), H = zeroblob(72);"
+        "UPDATE two_view_geometries SET tvec = zeroblob(24), qvec = X" +
+        kNegativeZeroPose + every + "1);" +
+        "UPDATE two_view_geometries SET tvec = zeroblob(24), qvec = X" +
+        kIdentity + every + "2);" +
+        "UPDATE two_view_geometries SET tvec = zeroblob(24), qvec = "
+        "zeroblob(32)" +
+        every + "3);");
+  }
+
+  // As hexadecimal text: zeros, as COLMAP 3.8 writes them, and w = 1.
+  const std::string kZeroPose = "'" + std::string(64, '0') + "'";
+  const std::string kNegativeZeroPose = "'0000000000000000" +
+                                        std::string("0000000000000080") +
+                                        "00000000000000800000000000000080'";
+  const std::string kIdentity =
+      "'000000000000F03F" + std::string(48, '0') + "'";
 
   TemporaryFolder folder_;
   std::string path_ = folder_.File("database.db");
@@ -147,6 +196,97 @@ TEST_F(TwoViewGeometryBackupTest, RowsThatColmapWroteSinceStay) {
   EXPECT_EQ(restored->num_restored, rows_.size() + removed_.size() - 2);
   const std::string dump = Dump("two_view_geometries");
   EXPECT_NE(dump.find(pair2 + "|0|2|X''|1|"), std::string::npos);
+  // What did not go back is not lost.
+  const std::string kept = Dump(kTwoViewGeometryBackupTable);
+  EXPECT_EQ(std::count(kept.begin(), kept.end(), '\n'), 2);
+  EXPECT_EQ(kept.find(pair1 + "|") == std::string::npos, false);
+  // Verified anew, they are the originals of the next run.
+  ASSERT_TRUE(RewriteTwoViewGeometries(path_, rows_, removed_).ok());
+  EXPECT_EQ(RestoreTwoViewGeometries(path_)->num_outdated, 0);
+  EXPECT_EQ(Dump("two_view_geometries"), dump);
+}
+
+TEST_F(TwoViewGeometryBackupTest, RestoresAfterColmap4OpenedTheFile) {
+  WriteMissingPoses();
+  CopyTo("migrated.db");
+  const std::string written_by_us = path_;
+  path_ = folder_.File("migrated.db");
+  MigrateToColmap4();
+  const std::string expected = Dump("two_view_geometries");
+  ASSERT_NE(expected.find("|NULL"), std::string::npos);
+
+  path_ = written_by_us;
+  ASSERT_TRUE(RewriteTwoViewGeometries(path_, rows_, removed_).ok());
+  MigrateToColmap4();
+  const StatusOr<RestoreSummary> restored = RestoreTwoViewGeometries(path_);
+  ASSERT_TRUE(restored.ok()) << restored.status().message();
+  EXPECT_EQ(restored->num_restored, rows_.size() + removed_.size());
+  EXPECT_EQ(restored->num_outdated, 0);
+  EXPECT_EQ(Dump("two_view_geometries"), expected);
+}
+
+TEST_F(TwoViewGeometryBackupTest, RewritesAgainAfterColmap4OpenedTheFile) {
+  WriteMissingPoses();
+  const std::string expected_pairs = Dump("two_view_geometries");
+  ASSERT_TRUE(RewriteTwoViewGeometries(path_, rows_, removed_).ok());
+  const std::string once = Dump("two_view_geometries");
+  MigrateToColmap4();
+  ASSERT_TRUE(RewriteTwoViewGeometries(path_, rows_, removed_).ok());
+  EXPECT_EQ(Dump("two_view_geometries"), once);
+  EXPECT_EQ(RestoreTwoViewGeometries(path_)->num_restored,
+            rows_.size() + removed_.size());
+  const std::string dump = Dump("two_view_geometries");
+  EXPECT_EQ(std::count(dump.begin(), dump.end(), '\n'),
+            std::count(expected_pairs.begin(), expected_pairs.end(), '\n'));
+}
+
+// Version 0.1.0 wrote H as zeros, and kept no more columns than COLMAP 3.8 has.
+TEST_F(TwoViewGeometryBackupTest, RestoresWhatVersion010Wrote) {
+  const std::string original = Dump("two_view_geometries");
+  ASSERT_TRUE(RewriteTwoViewGeometries(path_, rows_, removed_).ok());
+  Execute("UPDATE two_view_geometries SET H = zeroblob(72);");
+  EXPECT_EQ(RestoreTwoViewGeometries(path_)->num_outdated, 0);
+  EXPECT_EQ(Dump("two_view_geometries"), original);
+}
+
+TEST_F(TwoViewGeometryBackupTest, KeepsColumnsOfANewerColmap) {
+  MigrateToColmap4();
+  Execute("UPDATE two_view_geometries SET camera1 = X'0102', camera2 = X'03';");
+  ASSERT_TRUE(RewriteTwoViewGeometries(path_, rows_, removed_).ok());
+  const auto count = [this](const std::string& where) {
+    SqliteConnection database(path_, SqliteConnection::Mode::kRead);
+    SqliteStatement statement(
+        &database, "SELECT count(*) FROM two_view_geometries WHERE " + where);
+    statement.Step();
+    return statement.Int(0);
+  };
+  // The rows of ours have no such camera.
+  EXPECT_EQ(count("camera1 IS NULL AND camera2 IS NULL"), rows_.size());
+  ASSERT_TRUE(RestoreTwoViewGeometries(path_).ok());
+  EXPECT_EQ(count("camera1 = X'0102' AND camera2 = X'03'"),
+            rows_.size() + removed_.size());
+}
+
+TEST_F(TwoViewGeometryBackupTest, AddsThePosesThatColmap36LacksColumnsFor) {
+  Execute(
+      "ALTER TABLE two_view_geometries DROP COLUMN qvec;"
+      "ALTER TABLE two_view_geometries DROP COLUMN tvec;");
+  const Status rewritten = RewriteTwoViewGeometries(path_, rows_, removed_);
+  ASSERT_TRUE(rewritten.ok()) << rewritten.message();
+  SceneDataOptions options;
+  options.min_num_matches = 0;
+  const StatusOr<SceneData> written = ReadSceneData(path_, options);
+  EXPECT_EQ(written->pairs.size(), rows_.size());
+  for (const ScenePair& pair : written->pairs) {
+    EXPECT_TRUE(pair.cam2_from_cam1.has_value());
+  }
+  EXPECT_EQ(RestoreTwoViewGeometries(path_)->num_restored,
+            rows_.size() + removed_.size());
+  const StatusOr<SceneData> restored = ReadSceneData(path_, options);
+  EXPECT_EQ(restored->pairs.size(), world_.pairs.size());
+  for (const ScenePair& pair : restored->pairs) {
+    EXPECT_FALSE(pair.cam2_from_cam1.has_value());
+  }
 }
 
 TEST_F(TwoViewGeometryBackupTest, ErrorLeavesTheDatabaseAsItWas) {

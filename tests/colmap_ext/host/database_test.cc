@@ -3,7 +3,15 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+#include <cstdio>
+#include <cstring>
+#include <sstream>
+
 #include "colmap_ext/datasets/write_synthetic_world.h"
+#include "colmap_ext/host/camera.h"
+#include "colmap_ext/host/database_schema.h"
+#include "colmap_ext/host/features.h"
 #include "colmap_ext/scene/scene_data.h"
 #include "core/sqlite.h"
 #include "tests/testing/colmap_ext/temporary_folder.h"
@@ -63,9 +71,93 @@ TEST_F(DatabaseTest, RefusesOtherSqliteFiles) {
   ExpectRefused(path_, "table matches is missing");
 }
 
-TEST_F(DatabaseTest, RefusesANewerSchema) {
-  Execute("CREATE TABLE frames (frame_id INTEGER);");
-  ExpectRefused(path_, "newer COLMAP");
+TEST_F(DatabaseTest, ReadsWhatANewerColmapWroteButNotThroughTheLibrary) {
+  EXPECT_TRUE(CheckLibraryOpens(path_).ok());
+  EXPECT_TRUE(CheckLibraryOpens(folder_.File("missing.db")).ok());
+  const StatusOr<SceneData> before = ReadSceneData(path_, SceneDataOptions());
+  ASSERT_TRUE(before.ok());
+  Execute(
+      "CREATE TABLE pose_priors (pose_prior_id INTEGER);"
+      "CREATE TABLE frames (frame_id INTEGER);"
+      "ALTER TABLE images DROP COLUMN prior_qw;");
+  const StatusOr<SceneData> scene = ReadSceneData(path_, SceneDataOptions());
+  ASSERT_TRUE(scene.ok()) << scene.status().message();
+  EXPECT_EQ(scene->pairs.size(), before->pairs.size());
+
+  // Not even the version that the file says changes.
+  const std::string bytes = ReadBytes(path_);
+  const ProgressCallback progress = [](const std::string&, double) {};
+  const FeatureOptions options;
+  for (const Status& status :
+       {CheckLibraryOpens(path_),
+        RegisterImages(options, folder_.Path(), {"a.png"}, path_, progress)
+            .status(),
+        ExtractFeatures(options, folder_.Path(), path_, folder_.File("log"),
+                        progress),
+        MatchPairs(options, {ImagePair(1, 2)}, path_, folder_.File("log"),
+                   progress)}) {
+    ASSERT_FALSE(status.ok());
+    EXPECT_NE(status.message().find("newer COLMAP"), std::string::npos)
+        << status.message();
+  }
+  EXPECT_EQ(ReadBytes(path_), bytes);
+}
+
+TEST_F(DatabaseTest, ReadsTheDatabaseOfColmap36) {
+  Execute(
+      "ALTER TABLE two_view_geometries DROP COLUMN qvec;"
+      "ALTER TABLE two_view_geometries DROP COLUMN tvec;");
+  const StatusOr<SceneData> scene = ReadSceneData(path_, SceneDataOptions());
+  ASSERT_TRUE(scene.ok()) << scene.status().message();
+  EXPECT_EQ(scene->pairs.size(), world_.pairs.size());
+  for (const ScenePair& pair : scene->pairs) {
+    EXPECT_FALSE(pair.cam2_from_cam1.has_value());
+  }
+}
+
+// Doubles as a literal of SQL.
+std::string ParamsBlob(const std::vector<double>& params) {
+  std::ostringstream hex;
+  for (const double value : params) {
+    unsigned char bytes[sizeof(double)];
+    std::memcpy(bytes, &value, sizeof(double));
+    for (const unsigned char byte : bytes) {
+      char text[3];
+      std::snprintf(text, sizeof(text), "%02X", byte);
+      hex << text;
+    }
+  }
+  return "X'" + hex.str() + "'";
+}
+
+// A ray at the angle theta from the axis is at the distance f * theta from the
+// principal point.
+TEST_F(DatabaseTest, ConvertsEquidistantCameras) {
+  const std::pair<int, std::vector<double>> cameras[] = {
+      {14, {300.0, 320.0, 240.0}}, {15, {300.0, 280.0, 320.0, 240.0}}};
+  for (const auto& [model_id, params] : cameras) {
+    Execute("UPDATE cameras SET model = " + std::to_string(model_id) +
+            ", params = " + ParamsBlob(params) + ";");
+    const StatusOr<SceneData> scene = ReadSceneData(path_, SceneDataOptions());
+    ASSERT_TRUE(scene.ok()) << scene.status().message();
+    const colmap::Camera& camera = scene->cameras.begin()->second;
+    EXPECT_EQ(camera.ModelName(), "OPENCV_FISHEYE");
+    const double theta = 0.9, phi = 0.4;
+    const Eigen::Vector3d ray(std::sin(theta) * std::cos(phi),
+                              std::sin(theta) * std::sin(phi), std::cos(theta));
+    const Eigen::Vector2d expected(
+        320.0 + params[0] * theta * std::cos(phi),
+        240.0 + params[params.size() - 3] * theta * std::sin(phi));
+    EXPECT_LT((ProjectPoint(camera, ray).value() - expected).norm(), 1e-9);
+  }
+}
+
+TEST_F(DatabaseTest, NamesCameraModelsThatCannotBeConverted) {
+  Execute("UPDATE cameras SET model = 16, params = zeroblob(48);");
+  const StatusOr<SceneData> scene = ReadSceneData(path_, SceneDataOptions());
+  ASSERT_FALSE(scene.ok());
+  EXPECT_NE(scene.status().message().find("EUCM"), std::string::npos);
+  EXPECT_EQ(scene.status().message().find("damaged"), std::string::npos);
 }
 
 TEST_F(DatabaseTest, ReadsTheSceneAndChangesNothing) {

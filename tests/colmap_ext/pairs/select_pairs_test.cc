@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <iomanip>
+#include <map>
 #include <opencv2/imgcodecs.hpp>
 #include <set>
 #include <sstream>
@@ -265,6 +266,52 @@ TEST_F(SelectPairsTest, TakesDescriptorsFromElsewhere) {
   ExpectError(options + folder_.Write("d.txt", "other.png 1 2\n"),
               "none of its 1 images");
   ExpectError(options + folder_.Write("e.txt", "x.png 0 0\n"), "is zero");
+}
+
+// COLMAP 4 has floats in the table of bytes, and their kind in a column.
+TEST_F(SelectPairsTest, LearnedDescriptorsOfTheDatabaseAreFloats) {
+  MakeDatabase(SmallWorld(30));
+  const PairSelection of_bytes = Select(PairSelectionOptions());
+  EXPECT_GT(of_bytes.num_similar, 0);
+  {
+    SqliteConnection database(database_, SqliteConnection::Mode::kWrite);
+    database.Execute(
+        "ALTER TABLE descriptors ADD COLUMN type INTEGER NOT NULL DEFAULT 0;");
+    std::map<int64_t, std::vector<float>> floats;
+    {
+      SqliteStatement read(&database, "SELECT image_id, data FROM descriptors");
+      while (read.Step()) {
+        const auto* bytes = static_cast<const uint8_t*>(read.Blob(1));
+        for (size_t i = 0; i < read.NumBytes(1); ++i) {
+          floats[read.Int(0)].push_back(bytes[i] / 512.0f);
+        }
+      }
+    }
+    SqliteStatement write(&database,
+                          "UPDATE descriptors SET type = 1, cols = 4 * cols, "
+                          "data = ? WHERE image_id = ?");
+    for (const auto& [image_id, values] : floats) {
+      write.Reset();
+      write.BindBlob(1, values.data(), values.size() * sizeof(float));
+      write.BindInt(2, image_id);
+      write.Step();
+    }
+  }
+  const PairSelection of_floats = Select(PairSelectionOptions());
+  EXPECT_EQ(of_floats.pairs, of_bytes.pairs);
+
+  const auto expect_error = [this](const std::string& change,
+                                   const std::string& message) {
+    SqliteConnection(database_, SqliteConnection::Mode::kWrite).Execute(change);
+    const auto selection = SelectPairs(PairSelectionOptions(), database_);
+    ASSERT_FALSE(selection.ok());
+    EXPECT_NE(selection.status().message().find(message), std::string::npos)
+        << selection.status().message();
+  };
+  expect_error("UPDATE descriptors SET type = 2 WHERE image_id > 10",
+               "another type");
+  expect_error("UPDATE descriptors SET type = 7",
+               "--AdaSfmPairs.descriptors_path");
 }
 
 TEST_F(SelectPairsTest, WrongInputIsOneLine) {

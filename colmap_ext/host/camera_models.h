@@ -1,0 +1,29 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "core/sqlite.h"
+#include "core/status.h"
+
+namespace adasfm {
+
+// Camera models that newer COLMAPs have and the linked library has not.
+
+bool IsNewerCameraModel(int model_id);
+
+// COLMAP's name of any model up to version 4.2, as "PINHOLE"; "number N" for
+// another.
+std::string CameraModelName(int model_id);
+
+// Replaces a model that the linked library lacks by one that it has with
+// exactly the same projection: FISHEYE and SIMPLE_FISHEYE (equidistant) by
+// OPENCV_FISHEYE without distortion. Others stay as they are.
+void ConvertCameraModel(int* model_id, std::vector<double>* params);
+
+// An error, naming the model, when a camera's model is a newer COLMAP's and
+// cannot be converted.
+Status CheckCameraModels(const std::string& path, SqliteConnection* database);
+
+}  // namespace adasfm

@@ -1,0 +1,142 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "colmap_ext/host/frames.h"
+
+#include <gtest/gtest.h>
+
+#include <cstring>
+
+#include "colmap_ext/datasets/write_synthetic_world.h"
+#include "colmap_ext/host/model.h"
+#include "colmap_ext/host/model_folder.h"
+#include "colmap_ext/host/pose_conversion.h"
+#include "core/sqlite.h"
+#include "tests/testing/colmap_ext/reshape_database.h"
+#include "tests/testing/colmap_ext/temporary_folder.h"
+
+namespace adasfm {
+namespace {
+
+class FramesTest : public testing::Test {
+ protected:
+  FramesTest() {
+    SyntheticWorldOptions options;
+    options.num_images = 4;
+    options.num_keypoints_per_image = 40;
+    EXPECT_TRUE(
+        WriteSyntheticDatabase(BuildSyntheticWorld(options), path_).ok());
+  }
+
+  void Execute(const std::string& sql) {
+    SqliteConnection(path_, SqliteConnection::Mode::kWrite).Execute(sql);
+  }
+
+  DatabaseFrames ReadFrames() {
+    const StatusOr<DatabaseFrames> frames = ReadDatabaseFrames(path_);
+    EXPECT_TRUE(frames.ok()) << frames.status().message();
+    return frames.ok() ? *frames : DatabaseFrames();
+  }
+
+  TemporaryFolder folder_;
+  std::string path_ = folder_.File("database.db");
+};
+
+TEST_F(FramesTest, AreNeededForOtherIdsOnly) {
+  EXPECT_TRUE(ReadFrames().frames.empty());
+  ReshapeDatabase(path_, "4.2");
+  EXPECT_TRUE(ReadFrames().frames.empty());
+  Execute("UPDATE rigs SET rig_id = 7; UPDATE frames SET rig_id = 7;");
+  const DatabaseFrames frames = ReadFrames();
+  EXPECT_FALSE(frames.has_camera_rigs);
+  ASSERT_EQ(frames.frames.size(), 4);
+  EXPECT_EQ(frames.frames.at(3).frame_id, 3);
+  EXPECT_EQ(frames.frames.at(3).rig_id, 7);
+}
+
+TEST_F(FramesTest, RigsOfSeveralCamerasAreFound) {
+  ReshapeDatabase(path_, "4.2, other frames");
+  // Two images in one frame.
+  Execute("UPDATE frame_data SET frame_id = 101 WHERE data_id = 2;");
+  EXPECT_TRUE(ReadFrames().has_camera_rigs);
+  EXPECT_TRUE(ReadFrames().frames.empty());
+  // An image of a camera whose rig has another one as reference.
+  Execute(
+      "UPDATE frame_data SET frame_id = 102 WHERE data_id = 2;"
+      "UPDATE frame_data SET sensor_id = 9 WHERE data_id = 3;");
+  EXPECT_TRUE(ReadFrames().has_camera_rigs);
+}
+
+template <typename T>
+T Take(std::string* bytes) {
+  T value{};
+  EXPECT_GE(bytes->size(), sizeof(T));
+  std::memcpy(&value, bytes->data(), std::min(sizeof(T), bytes->size()));
+  bytes->erase(0, sizeof(T));
+  return value;
+}
+
+TEST_F(FramesTest, FilesSayTheIdsAndPosesOfRegisteredImages) {
+  colmap::Reconstruction model;
+  colmap::Camera camera;
+  camera.SetCameraId(2);
+  camera.InitializeWithName("PINHOLE", 500.0, 640, 480);
+  model.AddCamera(camera);
+  const Rigid3d pose(Eigen::Quaterniond(0.5, 0.5, -0.5, 0.5),
+                     Eigen::Vector3d(1.0, 2.0, 3.0));
+  for (const image_t image_id : {5, 6, 4}) {
+    colmap::Image image;
+    image.SetImageId(image_id);
+    image.SetCameraId(2);
+    image.SetName(std::to_string(image_id));
+    SetCamFromWorld(pose, &image);
+    model.AddImage(image);
+    if (image_id != 6) model.RegisterImage(image_id);
+  }
+  std::map<image_t, FrameOfImage> frames = {{4, {14, 3}}, {5, {15, 3}}};
+  ASSERT_TRUE(WriteModelFolder(folder_.Path(), {&model}, frames).ok());
+
+  std::string rigs = ReadBytes(folder_.File("0/rigs.bin"));
+  EXPECT_EQ(Take<uint64_t>(&rigs), 1);
+  EXPECT_EQ(Take<uint32_t>(&rigs), 3);  // the rig
+  EXPECT_EQ(Take<uint32_t>(&rigs), 1);  // of one
+  EXPECT_EQ(Take<int32_t>(&rigs), 0);   // camera,
+  EXPECT_EQ(Take<uint32_t>(&rigs), 2);  // this
+  EXPECT_TRUE(rigs.empty());
+
+  std::string file = ReadBytes(folder_.File("0/frames.bin"));
+  EXPECT_EQ(Take<uint64_t>(&file), 2);
+  for (const uint32_t image_id : {4, 5}) {
+    EXPECT_EQ(Take<uint32_t>(&file), image_id + 10);
+    EXPECT_EQ(Take<uint32_t>(&file), 3);
+    for (const double value : {0.5, 0.5, -0.5, 0.5, 1.0, 2.0, 3.0}) {
+      EXPECT_EQ(Take<double>(&file), value);
+    }
+    EXPECT_EQ(Take<uint32_t>(&file), 1);
+    EXPECT_EQ(Take<int32_t>(&file), 0);
+    EXPECT_EQ(Take<uint32_t>(&file), 2);
+    EXPECT_EQ(Take<uint64_t>(&file), image_id);
+  }
+  EXPECT_TRUE(file.empty());
+  // Models with the two files are read as others.
+  EXPECT_EQ(ReadModel(folder_.File("0"))->NumRegImages(), 2);
+  // Nothing half: an image without a frame is an error.
+  frames.erase(5);
+  EXPECT_FALSE(WriteModelFolder(folder_.Path(), {&model}, frames).ok());
+}
+
+TEST_F(FramesTest, ModelsWithUnknownCamerasAreNamed) {
+  std::string bytes(8 + 4, '\0');
+  bytes[0] = 1;
+  bytes[8] = 1;
+  bytes += std::string("\x10\0\0\0", 4) + std::string(16 + 6 * 8, '\0');
+  std::filesystem::create_directory(folder_.File("model"));
+  folder_.Write("model/cameras.bin", bytes);
+  folder_.Write("model/images.bin", std::string(8, '\0'));
+  folder_.Write("model/points3D.bin", std::string(8, '\0'));
+  const auto model = ReadModel(folder_.File("model"));
+  ASSERT_FALSE(model.ok());
+  EXPECT_NE(model.status().message().find("EUCM"), std::string::npos)
+      << model.status().message();
+}
+
+}  // namespace
+}  // namespace adasfm

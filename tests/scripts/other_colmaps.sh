@@ -1,0 +1,201 @@
+#!/usr/bin/env bash
+# SPDX-License-Identifier: BSD-3-Clause
+# Runs the chain with other COLMAPs than the one that we are linked with: each
+# extracts and matches rendered photos, and each takes our models. COLMAP 3.10
+# and 4 are Debian's packages of other releases, fetched once into ADASFM_CACHE
+# (1.1 GB); one that cannot be had is left out with one line.
+#
+#   other_colmaps.sh BUILD_DIR
+set -euo pipefail
+build=$(cd "$1" && pwd)
+here=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
+cache=${ADASFM_CACHE:-${XDG_CACHE_HOME:-$HOME/.cache}/adasfm}
+ours=$build/bin/colmap
+work=$(mktemp -d)
+trap 'rm -rf "$work"' EXIT
+
+fail() { echo "other_colmaps: $*" >&2; exit 1; }
+
+# call WHAT COMMAND...: shows the end of what it printed when it fails.
+call() {
+  local what=$1
+  shift
+  "$@" > "$work/log" 2>&1 || {
+    tail -n 5 "$work/log" >&2
+    fail "$what failed with exit code $?"
+  }
+}
+
+host() { ADASFM_HOST_COLMAP=${programs[$1]} call "$1 $2" "$ours" "${@:2}"; }
+
+# option_group HOST COMMAND GROUP NEW_GROUP: the group of use_gpu, which moved
+# in COLMAP 3.13.
+option_group() {
+  local group=$3
+  grep -q -- "--$4.use_gpu" <<< "$("${programs[$1]}" "$2" -h 2>&1)" && group=$4
+  echo "$group"
+}
+
+# database HOST FILE: makes a database of the photos with that COLMAP.
+database() {
+  local extraction matching
+  extraction=$(option_group "$1" feature_extractor SiftExtraction FeatureExtraction)
+  matching=$(option_group "$1" exhaustive_matcher SiftMatching FeatureMatching)
+  host "$1" feature_extractor --database_path "$2" --image_path "$photos" \
+    --ImageReader.single_camera 1 --ImageReader.camera_model PINHOLE \
+    --ImageReader.camera_params "$camera" --"$extraction.use_gpu" 0 \
+    --SiftExtraction.max_num_features 500
+  host "$1" exhaustive_matcher --database_path "$2" --"$matching.use_gpu" 0
+}
+
+# chain DATABASE FOLDER: importer, coarse model, mapper, and the check of both.
+chain() {
+  call adasfm_prior_importer "$ours" adasfm_prior_importer \
+    --database_path "$1" --image_times_path "$world/times.csv" \
+    --imu_path "$world/imu.csv" --wheel_path "$world/wheel.csv" \
+    --sensors_path "$world/sensors.yaml"
+  call adasfm_global "$ours" adasfm_global --database_path "$1" \
+    --output_path "$2/global"
+  call adasfm_mapper "$ours" adasfm_mapper --database_path "$1" \
+    --input_path "$2/global/0" --output_path "$2/sparse"
+  call adasfm_evaluator "$ours" adasfm_evaluator --input_path "$2/sparse/0" \
+    --ground_truth_path "$world/gt.txt" --json_path "$2/evaluation.json"
+  python3 - "$2/evaluation.json" <<'CHECK' || fail "the model in $2 is wrong"
+import json, sys
+figures = json.load(open(sys.argv[1]))
+assert figures['num_common_images'] == 8, figures
+# The drive is 7 m long; no error of this size is visible.
+assert figures['se3']['translation_rmse_m'] < 0.02, figures
+CHECK
+}
+
+# takes_model HOST MODEL: its commands read the model.
+takes_model() {
+  rm -rf "$work/out"
+  mkdir -p "$work/out/dense" "$work/out/adjusted"
+  host "$1" model_analyzer --path "$2"
+  host "$1" image_undistorter --image_path "$photos" --input_path "$2" \
+    --output_path "$work/out/dense"
+  host "$1" bundle_adjuster --input_path "$2" --output_path "$work/out/adjusted"
+}
+
+# continues_model HOST DATABASE MODEL: those that read the database with it.
+continues_model() {
+  rm -rf "$work/out"
+  mkdir -p "$work/out/points" "$work/out/more"
+  host "$1" point_triangulator --database_path "$2" --image_path "$photos" \
+    --input_path "$3" --output_path "$work/out/points"
+  host "$1" mapper --database_path "$2" --image_path "$photos" \
+    --input_path "$3" --output_path "$work/out/more"
+}
+
+# warns HOST DATABASE WORDS: so does a command on a copy of the database, which
+# the host cannot use.
+warns() {
+  rm -f "$work"/copy.db*
+  cp "$2" "$work/copy.db"
+  ADASFM_HOST_COLMAP=${programs[$1]} "$ours" mapper --image_path "$photos" \
+    --database_path "$work/copy.db" --output_path "$work/out" \
+    > "$work/log" 2>&1 && fail "COLMAP $1 can use $2 after all"
+  grep -q "WARNING: $work/copy.db is of COLMAP $3" "$work/log" ||
+    fail "no warning before COLMAP $1 spoils $2"
+}
+
+rows() { sqlite3 "$1" 'SELECT pair_id, rows, cols, quote(data), config,
+  quote(F), quote(E), quote(H), quote(qvec), quote(tvec)
+  FROM two_view_geometries ORDER BY pair_id'; }
+
+declare -A programs=([3.8]=$(sed -nE \
+  's/^ADASFM_HOST_COLMAP:FILEPATH=(.*)/\1/p' "$build/CMakeCache.txt"))
+hosts=(3.8)
+for release in trixie sid; do
+  if program=$("$here/fetch_colmap.sh" "$cache/other" "$release"); then
+    name=$("$program" help 2> /dev/null | sed -nE '1s/COLMAP ([0-9.]+).*/\1/p')
+    programs[$name]=$program
+    hosts+=("$name")
+  else
+    echo "other_colmaps: left out the COLMAP of Debian $release"
+  fi
+done
+newest=${hosts[-1]}
+
+echo '== Rendering'
+world=$work/world
+mkdir -p "$world"
+call adasfm_synthesizer "$ours" adasfm_synthesizer --output_path "$world" \
+  --render 1 --num_images 8 --seed 2
+photos=$world/images
+camera=$(sed -nE 's/^ *intrinsics: *\[(.*)\]/\1/p' "$world/sensors.yaml" | tr -d ' ')
+
+for name in "${hosts[@]}"; do
+  echo "== Database of COLMAP $name"
+  folder=$work/$name
+  mkdir -p "$folder"
+  database "$name" "$folder/database.db"
+  cp "$folder/database.db" "$folder/original.db"
+  chain "$folder/database.db" "$folder"
+  continues_model "$name" "$folder/database.db" "$folder/sparse/0"
+  for other in "${hosts[@]}"; do
+    takes_model "$other" "$folder/sparse/0"
+  done
+  call adasfm_restorer "$ours" adasfm_restorer --database_path "$folder/database.db"
+  [ "$(rows "$folder/database.db")" = "$(rows "$folder/original.db")" ] ||
+    fail "the originals of COLMAP $name's database are not restored"
+done
+
+if [[ $newest == 4.* ]]; then
+  echo "== Database of COLMAP 3.8 that $newest opened after adasfm_global"
+  folder=$work/opened
+  mkdir -p "$folder"
+  cp "$work/3.8/original.db" "$folder/database.db"
+  cp "$work/3.8/original.db" "$folder/expected.db"
+  chain "$folder/database.db" "$folder"
+  continues_model "$newest" "$folder/database.db" "$folder/sparse/0"
+  call adasfm_restorer "$ours" adasfm_restorer --database_path "$folder/database.db"
+  # What it makes of the originals.
+  host "$newest" mapper --database_path "$folder/expected.db" \
+    --image_path "$photos" --input_path "$work/3.8/sparse/0" \
+    --output_path "$work/out/more"
+  [ "$(rows "$folder/database.db")" = "$(rows "$folder/expected.db")" ] ||
+    fail "the originals are not restored after COLMAP $newest opened the file"
+
+  echo "== Database of COLMAP $newest with other ids of frames than of images"
+  folder=$work/frames
+  mkdir -p "$folder"
+  cp "$work/$newest/original.db" "$folder/database.db"
+  sqlite3 "$folder/database.db" 'PRAGMA foreign_keys = OFF;
+    UPDATE frames SET frame_id = frame_id + 100;
+    UPDATE frame_data SET frame_id = frame_id + 100;'
+  chain "$folder/database.db" "$folder"
+  [ -f "$folder/sparse/0/frames.bin" ] || fail 'no frames.bin was written'
+  continues_model "$newest" "$folder/database.db" "$folder/sparse/0"
+  takes_model "$newest" "$folder/sparse/0"
+  host 3.8 model_analyzer --path "$folder/sparse/0"
+fi
+for name in "${hosts[@]}"; do
+  echo "== scripts/adasfm.sh with COLMAP $name"
+  COLMAP=$ours ADASFM_HOST_COLMAP=${programs[$name]} call adasfm.sh \
+    "$here/../../scripts/adasfm.sh" "$photos" "$work/script-$name" PINHOLE \
+    "$camera" "$world"
+done
+
+for name in "${hosts[@]:1}"; do
+  echo "== adasfm_automatic_reconstructor with COLMAP $name, interrupted and again"
+  reconstruct=(env ADASFM_HOST_COLMAP="${programs[$name]}"
+    "$ours" adasfm_automatic_reconstructor --image_path "$photos"
+    --workspace_path "$work/auto-$name" --camera_model PINHOLE
+    --camera_params "$camera" --max_num_features 500)
+  timeout -s INT 4 "${reconstruct[@]}" > "$work/log" 2>&1 || true
+  call adasfm_automatic_reconstructor "${reconstruct[@]}"
+  call model_analyzer "$ours" model_analyzer --path "$work/auto-$name/sparse/0"
+  grep -q 'Registered images: 8' "$work/log" || fail "images are missing"
+done
+
+if [ -n "${programs[3.10]:-}" ] && [[ $newest == 4.* ]]; then
+  echo '== Warnings'
+  warns 3.8 "$work/3.10/original.db" '3.10 or later'
+  warns 3.8 "$work/$newest/original.db" '4.0 or later'
+  warns 3.10 "$work/$newest/original.db" '4.0 or later'
+  warns "$newest" "$work/3.10/original.db" '3.10, which'
+fi
+echo 'other_colmaps: ok'
