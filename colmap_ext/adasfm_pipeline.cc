@@ -5,6 +5,8 @@
 
 #include <algorithm>
 #include <chrono>
+#include <filesystem>
+#include <memory>
 #include <sstream>
 #include <utility>
 
@@ -13,7 +15,9 @@
 #include "colmap_ext/host/model.h"
 #include "colmap_ext/host/model_folder.h"
 #include "colmap_ext/host/pose_conversion.h"
+#include "colmap_ext/io/folder_lock.h"
 #include "colmap_ext/io/output_files.h"
+#include "colmap_ext/mapper_stage/model_checkpoint.h"
 #include "core/check_options.h"
 #include "core/so3.h"
 
@@ -33,7 +37,7 @@ bool ChangesDatabase(const GlobalStageOptions& options) {
 Status CheckGlobalPaths(const GlobalStageOptions& options,
                         const std::string& database_path,
                         const std::string& output_path) {
-  const Status status = CheckDatabase(database_path);
+  Status status = CheckDatabase(database_path);
   if (!status.ok()) return status;
   if (ChangesDatabase(options) && access(database_path.c_str(), W_OK) != 0) {
     return Status::Error("the database " + database_path +
@@ -42,7 +46,8 @@ Status CheckGlobalPaths(const GlobalStageOptions& options,
                          "--AdaSfmGlobal.correct_camera_mount 0 "
                          "--AdaSfmGlobal.correct_rotation_rates 0");
   }
-  return PrepareOutputFolder(output_path);
+  status = PrepareOutputFolder(output_path);
+  return status.ok() ? CheckModelFolders(output_path) : status;
 }
 
 PriorCorrections CollectCorrections(const CoarsePoses& poses) {
@@ -92,6 +97,54 @@ Status CheckCoarseModel(const std::string& path) {
     }
   }
   return Status::Ok();
+}
+
+// The model would replace the one that it is made from, and summary.json what
+// is said about that.
+Status CheckIsNotBesideInput(const std::string& input_path,
+                             const std::string& output_path) {
+  namespace fs = std::filesystem;
+  std::error_code error;
+  const fs::path input = fs::canonical(input_path, error);
+  const bool is_beside =
+      !error && fs::equivalent(input.parent_path(), output_path, error);
+  if (!is_beside && !fs::equivalent(input, output_path, error)) {
+    return Status::Ok();
+  }
+  return Status::Error("the output folder " + output_path +
+                       " is that of the coarse model " + input_path +
+                       ", which would be replaced; choose another one");
+}
+
+// Before any work, as CheckGlobalPaths.
+Status CheckMapPaths(const MapRequest& request) {
+  Status status = CheckDatabase(request.database_path);
+  if (status.ok()) status = CheckCoarseModel(request.input_path);
+  if (status.ok()) status = PrepareOutputFolder(request.output_path);
+  if (status.ok()) {
+    status = CheckIsNotBesideInput(request.input_path, request.output_path);
+  }
+  if (status.ok()) status = CheckModelFolders(request.output_path);
+  if (status.ok()) {
+    status = CheckCheckpointFolder(request.output_path + "/checkpoints");
+  }
+  return status;
+}
+
+// Single parts may be made at the same time, each by one run.
+StatusOr<std::vector<std::shared_ptr<FolderLock>>> LockMapFolder(
+    const MapRequest& request) {
+  using Mode = FolderLock::Mode;
+  const bool is_part = request.steps == MapperSteps::kPart;
+  const auto whole = FolderLock::Acquire(
+      request.output_path, is_part ? Mode::kShared : Mode::kExclusive);
+  if (!whole.ok()) return whole.status();
+  if (!is_part) return std::vector<std::shared_ptr<FolderLock>>{*whole};
+  const auto part = FolderLock::Acquire(
+      request.output_path, Mode::kExclusive,
+      ".adasfm_part_" + std::to_string(request.part_index) + ".lock");
+  if (!part.ok()) return part.status();
+  return std::vector<std::shared_ptr<FolderLock>>{*whole, *part};
 }
 
 // Poses belong to the cameras that they were adjusted with.
@@ -231,6 +284,9 @@ StatusOr<CoarseModelReport> EstimateCoarseModel(
     status = CheckGlobalPaths(options, database_path, output_path);
   }
   if (!status.ok()) return status;
+  const auto lock =
+      FolderLock::Acquire(output_path, FolderLock::Mode::kExclusive);
+  if (!lock.ok()) return lock.status();
 
   if (progress) progress("reading", 0.0);
   SceneDataOptions scene_options;
@@ -269,10 +325,10 @@ StatusOr<MapReport> MapParts(const MapOptions& options,
                              const MapRequest& request,
                              const ProgressCallback& progress) {
   Status status = CheckOptions(options);
-  if (status.ok()) status = CheckDatabase(request.database_path);
-  if (status.ok()) status = CheckCoarseModel(request.input_path);
-  if (status.ok()) status = PrepareOutputFolder(request.output_path);
+  if (status.ok()) status = CheckMapPaths(request);
   if (!status.ok()) return status;
+  const auto locks = LockMapFolder(request);
+  if (!locks.ok()) return locks.status();
   StatusOr<SceneData> scene = ReadSceneData(request.database_path, {});
   if (!scene.ok()) return scene.status();
   MapReport report;

@@ -32,6 +32,12 @@ class Hash {
 
 }  // namespace
 
+std::string DigestText(const std::string& text) {
+  Hash hash;
+  hash.Add(text.data(), text.size());
+  return hash.Text();
+}
+
 StatusOr<std::string> DigestPath(const std::string& path) {
   if (path.empty()) return std::string("none");
   std::error_code error;

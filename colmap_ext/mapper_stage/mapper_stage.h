@@ -102,7 +102,7 @@ class MapperStage {
   const std::string& Fingerprint() const { return fingerprint_; }
 
  private:
-  Status ReadPlan();
+  Status ReadPlan(CheckpointCondition* condition = nullptr);
   Status RunPartWithThreads(int part_index, int num_threads);
   PartReport MapPart(int part_index, int num_threads,
                      LocalMapResult* result) const;
