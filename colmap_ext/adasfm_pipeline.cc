@@ -6,17 +6,21 @@
 #include <algorithm>
 #include <chrono>
 #include <filesystem>
+#include <fstream>
 #include <memory>
+#include <nlohmann/json.hpp>
 #include <sstream>
 #include <utility>
 
 #include "colmap_ext/coarse/global_report.h"
 #include "colmap_ext/database/two_view_geometry_backup.h"
+#include "colmap_ext/host/database.h"
 #include "colmap_ext/host/model.h"
 #include "colmap_ext/host/model_folder.h"
 #include "colmap_ext/host/pose_conversion.h"
 #include "colmap_ext/io/folder_lock.h"
 #include "colmap_ext/io/output_files.h"
+#include "colmap_ext/io/sqlite.h"
 #include "colmap_ext/mapper_stage/model_checkpoint.h"
 #include "core/check_options.h"
 #include "core/so3.h"
@@ -31,6 +35,38 @@ constexpr char kNoPriorsWarning[] =
 bool ChangesDatabase(const GlobalStageOptions& options) {
   return options.refinement.enabled || options.poses.camera_mount.enabled ||
          options.poses.rotation_rates.enabled;
+}
+
+// Who forgot a matcher would get a model of the sensors alone.
+Status CheckHasMatches(const std::string& database_path,
+                       const SceneData& scene) {
+  const bool has_matches = std::any_of(
+      scene.pairs.begin(), scene.pairs.end(),
+      [](const auto& pair) { return !pair.inlier_matches.empty(); });
+  if (has_matches) return Status::Ok();
+  int num_matched = 0;
+  try {
+    SqliteConnection database(database_path, SqliteConnection::Mode::kRead);
+    CountMatches(&database, "matches", 1,
+                 [&num_matched](const ImagePair&, int64_t) { ++num_matched; });
+  } catch (const SqliteError& error) {
+    return Status::Error(database_path + ": " + error.what());
+  }
+  return Status::Error(
+      num_matched == 0
+          ? "no images of " + database_path +
+                " are matched; run a matcher of COLMAP first, such as "
+                "sequential_matcher or exhaustive_matcher"
+          : std::to_string(num_matched) + " pairs of " + database_path +
+                " have matches, but no pair has enough verified ones; match "
+                "more images, or check the camera's parameters");
+}
+
+// Of all models together.
+int CountPoints(const GlobalStageResult& result) {
+  int num_points = 0;
+  for (const CoarseModel& model : result.models) num_points += model.num_points;
+  return num_points;
 }
 
 // Before any work: nothing is lost when the result cannot be written.
@@ -65,6 +101,9 @@ Status WriteGlobalResult(const GlobalStageOptions& options,
                          const std::string& output_path, const SceneData& scene,
                          const CoarseModelReport& report) {
   const GlobalStageResult& result = report.result;
+  // One of an earlier run would speak of other models.
+  std::error_code none;
+  std::filesystem::remove(output_path + "/summary.json", none);
   std::vector<const colmap::Reconstruction*> models;
   for (const CoarseModel& model : result.models) {
     models.push_back(&model.reconstruction);
@@ -78,11 +117,6 @@ Status WriteGlobalResult(const GlobalStageOptions& options,
     status = RewriteTwoViewGeometries(database_path, result.geometries,
                                       result.removed_pairs,
                                       CollectCorrections(result.poses));
-  }
-  if (status.ok()) {
-    status =
-        WriteTextFile(output_path + "/summary.json",
-                      FormatGlobalReportJson(scene, result, report.seconds));
   }
   return status;
 }
@@ -191,6 +225,34 @@ StatusOr<CoarsePoseMap> ReadCoarseModel(const std::string& path,
   return poses;
 }
 
+// What a stage wrote about itself; empty when it left no summary.
+std::vector<std::string> ReadWarnings(const std::string& summary_path) {
+  std::ifstream file(summary_path);
+  const nlohmann::json json =
+      nlohmann::json::parse(file, nullptr, /*allow_exceptions=*/false);
+  std::vector<std::string> warnings;
+  if (!json.is_object() || !json.contains("warnings")) return warnings;
+  for (const nlohmann::json& warning : json["warnings"]) {
+    if (warning.is_string()) warnings.push_back(warning.get<std::string>());
+  }
+  return warnings;
+}
+
+std::vector<std::string> ReadEarlierWarnings(const MapRequest& request) {
+  std::vector<std::string> warnings;
+  // The importer's other warnings are about its input.
+  for (std::string& warning :
+       ReadWarnings(request.database_path + ".priors.json")) {
+    if (warning.find("contradict") == std::string::npos) continue;
+    warnings.push_back(std::move(warning));
+  }
+  for (std::string& warning :
+       ReadWarnings(request.input_path + "/../summary.json")) {
+    warnings.push_back(std::move(warning));
+  }
+  return warnings;
+}
+
 // The stage's options for this scene's cameras, with the thresholds that local
 // mapping and refinement share.
 MapperStageOptions ResolveOptions(const MapOptions& options,
@@ -213,30 +275,35 @@ MapperStageOptions ResolveOptions(const MapOptions& options,
   return stage;
 }
 
-Status MergeAndWrite(const std::string& output_path, MapperStage* stage) {
+Status MergeAndWrite(const MapRequest& request, const SceneData& scene,
+                     MapperStage* stage, MapReport* report) {
   const StatusOr<colmap::Reconstruction> model =
       stage->Merge(/*require_all_parts=*/true);
   if (!model.ok()) return model.status();
-  const Status status = WriteModelFolder(output_path, {&*model});
+  const Status status = WriteModelFolder(request.output_path, {&*model});
   if (!status.ok()) return status;
-  return WriteTextFile(output_path + "/summary.json",
-                       FormatMapperSummaryJson(stage->Summary()));
+  report->verdict = AssessModel(scene, stage->Summary(),
+                                ReadEarlierWarnings(request), *model);
+  return WriteTextFile(
+      request.output_path + "/summary.json",
+      FormatMapperSummaryJson(stage->Summary(), &*report->verdict));
 }
 
-Status RunMapperSteps(const MapRequest& request, MapperStage* stage) {
+Status RunMapperSteps(const MapRequest& request, const SceneData& scene,
+                      MapperStage* stage, MapReport* report) {
   switch (request.steps) {
     case MapperSteps::kPlan:
       return stage->Plan();
     case MapperSteps::kPart:
       return stage->RunPart(request.part_index);
     case MapperSteps::kMerge:
-      return MergeAndWrite(request.output_path, stage);
+      return MergeAndWrite(request, scene, stage, report);
     case MapperSteps::kAll:
       break;
   }
   Status status = stage->Plan();
   if (status.ok()) status = stage->RunAllParts();
-  if (status.ok()) status = MergeAndWrite(request.output_path, stage);
+  if (status.ok()) status = MergeAndWrite(request, scene, stage, report);
   return status;
 }
 
@@ -298,6 +365,8 @@ StatusOr<CoarseModelReport> EstimateCoarseModel(
   std::ostringstream text;
   text << scene->images.size() << " images, " << scene->pairs.size()
        << " verified pairs, " << scene->priors.size() << " priors";
+  status = CheckHasMatches(database_path, *scene);
+  if (!status.ok()) return status;
   const StepReport reading = {"reading", seconds(), text.str()};
 
   CoarseModelReport report;
@@ -306,6 +375,12 @@ StatusOr<CoarseModelReport> EstimateCoarseModel(
   StatusOr<GlobalStageResult> result =
       RunGlobalStage(options, *scene, progress);
   if (!result.ok()) return result.status();
+  if (CountPoints(*result) == 0) {
+    return Status::Error(
+        "no point of " + database_path +
+        " could be triangulated: the camera hardly moved, its parameters are "
+        "wrong, or the matches are those of other images");
+  }
   report.result = std::move(result).value();
   report.result.steps.insert(report.result.steps.begin(), reading);
   for (std::string& warning : ListGlobalWarnings(*scene, report.result)) {
@@ -318,6 +393,10 @@ StatusOr<CoarseModelReport> EstimateCoarseModel(
   report.result.steps.push_back(
       {"writing", seconds() - report.seconds, "models and matches"});
   report.seconds = seconds();
+  status = WriteTextFile(
+      output_path + "/summary.json",
+      FormatGlobalReportJson(*scene, report.result, report.seconds));
+  if (!status.ok()) return status;
   return report;
 }
 
@@ -331,6 +410,8 @@ StatusOr<MapReport> MapParts(const MapOptions& options,
   if (!locks.ok()) return locks.status();
   StatusOr<SceneData> scene = ReadSceneData(request.database_path, {});
   if (!scene.ok()) return scene.status();
+  status = CheckHasMatches(request.database_path, *scene);
+  if (!status.ok()) return status;
   MapReport report;
   const StatusOr<CoarsePoseMap> coarse =
       ReadCoarseModel(request.input_path, &report, &*scene);
@@ -340,7 +421,7 @@ StatusOr<MapReport> MapParts(const MapOptions& options,
   if (scene->priors.empty()) report.warnings.push_back(kNoPriorsWarning);
   MapperStage stage(ResolveOptions(options, *scene), *scene, *coarse,
                     request.output_path, progress);
-  status = RunMapperSteps(request, &stage);
+  status = RunMapperSteps(request, *scene, &stage, &report);
   if (!status.ok()) return status;
   report.summary = stage.Summary();
   return report;

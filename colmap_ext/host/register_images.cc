@@ -10,6 +10,7 @@
 #include <optional>
 #include <tuple>
 
+#include "colmap_ext/host/camera.h"
 #include "colmap_ext/host/features.h"
 #include "core/parallel.h"
 
@@ -46,8 +47,12 @@ bool ParseCameraParams(const FeatureOptions& options,
   } catch (const std::exception&) {
     return false;
   }
-  return colmap::CameraModelVerifyParams(
-      colmap::CameraModelNameToId(options.camera_model), *params);
+  const int model_id = colmap::CameraModelNameToId(options.camera_model);
+  if (!colmap::CameraModelVerifyParams(model_id, *params)) return false;
+  colmap::Camera camera;
+  camera.SetModelId(model_id);
+  camera.SetParams(*params);
+  return HasUsableParams(camera);
 }
 
 colmap::Camera MakeCamera(const FeatureOptions& options,
@@ -146,7 +151,8 @@ bool FeatureOptions::IsValid(std::string* error) const {
              " must be one of COLMAP's, as PINHOLE or OPENCV_FISHEYE";
   } else if (!ParseCameraParams(*this, &params)) {
     *error = "camera_params = " + camera_params +
-             " must be the parameters of " + camera_model + ": " +
+             " must be the parameters, and the focal length positive, of " +
+             camera_model + ": " +
              colmap::CameraModelParamsInfo(
                  colmap::CameraModelNameToId(camera_model));
   } else if (single_camera < -1 || single_camera > 1) {

@@ -92,6 +92,19 @@ Status WriteTextFile(const std::string& path, const std::string& text) {
   return SyncToDisk(folder.empty() ? "." : folder);
 }
 
+Status CheckOutputFile(const std::string& path) {
+  const fs::path folder = fs::path(path).parent_path();
+  std::error_code none;
+  if (fs::is_directory(path, none)) {
+    return Status::Error("cannot write " + path +
+                         ": it is a folder; choose a file in it");
+  }
+  if (access(folder.empty() ? "." : folder.c_str(), W_OK | X_OK) == 0) {
+    return Status::Ok();
+  }
+  return Status::Error("cannot write " + path + ": " + ReasonAndAdvice(errno));
+}
+
 Status CheckOutputIsNoInput(
     const std::string& output_path,
     const std::vector<std::pair<std::string, std::string>>& inputs) {
@@ -110,14 +123,15 @@ Status SyncToDisk(const std::string& path) {
   if (error == 0 && fsync(file) != 0) error = errno;
   if (file >= 0) close(file);
   if (error == 0 || IsUnsupported(error)) return Status::Ok();
-  return Status::Error("cannot write " + path + " to the disk: " +
-                       ReasonAndAdvice(error));
+  return Status::Error("cannot write " + path +
+                       " to the disk: " + ReasonAndAdvice(error));
 }
 
 std::string DescribeWriteFailure(const std::string& path) {
   const int file = open(path.c_str(), O_WRONLY | O_APPEND | O_CLOEXEC);
   if (file < 0) return ReasonAndAdvice(errno);
-  int error = WriteAll(file, std::string(kProbeBytes, '\0').data(), kProbeBytes);
+  int error =
+      WriteAll(file, std::string(kProbeBytes, '\0').data(), kProbeBytes);
   if (error == 0 && fsync(file) != 0) error = errno;
   close(file);
   return error != 0 ? ReasonAndAdvice(error)

@@ -17,6 +17,10 @@ Status PrepareOutputFolder(const std::string& path);
 // renames it. The error names the cause, such as a full disk.
 Status WriteTextFile(const std::string& path, const std::string& text);
 
+// An error when no file can be written there: the folder is missing or not
+// writable, or the path is a folder.
+Status CheckOutputFile(const std::string& path);
+
 // An error when the output is one of the inputs, under whatever name. An input
 // is the option that names it and its path; empty paths are passed over.
 Status CheckOutputIsNoInput(

@@ -33,9 +33,14 @@ LocalMapperOptions StricterOptions(LocalMapperOptions options) {
   return options;
 }
 
-bool IsMetric(const SceneData& data) {
-  return std::any_of(data.priors.begin(), data.priors.end(),
-                     [](const auto& prior) { return prior.HasLength(); });
+// Lengths between other images, such as those of another coarse model, say
+// nothing.
+bool IsMetric(const SceneData& data, const CoarsePoseMap& coarse) {
+  return std::any_of(
+      data.priors.begin(), data.priors.end(), [&coarse](const auto& prior) {
+        return prior.HasLength() && coarse.count(prior.image_id1) > 0 &&
+               coarse.count(prior.image_id2) > 0;
+      });
 }
 
 MapperStageOptions WithThreads(MapperStageOptions options) {
@@ -80,7 +85,7 @@ MapperStage::MapperStage(const MapperStageOptions& options,
       part_mapper_(std::move(part_mapper)) {
   std::string error;
   if (!options.IsValid(&error)) throw std::invalid_argument(error);
-  summary_.is_metric = IsMetric(data);
+  summary_.is_metric = IsMetric(data, coarse);
 }
 
 void MapperStage::Report(const std::string& line, double share_done) const {
