@@ -95,12 +95,28 @@ PriorCorrections CollectCorrections(const CoarsePoses& poses) {
   return corrections;
 }
 
+// Waits for another writer, and gives up before anything is replaced.
+Status CheckDatabaseIsFree(const std::string& database_path) {
+  try {
+    SqliteConnection database(database_path, SqliteConnection::Mode::kWrite);
+    SqliteTransaction transaction(&database);
+    return Status::Ok();
+  } catch (const SqliteError& error) {
+    return Status::Error(database_path + ": " + error.what() +
+                         "; nothing was written");
+  }
+}
+
 // The models first: a crash in between leaves the database as it was.
 Status WriteGlobalResult(const GlobalStageOptions& options,
                          const std::string& database_path,
                          const std::string& output_path, const SceneData& scene,
                          const CoarseModelReport& report) {
   const GlobalStageResult& result = report.result;
+  if (ChangesDatabase(options)) {
+    const Status free = CheckDatabaseIsFree(database_path);
+    if (!free.ok()) return free;
+  }
   // One of an earlier run would speak of other models.
   std::error_code none;
   std::filesystem::remove(output_path + "/summary.json", none);

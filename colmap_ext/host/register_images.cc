@@ -117,6 +117,11 @@ class ImageWriter {
     return Status::Ok();
   }
 
+  // COLMAP reports no failed write.
+  bool IsComplete() const {
+    return static_cast<int>(database_.NumImages()) == result_.num_images;
+  }
+
   ImageRegistration& Result() { return result_; }
 
  private:
@@ -206,6 +211,11 @@ StatusOr<ImageRegistration> RegisterImages(
     return Status::Error("none of the " + std::to_string(names.size()) +
                          " files in " + image_path +
                          " is an image; check --image_path");
+  }
+  if (!writer.IsComplete()) {
+    return Status::Error(database_path +
+                         ": not all images could be written; make sure that "
+                         "the disk has room, and run again");
   }
   return writer.Result();
 }

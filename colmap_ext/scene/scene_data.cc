@@ -147,6 +147,10 @@ void ReadScenePairs(SqliteConnection* database, const SceneDataOptions& options,
                     SceneData* scene) {
   int num_unknown = 0;
   for (auto& [pair, row] : ReadRows(database, options)) {
+    if (pair.image_id1 == pair.image_id2) {
+      throw SqliteError("an image, id " + std::to_string(pair.image_id1) +
+                        ", is paired with itself");
+    }
     // COLMAP leaves the pairs of deleted images in the table.
     if (scene->images.count(pair.image_id1) == 0 ||
         scene->images.count(pair.image_id2) == 0) {

@@ -140,7 +140,7 @@ TEST_F(FilesTest, CameraThatIsNone) {
 TEST_F(FilesTest, ForeignFilesStay) {
   fs::create_directory(folder_.File("0"));
   const std::string photo = folder_.Write("0/photo.jpg", "x");
-  ExpectError(Global("."), photo);
+  ExpectError(Global("."), "/0/photo.jpg, which is no file of a model");
   EXPECT_EQ(ReadBytes(photo), "x");
   ASSERT_EQ(Call(Global("g")).ExitCode(), 0);
   fs::create_directories(folder_.File("m/checkpoints"));
@@ -183,6 +183,16 @@ TEST_F(FilesTest, SecondRunIsToldWhoHasTheFolder) {
       FolderLock::Acquire(folder_.File("g"), FolderLock::Mode::kExclusive);
   ASSERT_TRUE(lock.ok());
   ExpectError(Global("g"), "process " + std::to_string(getpid()));
+}
+
+// The models of before stay when the database cannot be written.
+TEST_F(FilesTest, LockedDatabaseLeavesTheModels) {
+  ASSERT_EQ(Call(Global("g")).ExitCode(), 0);
+  const std::string summary = ReadBytes(folder_.File("g/summary.json"));
+  SqliteConnection database(database_, SqliteConnection::Mode::kWrite);
+  const SqliteTransaction transaction(&database);
+  ExpectError(Global("g"), "database is locked; nothing was written");
+  EXPECT_EQ(ReadBytes(folder_.File("g/summary.json")), summary);
 }
 
 TEST_F(FilesTest, StrayWordsAndMisplacedOptions) {

@@ -164,6 +164,16 @@ TEST_F(DatabaseTest, RefusesCountsThatOverflow) {
   }
 }
 
+TEST_F(DatabaseTest, RefusesAnImagePairedWithItself) {
+  Execute("UPDATE two_view_geometries SET pair_id = " +
+          std::to_string(PairIdFromImagePair(ImagePair(5, 5))) +
+          " WHERE pair_id = (SELECT MIN(pair_id) FROM two_view_geometries)");
+  const StatusOr<SceneData> scene = ReadSceneData(path_, SceneDataOptions());
+  ASSERT_FALSE(scene.ok());
+  EXPECT_NE(scene.status().message().find("paired with itself"),
+            std::string::npos);
+}
+
 TEST_F(DatabaseTest, IgnoresPairsOfDeletedImages) {
   Execute(
       "DELETE FROM keypoints WHERE image_id = 4;"
