@@ -6,6 +6,7 @@
 #include <cmath>
 #include <iomanip>
 #include <nlohmann/json.hpp>
+#include <set>
 #include <sstream>
 
 #include "colmap_ext/host/pose_conversion.h"
@@ -22,6 +23,9 @@ constexpr double kGoodShareOfImages = 0.95;
 // Images between points, as in a tunnel, hang on the priors alone.
 constexpr double kMinShareHeld = 0.25;
 constexpr double kGoodShareHeld = 0.85;
+// Verified matches and poses that most of them contradict: one is wrong.
+constexpr double kMinShareOfMatchedHeld = 0.5;
+constexpr double kGoodShareOfMatchedHeld = 0.9;
 // Quantiles of chi-square with three degrees of freedom: 50 % and 99.9 %.
 constexpr double kMedianChi2 = 2.366;
 constexpr double kLargeChi2 = 16.27;
@@ -49,6 +53,12 @@ std::string Number(double value, int digits) {
   return text.str();
 }
 
+bool IsHeld(const colmap::Reconstruction& model, image_t image_id) {
+  return model.ExistsImage(image_id) && model.IsImageRegistered(image_id) &&
+         static_cast<int>(model.Image(image_id).NumPoints3D()) >=
+             kMinPointsOfImage;
+}
+
 // Of the residual by its covariance; negative when that is not one.
 double Chi2(const Eigen::Vector3d& residual,
             const Eigen::Matrix3d& covariance) {
@@ -74,14 +84,11 @@ PriorAgreement Summarize(const std::string& kind, std::vector<double> chi2) {
 
 std::vector<PriorAgreement> ComparePriors(const SceneData& data,
                                           const colmap::Reconstruction& model) {
-  const auto is_held = [&model](image_t image_id) {
-    return model.ExistsImage(image_id) && model.IsImageRegistered(image_id) &&
-           static_cast<int>(model.Image(image_id).NumPoints3D()) >=
-               kMinPointsOfImage;
-  };
   std::vector<double> rotations, translations;
   for (const RelativePosePrior& prior : data.priors) {
-    if (!is_held(prior.image_id1) || !is_held(prior.image_id2)) continue;
+    if (!IsHeld(model, prior.image_id1) || !IsHeld(model, prior.image_id2)) {
+      continue;
+    }
     const Rigid3d motion = CamFromWorld(model.Image(prior.image_id2)) *
                            CamFromWorld(model.Image(prior.image_id1)).Inverse();
     if (prior.HasRotation()) {
@@ -152,6 +159,28 @@ class Judge {
   std::vector<std::string> failures_;
   std::vector<std::string> doubts_;
 };
+
+// Images that have verified matches must have points too, unlike those in the
+// dark. The reason names how many have not.
+void JudgeMatchedImages(const SceneData& data,
+                        const colmap::Reconstruction& model, Judge* judge) {
+  std::set<image_t> matched;
+  for (const ScenePair& pair : data.pairs) {
+    if (pair.inlier_matches.empty()) continue;
+    matched.insert(pair.image_id1);
+    matched.insert(pair.image_id2);
+  }
+  const int num_held = static_cast<int>(std::count_if(
+      matched.begin(), matched.end(),
+      [&model](image_t image_id) { return IsHeld(model, image_id); }));
+  const int num_matched = static_cast<int>(matched.size());
+  judge->Limit(1.0 * num_held / std::max(1, num_matched),
+               kMinShareOfMatchedHeld, kGoodShareOfMatchedHeld,
+               std::to_string(num_matched - num_held) + " of " +
+                   std::to_string(num_matched) +
+                   " images with verified matches have no place that their "
+                   "matches agree with");
+}
 
 void JudgeImages(const Verdict& verdict, Judge* judge) {
   const double share =
@@ -238,6 +267,7 @@ Verdict AssessModel(const SceneData& data, const MapperStageSummary& summary,
   verdict.mean_reproj_error_px = summary.mean_reproj_error_px;
   Judge judge;
   JudgeImages(verdict, &judge);
+  JudgeMatchedImages(data, model, &judge);
   JudgePriors(verdict, &judge);
   JudgeStages(summary, verdict, warnings, &judge);
   if (!summary.is_metric && !data.priors.empty()) {

@@ -4,8 +4,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cmath>
 #include <nlohmann/json.hpp>
-#include <optional>
 
 #include "tests/testing/colmap_ext/mapper_stage_fixture.h"
 
@@ -85,6 +86,31 @@ TEST_F(VerdictTest, ModelWithoutPointsFailed) {
     model_.DeletePoint3D(point_id);
   }
   ExpectResult(Assess(), VerdictResult::kFailed, "the model has no points");
+}
+
+// Poses of a wrong log: the matches are there, and no points come of them.
+TEST_F(VerdictTest, MatchedImagesWithoutPointsFailed) {
+  std::vector<image_t> images = model_.RegImageIds();
+  std::sort(images.begin(), images.end());
+  for (size_t i = 0; i < images.size() * 6 / 10; ++i) {
+    for (const colmap::Point2D& point : model_.Image(images[i]).Points2D()) {
+      if (point.HasPoint3D()) model_.DeletePoint3D(point.Point3DId());
+    }
+  }
+  ExpectResult(Assess(), VerdictResult::kFailed,
+               "images with verified matches");
+  // Nobody expects points of images in the dark.
+  world_.data.pairs.erase(
+      std::remove_if(world_.data.pairs.begin(), world_.data.pairs.end(),
+                     [&](const ScenePair& pair) {
+                       const auto is_dark = [&](image_t image_id) {
+                         return model_.Image(image_id).NumPoints3D() < 15;
+                       };
+                       return is_dark(pair.image_id1) ||
+                              is_dark(pair.image_id2);
+                     }),
+      world_.data.pairs.end());
+  ExpectResult(Assess(), VerdictResult::kDoubtful, "see too few points");
 }
 
 TEST_F(VerdictTest, SensorsThatContradictVision) {
