@@ -154,8 +154,8 @@ StatusOr<int> ReadMergeCheckpoint(const std::string& checkpoint_path,
     if (status.ok()) return num_rounds;
     problems += (problems.empty() ? "" : "; ") + status.message();
   }
-  return Status::Error(problems.empty() ? "no merged model in " + checkpoint_path
-                                        : problems);
+  return Status::Error(
+      problems.empty() ? "no merged model in " + checkpoint_path : problems);
 }
 
 }  // namespace adasfm

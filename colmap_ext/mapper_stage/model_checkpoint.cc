@@ -112,8 +112,8 @@ Status CheckCheckpointFolder(const std::string& path) {
                            " is no checkpoint of adasfm_mapper; choose another "
                            "output folder, or move it");
     }
-    const Status status = CheckModelFolder(
-        entry.path().string(), {kStateName, kTemporaryStateName});
+    const Status status = CheckModelFolder(entry.path().string(),
+                                           {kStateName, kTemporaryStateName});
     if (!status.ok()) return status;
   }
   return Status::Ok();
