@@ -5,18 +5,26 @@
 
 #include <algorithm>
 #include <chrono>
+#include <filesystem>
+#include <fstream>
+#include <memory>
+#include <nlohmann/json.hpp>
 #include <sstream>
 #include <utility>
 
 #include "colmap_ext/coarse/global_report.h"
 #include "colmap_ext/database/two_view_geometry_backup.h"
+#include "colmap_ext/host/database.h"
 #include "colmap_ext/host/frames.h"
 #include "colmap_ext/host/model.h"
 #include "colmap_ext/host/model_folder.h"
 #include "colmap_ext/host/pose_conversion.h"
+#include "colmap_ext/io/folder_lock.h"
 #include "colmap_ext/io/output_files.h"
+#include "colmap_ext/mapper_stage/model_checkpoint.h"
 #include "core/check_options.h"
 #include "core/so3.h"
+#include "core/sqlite.h"
 
 namespace adasfm {
 namespace {
@@ -30,11 +38,43 @@ bool ChangesDatabase(const GlobalStageOptions& options) {
          options.poses.rotation_rates.enabled;
 }
 
+// Who forgot a matcher would get a model of the sensors alone.
+Status CheckHasMatches(const std::string& database_path,
+                       const SceneData& scene) {
+  const bool has_matches = std::any_of(
+      scene.pairs.begin(), scene.pairs.end(),
+      [](const auto& pair) { return !pair.inlier_matches.empty(); });
+  if (has_matches) return Status::Ok();
+  int num_matched = 0;
+  try {
+    SqliteConnection database(database_path, SqliteConnection::Mode::kRead);
+    CountMatches(&database, "matches", 1,
+                 [&num_matched](const ImagePair&, int64_t) { ++num_matched; });
+  } catch (const SqliteError& error) {
+    return Status::Error(database_path + ": " + error.what());
+  }
+  return Status::Error(
+      num_matched == 0
+          ? "no images of " + database_path +
+                " are matched; run a matcher of COLMAP first, such as "
+                "sequential_matcher or exhaustive_matcher"
+          : std::to_string(num_matched) + " pairs of " + database_path +
+                " have matches, but no pair has enough verified ones; match "
+                "more images, or check the camera's parameters");
+}
+
+// Of all models together.
+int CountPoints(const GlobalStageResult& result) {
+  int num_points = 0;
+  for (const CoarseModel& model : result.models) num_points += model.num_points;
+  return num_points;
+}
+
 // Before any work: nothing is lost when the result cannot be written.
 Status CheckGlobalPaths(const GlobalStageOptions& options,
                         const std::string& database_path,
                         const std::string& output_path) {
-  const Status status = CheckDatabase(database_path);
+  Status status = CheckDatabase(database_path);
   if (!status.ok()) return status;
   if (ChangesDatabase(options) && access(database_path.c_str(), W_OK) != 0) {
     return Status::Error("the database " + database_path +
@@ -43,7 +83,8 @@ Status CheckGlobalPaths(const GlobalStageOptions& options,
                          "--AdaSfmGlobal.correct_camera_mount 0 "
                          "--AdaSfmGlobal.correct_rotation_rates 0");
   }
-  return PrepareOutputFolder(output_path);
+  status = PrepareOutputFolder(output_path);
+  return status.ok() ? CheckModelFolders(output_path) : status;
 }
 
 PriorCorrections CollectCorrections(const CoarsePoses& poses) {
@@ -55,6 +96,18 @@ PriorCorrections CollectCorrections(const CoarsePoses& poses) {
   return corrections;
 }
 
+// Waits for another writer, and gives up before anything is replaced.
+Status CheckDatabaseIsFree(const std::string& database_path) {
+  try {
+    SqliteConnection database(database_path, SqliteConnection::Mode::kWrite);
+    SqliteTransaction transaction(&database);
+    return Status::Ok();
+  } catch (const SqliteError& error) {
+    return Status::Error(database_path + ": " + error.what() +
+                         "; nothing was written");
+  }
+}
+
 // The models first: a crash in between leaves the database as it was.
 Status WriteGlobalResult(const GlobalStageOptions& options,
                          const std::string& database_path,
@@ -62,6 +115,13 @@ Status WriteGlobalResult(const GlobalStageOptions& options,
                          const DatabaseFrames& frames,
                          const CoarseModelReport& report) {
   const GlobalStageResult& result = report.result;
+  if (ChangesDatabase(options)) {
+    const Status free = CheckDatabaseIsFree(database_path);
+    if (!free.ok()) return free;
+  }
+  // One of an earlier run would speak of other models.
+  std::error_code none;
+  std::filesystem::remove(output_path + "/summary.json", none);
   std::vector<const colmap::Reconstruction*> models;
   for (const CoarseModel& model : result.models) {
     models.push_back(&model.reconstruction);
@@ -76,11 +136,6 @@ Status WriteGlobalResult(const GlobalStageOptions& options,
                                       result.removed_pairs,
                                       CollectCorrections(result.poses));
   }
-  if (status.ok()) {
-    status =
-        WriteTextFile(output_path + "/summary.json",
-                      FormatGlobalReportJson(scene, result, report.seconds));
-  }
   return status;
 }
 
@@ -94,6 +149,54 @@ Status CheckCoarseModel(const std::string& path) {
     }
   }
   return Status::Ok();
+}
+
+// The model would replace the one that it is made from, and summary.json what
+// is said about that.
+Status CheckIsNotBesideInput(const std::string& input_path,
+                             const std::string& output_path) {
+  namespace fs = std::filesystem;
+  std::error_code error;
+  const fs::path input = fs::canonical(input_path, error);
+  const bool is_beside =
+      !error && fs::equivalent(input.parent_path(), output_path, error);
+  if (!is_beside && !fs::equivalent(input, output_path, error)) {
+    return Status::Ok();
+  }
+  return Status::Error("the output folder " + output_path +
+                       " is that of the coarse model " + input_path +
+                       ", which would be replaced; choose another one");
+}
+
+// Before any work, as CheckGlobalPaths.
+Status CheckMapPaths(const MapRequest& request) {
+  Status status = CheckDatabase(request.database_path);
+  if (status.ok()) status = CheckCoarseModel(request.input_path);
+  if (status.ok()) status = PrepareOutputFolder(request.output_path);
+  if (status.ok()) {
+    status = CheckIsNotBesideInput(request.input_path, request.output_path);
+  }
+  if (status.ok()) status = CheckModelFolders(request.output_path);
+  if (status.ok()) {
+    status = CheckCheckpointFolder(request.output_path + "/checkpoints");
+  }
+  return status;
+}
+
+// Single parts may be made at the same time, each by one run.
+StatusOr<std::vector<std::shared_ptr<FolderLock>>> LockMapFolder(
+    const MapRequest& request) {
+  using Mode = FolderLock::Mode;
+  const bool is_part = request.steps == MapperSteps::kPart;
+  const auto whole = FolderLock::Acquire(
+      request.output_path, is_part ? Mode::kShared : Mode::kExclusive);
+  if (!whole.ok()) return whole.status();
+  if (!is_part) return std::vector<std::shared_ptr<FolderLock>>{*whole};
+  const auto part = FolderLock::Acquire(
+      request.output_path, Mode::kExclusive,
+      ".adasfm_part_" + std::to_string(request.part_index) + ".lock");
+  if (!part.ok()) return part.status();
+  return std::vector<std::shared_ptr<FolderLock>>{*whole, *part};
 }
 
 // Poses belong to the cameras that they were adjusted with.
@@ -140,6 +243,34 @@ StatusOr<CoarsePoseMap> ReadCoarseModel(const std::string& path,
   return poses;
 }
 
+// What a stage wrote about itself; empty when it left no summary.
+std::vector<std::string> ReadWarnings(const std::string& summary_path) {
+  std::ifstream file(summary_path);
+  const nlohmann::json json =
+      nlohmann::json::parse(file, nullptr, /*allow_exceptions=*/false);
+  std::vector<std::string> warnings;
+  if (!json.is_object() || !json.contains("warnings")) return warnings;
+  for (const nlohmann::json& warning : json["warnings"]) {
+    if (warning.is_string()) warnings.push_back(warning.get<std::string>());
+  }
+  return warnings;
+}
+
+std::vector<std::string> ReadEarlierWarnings(const MapRequest& request) {
+  std::vector<std::string> warnings;
+  // The importer's other warnings are about its input.
+  for (std::string& warning :
+       ReadWarnings(request.database_path + ".priors.json")) {
+    if (warning.find("contradict") == std::string::npos) continue;
+    warnings.push_back(std::move(warning));
+  }
+  for (std::string& warning :
+       ReadWarnings(request.input_path + "/../summary.json")) {
+    warnings.push_back(std::move(warning));
+  }
+  return warnings;
+}
+
 // The stage's options for this scene's cameras, with the thresholds that local
 // mapping and refinement share.
 MapperStageOptions ResolveOptions(const MapOptions& options,
@@ -162,32 +293,39 @@ MapperStageOptions ResolveOptions(const MapOptions& options,
   return stage;
 }
 
-Status MergeAndWrite(const std::string& output_path,
-                     const DatabaseFrames& frames, MapperStage* stage) {
+Status MergeAndWrite(const MapRequest& request, const SceneData& scene,
+                     const DatabaseFrames& frames, MapperStage* stage,
+                     MapReport* report) {
   const StatusOr<colmap::Reconstruction> model =
       stage->Merge(/*require_all_parts=*/true);
   if (!model.ok()) return model.status();
-  const Status status = WriteModelFolder(output_path, {&*model}, frames.frames);
+  const Status status =
+      WriteModelFolder(request.output_path, {&*model}, frames.frames);
   if (!status.ok()) return status;
-  return WriteTextFile(output_path + "/summary.json",
-                       FormatMapperSummaryJson(stage->Summary()));
+  report->verdict = AssessModel(scene, stage->Summary(),
+                                ReadEarlierWarnings(request), *model);
+  return WriteTextFile(
+      request.output_path + "/summary.json",
+      FormatMapperSummaryJson(stage->Summary(), &*report->verdict));
 }
 
-Status RunMapperSteps(const MapRequest& request, const DatabaseFrames& frames,
-                      MapperStage* stage) {
+Status RunMapperSteps(const MapRequest& request, const SceneData& scene,
+                      const DatabaseFrames& frames, MapperStage* stage,
+                      MapReport* report) {
   switch (request.steps) {
     case MapperSteps::kPlan:
       return stage->Plan();
     case MapperSteps::kPart:
       return stage->RunPart(request.part_index);
     case MapperSteps::kMerge:
-      return MergeAndWrite(request.output_path, frames, stage);
+      return MergeAndWrite(request, scene, frames, stage, report);
     case MapperSteps::kAll:
       break;
   }
   Status status = stage->Plan();
   if (status.ok()) status = stage->RunAllParts();
-  if (status.ok()) status = MergeAndWrite(request.output_path, frames, stage);
+  if (status.ok())
+    status = MergeAndWrite(request, scene, frames, stage, report);
   return status;
 }
 
@@ -235,6 +373,9 @@ StatusOr<CoarseModelReport> EstimateCoarseModel(
     status = CheckGlobalPaths(options, database_path, output_path);
   }
   if (!status.ok()) return status;
+  const auto lock =
+      FolderLock::Acquire(output_path, FolderLock::Mode::kExclusive);
+  if (!lock.ok()) return lock.status();
 
   if (progress) progress("reading", 0.0);
   SceneDataOptions scene_options;
@@ -248,6 +389,8 @@ StatusOr<CoarseModelReport> EstimateCoarseModel(
   std::ostringstream text;
   text << scene->images.size() << " images, " << scene->pairs.size()
        << " verified pairs, " << scene->priors.size() << " priors";
+  status = CheckHasMatches(database_path, *scene);
+  if (!status.ok()) return status;
   const StepReport reading = {"reading", seconds(), text.str()};
 
   CoarseModelReport report;
@@ -257,6 +400,12 @@ StatusOr<CoarseModelReport> EstimateCoarseModel(
   StatusOr<GlobalStageResult> result =
       RunGlobalStage(options, *scene, progress);
   if (!result.ok()) return result.status();
+  if (CountPoints(*result) == 0) {
+    return Status::Error(
+        "no point of " + database_path +
+        " could be triangulated: the camera hardly moved, its parameters are "
+        "wrong, or the matches are those of other images");
+  }
   report.result = std::move(result).value();
   report.result.steps.insert(report.result.steps.begin(), reading);
   for (std::string& warning : ListGlobalWarnings(*scene, report.result)) {
@@ -269,6 +418,10 @@ StatusOr<CoarseModelReport> EstimateCoarseModel(
   report.result.steps.push_back(
       {"writing", seconds() - report.seconds, "models and matches"});
   report.seconds = seconds();
+  status = WriteTextFile(
+      output_path + "/summary.json",
+      FormatGlobalReportJson(*scene, report.result, report.seconds));
+  if (!status.ok()) return status;
   return report;
 }
 
@@ -276,12 +429,14 @@ StatusOr<MapReport> MapParts(const MapOptions& options,
                              const MapRequest& request,
                              const ProgressCallback& progress) {
   Status status = CheckOptions(options);
-  if (status.ok()) status = CheckDatabase(request.database_path);
-  if (status.ok()) status = CheckCoarseModel(request.input_path);
-  if (status.ok()) status = PrepareOutputFolder(request.output_path);
+  if (status.ok()) status = CheckMapPaths(request);
   if (!status.ok()) return status;
+  const auto locks = LockMapFolder(request);
+  if (!locks.ok()) return locks.status();
   StatusOr<SceneData> scene = ReadSceneData(request.database_path, {});
   if (!scene.ok()) return scene.status();
+  status = CheckHasMatches(request.database_path, *scene);
+  if (!status.ok()) return status;
   MapReport report;
   const StatusOr<CoarsePoseMap> coarse =
       ReadCoarseModel(request.input_path, &report, &*scene);
@@ -295,7 +450,7 @@ StatusOr<MapReport> MapParts(const MapOptions& options,
   if (frames->has_camera_rigs) report.warnings.push_back(kCameraRigsWarning);
   MapperStage stage(ResolveOptions(options, *scene), *scene, *coarse,
                     request.output_path, progress);
-  status = RunMapperSteps(request, *frames, &stage);
+  status = RunMapperSteps(request, *scene, *frames, &stage, &report);
   if (!status.ok()) return status;
   report.summary = stage.Summary();
   return report;

@@ -1,11 +1,13 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "colmap_ext/coarse/global_stage.h"
 #include "colmap_ext/mapper_stage/mapper_stage.h"
+#include "colmap_ext/mapper_stage/verdict.h"
 #include "colmap_ext/priors/prior_importer.h"
 #include "core/progress.h"
 #include "core/status.h"
@@ -54,7 +56,8 @@ struct CoarseModelReport {
 // Stage 2. Writes the models to output_path/0, 1, ... (largest first),
 // removed_pairs.txt and summary.json there, and the refined two-view geometries
 // to the database, whose originals it keeps and starts from: running twice
-// equals running once. On error the database is as it was.
+// equals running once. On error the database is as it was. An error, too, when
+// no images have verified matches, and when no points come of them.
 StatusOr<CoarseModelReport> EstimateCoarseModel(
     const GlobalStageOptions& options, const std::string& database_path,
     const std::string& output_path, const ProgressCallback& progress = {});
@@ -82,11 +85,14 @@ struct MapRequest {
 // What a run of stage 3 did beside its files.
 struct MapReport {
   MapperStageSummary summary;
+  // With the steps kAll and kMerge.
+  std::optional<Verdict> verdict;
   std::vector<std::string> warnings;
 };
 
 // Stage 3. Writes the model and summary.json with the steps kAll and kMerge,
-// checkpoints with all; after a crash the same call continues.
+// checkpoints with all; after a crash the same call continues. A model that
+// failed by its verdict is written all the same.
 StatusOr<MapReport> MapParts(const MapOptions& options,
                              const MapRequest& request,
                              const ProgressCallback& progress = {});

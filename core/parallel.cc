@@ -5,6 +5,7 @@
 #include <atomic>
 #include <exception>
 #include <mutex>
+#include <system_error>
 #include <thread>
 #include <vector>
 
@@ -26,17 +27,19 @@ void ParallelFor(int num_threads, size_t count,
   // Blocks keep the counter cheap; small enough to balance the load.
   const size_t block = std::max<size_t>(1, count / (num_workers * 16));
   std::atomic<size_t> next{0};
+  std::atomic<bool> failed{false};
   std::mutex mutex;
   std::exception_ptr exception;
   size_t exception_index = count;
   const auto work = [&] {
-    for (size_t begin = next.fetch_add(block); begin < count;
+    for (size_t begin = next.fetch_add(block); begin < count && !failed;
          begin = next.fetch_add(block)) {
       for (size_t i = begin; i < std::min(count, begin + block); ++i) {
         try {
           function(i);
         } catch (...) {
           const std::lock_guard<std::mutex> lock(mutex);
+          failed = true;
           if (i < exception_index) {
             exception_index = i;
             exception = std::current_exception();
@@ -47,7 +50,12 @@ void ParallelFor(int num_threads, size_t count,
     }
   };
   std::vector<std::thread> workers;
-  for (size_t i = 1; i < num_workers; ++i) workers.emplace_back(work);
+  workers.reserve(num_workers - 1);
+  try {
+    for (size_t i = 1; i < num_workers; ++i) workers.emplace_back(work);
+  } catch (const std::system_error&) {
+    // The system gives no more threads: those that run do the work.
+  }
   work();
   for (std::thread& worker : workers) worker.join();
   if (exception) std::rethrow_exception(exception);

@@ -114,20 +114,27 @@ void SqliteStatement::Reset() {
   sqlite3_clear_bindings(handle_);
 }
 
+void SqliteStatement::CheckBinding(int code) const {
+  if (code != SQLITE_OK) {
+    throw SqliteError(sqlite3_errmsg(connection_->Handle()));
+  }
+}
+
 void SqliteStatement::BindInt(int parameter, int64_t value) {
-  sqlite3_bind_int64(handle_, parameter, value);
+  CheckBinding(sqlite3_bind_int64(handle_, parameter, value));
 }
 
 void SqliteStatement::BindText(int parameter, const std::string& value) {
-  sqlite3_bind_text(handle_, parameter, value.data(), value.size(),
-                    SQLITE_TRANSIENT);
+  CheckBinding(sqlite3_bind_text(handle_, parameter, value.data(), value.size(),
+                                 SQLITE_TRANSIENT));
 }
 
 void SqliteStatement::BindBlob(int parameter, const void* data,
                                size_t num_bytes) {
   // A null pointer would become NULL, which is not an empty blob.
-  sqlite3_bind_blob64(handle_, parameter, num_bytes == 0 ? "" : data, num_bytes,
-                      SQLITE_TRANSIENT);
+  CheckBinding(sqlite3_bind_blob64(handle_, parameter,
+                                   num_bytes == 0 ? "" : data, num_bytes,
+                                   SQLITE_TRANSIENT));
 }
 
 bool SqliteStatement::IsNull(int column) const {

@@ -70,6 +70,8 @@ class SqliteStatement {
   size_t NumBytes(int column) const;
 
  private:
+  void CheckBinding(int code) const;
+
   SqliteConnection* connection_;
   sqlite3_stmt* handle_ = nullptr;
 };

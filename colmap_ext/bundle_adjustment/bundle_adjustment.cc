@@ -207,8 +207,8 @@ std::vector<PosePriorEdge> CorrectSharedErrors(
   AssignWindows(options.gyroscope_window_s, &priors);
   for (PosePriorEdge& edge : priors) {
     if (edge.dt_s < 0.0) continue;
-    edge.cam2_from_cam1 = shared_errors.Correct(edge.cam2_from_cam1, edge.dt_s,
-                                                edge.window);
+    edge.cam2_from_cam1 =
+        shared_errors.Correct(edge.cam2_from_cam1, edge.dt_s, edge.window);
   }
   return priors;
 }

@@ -115,6 +115,28 @@ Json MountJson(const CameraMountReport& mount) {
           {"true_from_stated", rows}};
 }
 
+void AppendLostImages(const SceneData& scene, const GlobalStageResult& result,
+                      std::vector<std::string>* warnings) {
+  size_t num_images = 0;
+  for (const CoarseModel& model : result.models) {
+    num_images += model.reconstruction.NumRegImages();
+  }
+  if (num_images < scene.images.size()) {
+    warnings->push_back(
+        std::to_string(scene.images.size() - num_images) + " of " +
+        std::to_string(scene.images.size()) +
+        " images are in no model: neither verified matches nor sensors tie "
+        "them to others");
+  }
+  if (result.models.size() > 1) {
+    warnings->push_back(
+        "the images fall apart into " + std::to_string(result.models.size()) +
+        " models, the largest of " +
+        std::to_string(result.models[0].reconstruction.NumRegImages()) +
+        " images: match more pairs, or add sensors that cover the gaps");
+  }
+}
+
 void AppendMountWarning(const CameraMountReport& mount,
                         std::vector<std::string>* warnings) {
   if (!mount.corrected) return;
@@ -218,6 +240,10 @@ std::string FormatGlobalReportText(const GlobalStageResult& result,
     const CoarseComponent& component = result.poses.components[i];
     if (!component.rotations_converged) text << ", rotations not converged";
     if (!component.positions_converged) text << ", positions not converged";
+    if (model.num_points == 0) {
+      text << "; nothing but the sensors holds it\n";
+      continue;
+    }
     text << "; directions agree to " << 100.0 * component.direction_agreement
          << " %, at the worst image "
          << 100.0 * component.least_direction_agreement << " %\n";
@@ -229,6 +255,7 @@ std::string FormatGlobalReportText(const GlobalStageResult& result,
 std::vector<std::string> ListGlobalWarnings(const SceneData& scene,
                                             const GlobalStageResult& result) {
   std::vector<std::string> warnings;
+  AppendLostImages(scene, result, &warnings);
   AppendMountWarning(result.poses.camera_mount, &warnings);
   for (const CoarseModel& model : result.models) {
     AppendPriorWarnings(model, &warnings);

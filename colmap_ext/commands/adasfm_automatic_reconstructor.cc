@@ -121,6 +121,8 @@ Status RunAdasfmAutomaticReconstructor(int argc, char** argv) {
   display.Finish();
   if (!result.ok()) return result.status();
   PrintResult(*result);
+  if (result->has_failed) return Status::Error(result->verdict);
+  std::cout << result->verdict << std::endl;
   return Status::Ok();
 }
 

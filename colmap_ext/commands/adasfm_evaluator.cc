@@ -96,7 +96,15 @@ Status RunAdasfmEvaluator(int argc, char** argv) {
   AddPairOptions(&pairs, &command);
   const Status parsed = command.Parse(argc, argv);
   if (!parsed.ok() || command.HelpShown()) return parsed;
-  const Status valid = CheckOptions(options);
+  Status valid = CheckOptions(options);
+  for (const std::string& output : {json_path, pairs.json_path}) {
+    if (!valid.ok()) break;
+    valid = CheckOutputIsNoInput(
+        output, {{"ground_truth_path", ground_truth_path},
+                 {"image_times_path", options.image_times_path},
+                 {"database_path", pairs.database_path},
+                 {"landmarks_path", pairs.landmarks_path}});
+  }
   if (!valid.ok()) return valid;
 
   StatusOr<LargestModel> model = ReadLargestModel(input_path);

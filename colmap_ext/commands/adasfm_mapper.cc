@@ -135,6 +135,10 @@ Status RunAdasfmMapper(int argc, char** argv) {
   const StatusOr<MapperSteps> steps = StepsFromName(options.stage);
   if (!steps.ok()) return steps.status();
   options.request.steps = *steps;
+  if (options.request.part_index >= 0 && *steps != MapperSteps::kPart) {
+    return Status::Error(
+        "--AdaSfmMapper.part_index is for --AdaSfmMapper.stage part only");
+  }
 
   ProgressDisplay display;
   const StatusOr<MapReport> report =
@@ -150,6 +154,11 @@ Status RunAdasfmMapper(int argc, char** argv) {
   if (*steps == MapperSteps::kAll || *steps == MapperSteps::kMerge) {
     std::cout << FormatMapperSummaryText(report->summary) << std::flush;
   }
+  if (!report->verdict) return Status::Ok();
+  if (report->verdict->result == VerdictResult::kFailed) {
+    return Status::Error(FormatVerdict(*report->verdict));
+  }
+  std::cout << FormatVerdict(*report->verdict) << std::endl;
   return Status::Ok();
 }
 

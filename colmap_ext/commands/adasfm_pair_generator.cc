@@ -37,7 +37,12 @@ Status RunAdasfmPairGenerator(int argc, char** argv) {
   const Status valid = CheckOptions(options);
   if (!valid.ok()) return valid;
   // A name that no list can hold is better known before the search.
-  Status names = CheckDatabase(database_path);
+  Status names = CheckOutputIsNoInput(
+      output_path, {{"database_path", database_path},
+                    {"image_times_path", options.image_times_path},
+                    {"descriptors_path", options.descriptors_path}});
+  if (names.ok()) names = CheckOutputFile(output_path);
+  if (names.ok()) names = CheckDatabase(database_path);
   if (names.ok()) names = FormatPairList({}, database_path).status();
   if (!names.ok()) return names;
 

@@ -5,6 +5,7 @@
 #include "colmap_ext/adasfm_pipeline.h"
 #include "colmap_ext/commands/log_options.h"
 #include "colmap_ext/commands/registry.h"
+#include "colmap_ext/io/output_files.h"
 #include "core/check_options.h"
 
 namespace adasfm {
@@ -132,6 +133,13 @@ Status RunAdasfmPriorImporter(int argc, char** argv) {
   if (!valid.ok()) return valid;
   options.estimation.check_against_vision = !force;
   if (summary_path.empty()) summary_path = paths.database_path + ".priors.json";
+  const Status apart = CheckOutputIsNoInput(
+      summary_path, {{"database_path", paths.database_path},
+                     {"image_times_path", paths.image_times_path},
+                     {"imu_path", paths.imu_path},
+                     {"wheel_path", paths.wheel_path},
+                     {"sensors_path", paths.sensors_path}});
+  if (!apart.ok()) return apart;
 
   const StatusOr<PriorImport> import =
       ImportPriors(options, paths, summary_path);

@@ -45,7 +45,14 @@ Status RunAdasfmReporter(int argc, char** argv) {
                      "and kept ones; each adds about 60 kB");
   const Status parsed = command.Parse(argc, argv);
   if (!parsed.ok() || command.HelpShown()) return parsed;
-  const Status valid = CheckOptions(options);
+  Status valid = CheckOptions(options);
+  if (valid.ok()) {
+    valid = CheckOutputIsNoInput(
+        output_path,
+        {{"database_path", options.database_path},
+         {"ground_truth_path", options.ground_truth_path},
+         {"image_times_path", options.ground_truth.image_times_path}});
+  }
   if (!valid.ok()) return valid;
   const StatusOr<std::string> page = BuildReport(options);
   if (!page.ok()) return page.status();

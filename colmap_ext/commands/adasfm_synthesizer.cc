@@ -90,6 +90,20 @@ Status Translate(SynthesizerOptions* options) {
   return CheckOptions(options->world);
 }
 
+// A world of ours may be replaced, somebody's own files may not.
+Status CheckWorldFolder(const std::string& path) {
+  std::error_code none;
+  if (fs::exists(path + "/landmarks.txt", none)) return Status::Ok();
+  for (const char* name : {"database.db", "imu.csv", "wheel.csv", "times.csv",
+                           "sensors.yaml", "gt.txt"}) {
+    if (!fs::exists(path + "/" + name, none)) continue;
+    return Status::Error(path + "/" + name +
+                         " was not made by this command and is not replaced; "
+                         "choose an empty output folder");
+  }
+  return Status::Ok();
+}
+
 // Photos of another world in the folder would end up in the user's model.
 Status CheckPhotoFolder(const SyntheticWorld& world, const fs::path& folder) {
   std::set<std::string> names;
@@ -142,6 +156,7 @@ Status RunAdasfmSynthesizer(int argc, char** argv) {
   if (!status.ok() || command.HelpShown()) return status;
   status = Translate(&options);
   if (status.ok()) status = PrepareOutputFolder(options.output_path);
+  if (status.ok()) status = CheckWorldFolder(options.output_path);
   if (!status.ok()) return status;
 
   SyntheticWorld world;

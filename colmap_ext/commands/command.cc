@@ -5,12 +5,15 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <csignal>
 #include <cstdio>
 #include <cstdlib>
 #include <exception>
+#include <filesystem>
 #include <fstream>
 #include <iostream>
 #include <new>
+#include <system_error>
 #include <vector>
 
 #include "colmap_ext/commands/progress_display.h"
@@ -48,6 +51,8 @@ void SetUpLogging(const char* name) {
       reinterpret_cast<google::logging_fail_func_t>(&ExitOnFailedCheck));
   // Log files in /tmp are of no use to anybody who did not ask for them.
   FLAGS_logtostderr = true;
+  // A write beyond a limit fails like one to a full disk, and is reported.
+  std::signal(SIGXFSZ, SIG_IGN);
 }
 
 }  // namespace
@@ -74,7 +79,7 @@ void CommandOptions::PrintHelp() const {
 Status CommandOptions::ReadProject(const std::string& path,
                                    po::variables_map* values) const {
   std::ifstream file(path);
-  if (!file) {
+  if (!file || std::filesystem::is_directory(path)) {
     return Status::Error("cannot read the project file " + path +
                          "; check --project_path");
   }
@@ -105,7 +110,17 @@ Status CommandOptions::Parse(int argc, const char* const* argv) {
   try {
     const int style = po::command_line_style::default_style &
                       ~po::command_line_style::allow_guessing;
-    po::store(po::parse_command_line(argc, argv, options_, style), values);
+    const po::parsed_options parsed =
+        po::parse_command_line(argc, argv, options_, style);
+    for (const po::option& option : parsed.options) {
+      if (!option.string_key.empty()) continue;
+      return Status::Error(
+          "'" + option.original_tokens.at(0) +
+          "' is no option; names begin with --, and a value with blanks needs "
+          "quotes; see `colmap " +
+          name_ + " -h`");
+    }
+    po::store(parsed, values);
     if (values.count("help")) {
       PrintHelp();
       help_shown_ = true;
@@ -140,6 +155,10 @@ int RunCommand(const Command& command, int argc, char** argv) {
   } catch (const std::bad_alloc&) {
     PrintError(std::string(command.name) +
                ": out of memory; use fewer threads, or fewer images at a time");
+  } catch (const std::system_error& error) {
+    PrintError(std::string(command.name) +
+               ": the system refuses: " + error.what() +
+               "; if it is short of threads, use a smaller --num_threads");
   } catch (const std::exception& error) {
     PrintError(std::string(command.name) + ": " + error.what());
   } catch (...) {

@@ -7,14 +7,16 @@
 
 #include <cstdio>
 #include <filesystem>
-#include <fstream>
 #include <functional>
 #include <iomanip>
 #include <limits>
+#include <sstream>
 #include <system_error>
 #include <vector>
 
+#include "colmap_ext/io/output_files.h"
 #include "core/so3.h"
+#include "core/sqlite.h"
 
 namespace adasfm {
 namespace {
@@ -80,26 +82,43 @@ void WritePairs(const SyntheticWorld& world, colmap::Database* database) {
   }
 }
 
-// Writes a text file under a temporary name and puts it in place when it is
-// complete.
 Status WriteText(const fs::path& path,
                  const std::function<void(std::ostream*)>& write) {
-  const fs::path temporary = path.string() + ".tmp";
-  {
-    std::ofstream file(temporary);
-    file << std::setprecision(9);
-    if (file) write(&file);
-    file.flush();
-    if (!file) {
-      return Status::Error("cannot write " + temporary.string() +
-                           "; check the folder's permissions and free space");
+  std::ostringstream text;
+  text << std::setprecision(9);
+  write(&text);
+  return WriteTextFile(path.string(), text.str());
+}
+
+// COLMAP's class prints that a write has failed and goes on.
+bool HasAllRows(const SyntheticWorld& world, const std::string& path) {
+  const std::pair<const char*, size_t> tables[] = {
+      {"cameras", 1},
+      {"images", world.images.size()},
+      {"keypoints", world.images.size()},
+      {"matches", world.pairs.size()},
+      {"two_view_geometries", world.pairs.size()}};
+  try {
+    SqliteConnection database(path, SqliteConnection::Mode::kRead);
+    SqliteStatement check(&database, "PRAGMA quick_check");
+    bool is_whole = check.Step() && check.Text(0) == "ok";
+    for (const auto& [table, num_rows] : tables) {
+      SqliteStatement count(&database,
+                            std::string("SELECT COUNT(*) FROM ") + table);
+      is_whole &=
+          count.Step() && count.Int(0) == static_cast<int64_t>(num_rows);
     }
+    return is_whole;
+  } catch (const SqliteError&) {
+    return false;
   }
-  std::error_code error;
-  fs::rename(temporary, path, error);
-  if (!error) return Status::Ok();
-  return Status::Error("cannot write " + path.string() + ": " +
-                       error.message());
+}
+
+void RemoveDatabase(const std::string& path) {
+  std::error_code ignored;
+  for (const char* suffix : {"", "-wal", "-shm", "-journal"}) {
+    fs::remove(path + suffix, ignored);
+  }
 }
 
 void WriteImu(const SyntheticWorld& world, std::ostream* file) {
@@ -195,12 +214,9 @@ Status WriteSyntheticDatabase(const SyntheticWorld& world,
                               const std::string& path) {
   // COLMAP ends the process when it cannot open a file: try first.
   const std::string temporary = path + ".tmp";
-  if (!std::ofstream(temporary, std::ios::trunc)) {
-    return Status::Error("cannot write " + temporary +
-                         "; check the folder's permissions");
-  }
-  std::error_code error;
-  fs::remove(temporary, error);
+  RemoveDatabase(temporary);
+  Status status = WriteTextFile(temporary, "");
+  if (!status.ok()) return status;
   {
     colmap::Database database(temporary);
     colmap::DatabaseTransaction transaction(&database);
@@ -208,6 +224,15 @@ Status WriteSyntheticDatabase(const SyntheticWorld& world,
     WriteImages(world, &database);
     WritePairs(world, &database);
   }
+  if (!HasAllRows(world, temporary)) {
+    status = Status::Error("cannot write " + path + ": " +
+                           DescribeWriteFailure(temporary));
+    RemoveDatabase(temporary);
+    return status;
+  }
+  status = SyncToDisk(temporary);
+  if (!status.ok()) return status;
+  std::error_code error;
   fs::rename(temporary, path, error);
   if (!error) return Status::Ok();
   return Status::Error("cannot write " + path + ": " + error.message());

@@ -2,6 +2,8 @@
 #include "colmap_ext/host/camera.h"
 
 #include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
 
 namespace adasfm {
 namespace {
@@ -28,6 +30,15 @@ Eigen::Matrix2d ComputeProjectionJacobian(const colmap::Camera& camera,
 }
 
 }  // namespace
+
+bool HasUsableParams(const colmap::Camera& camera) {
+  const std::vector<double>& params = camera.Params();
+  const std::vector<size_t>& focal = camera.FocalLengthIdxs();
+  return std::all_of(params.begin(), params.end(),
+                     [](double value) { return std::isfinite(value); }) &&
+         std::all_of(focal.begin(), focal.end(),
+                     [&params](size_t i) { return params[i] > 0.0; });
+}
 
 std::optional<Bearing> ComputeBearing(const colmap::Camera& camera,
                                       const Eigen::Vector2d& pixel) {

@@ -11,6 +11,9 @@
 
 namespace adasfm {
 
+// Whether all parameters are finite and the focal lengths positive.
+bool HasUsableParams(const colmap::Camera& camera);
+
 // The ray of a pixel and its derivative, for every camera model of COLMAP. None
 // where the model cannot be inverted: beyond 90 degrees from the axis, or where
 // a polynomial distortion folds back.

@@ -27,7 +27,9 @@ std::vector<FeatureMatch> MatchesFromRow(const SqliteStatement& statement,
   static_assert(sizeof(FeatureMatch) == 2 * sizeof(point2D_t), "blob layout");
   const int64_t num_rows = statement.Int(first_column);
   const int64_t num_bytes = statement.NumBytes(first_column + 2);
-  if (num_rows < 0 || (num_rows > 0 && statement.Int(first_column + 1) != 2) ||
+  // A row has bytes: first of all, so that the product cannot overflow.
+  if (num_rows < 0 || num_rows > num_bytes ||
+      (num_rows > 0 && statement.Int(first_column + 1) != 2) ||
       num_bytes != num_rows * static_cast<int64_t>(sizeof(FeatureMatch))) {
     ThrowRowError(table, statement.Int(0), "malformed matches");
   }
@@ -42,8 +44,12 @@ std::vector<Eigen::Vector2d> KeypointsFromRow(
     const SqliteStatement& statement) {
   const int64_t num_rows = statement.Int(1);
   const int64_t num_cols = statement.Int(2);
-  if (num_rows < 0 || (num_rows > 0 && num_cols < 2) ||
-      statement.NumBytes(3) != num_rows * num_cols * sizeof(float)) {
+  const int64_t num_bytes = statement.NumBytes(3);
+  // As above; SQLite's blobs have less than 2^31 bytes.
+  if (num_rows < 0 || num_rows > num_bytes ||
+      (num_rows > 0 && (num_cols < 2 || num_cols > num_bytes)) ||
+      (num_rows > 0 && num_bytes != num_rows * num_cols *
+                                        static_cast<int64_t>(sizeof(float)))) {
     ThrowRowError("keypoints", statement.Int(0), "malformed keypoints");
   }
   std::vector<Eigen::Vector2d> points;

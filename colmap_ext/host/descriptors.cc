@@ -32,13 +32,14 @@ DescriptorMatrix DescriptorsFromRow(const SqliteStatement& statement) {
                              "--AdaSfmPairs.descriptors_path instead");
   }
   const int64_t value_size = type == kSift ? 1 : sizeof(float);
-  if (num_rows < 0 || num_bytes_per_row < 0 ||
-      num_bytes_per_row % value_size != 0 ||
-      statement.NumBytes(3) != num_rows * num_bytes_per_row) {
+  const int64_t num_bytes = statement.NumBytes(3);
+  // The bounds so that the product cannot overflow.
+  if (num_rows < 1 || num_rows > num_bytes || num_bytes_per_row < 1 ||
+      num_bytes_per_row > num_bytes || num_bytes_per_row % value_size != 0 ||
+      num_bytes != num_rows * num_bytes_per_row) {
     ThrowDescriptorError(image_id, "malformed descriptors");
   }
   DescriptorMatrix descriptors(num_rows, num_bytes_per_row / value_size);
-  if (descriptors.size() == 0) return descriptors;
   if (type == kSift) {
     descriptors =
         Eigen::Map<const Eigen::Matrix<unsigned char, Eigen::Dynamic,
@@ -65,11 +66,12 @@ void ReadDescriptors(
   SqliteStatement statement(database,
                             std::string("SELECT image_id, rows, cols, data, ") +
                                 (has_type ? "type" : "0") +
-                                " FROM descriptors ORDER BY image_id");
+                                " FROM descriptors WHERE rows > 0 AND image_id "
+                                "IN (SELECT image_id FROM images) "
+                                "ORDER BY image_id");
   int64_t first_type = -1;
   while (statement.Step()) {
     const DescriptorMatrix descriptors = DescriptorsFromRow(statement);
-    if (descriptors.size() == 0) continue;
     if (first_type < 0) first_type = statement.Int(4);
     if (statement.Int(4) != first_type) {
       ThrowDescriptorError(

@@ -7,10 +7,12 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cstdlib>
 #include <functional>
 #include <thread>
 #include <utility>
 
+#include "colmap_ext/host/database.h"
 #include "colmap_ext/host/database_schema.h"
 #include "colmap_ext/host/host_features.h"
 #include "colmap_ext/io/capture_output.h"
@@ -48,6 +50,13 @@ std::vector<std::string> ImagesWithoutFeatures(const std::string& path,
   return names;
 }
 
+Status MissingRows(const std::string& database_path, const std::string& what,
+                   const std::string& count, const std::string& log_name) {
+  return Status::Error(database_path + ": " + what + " " + count +
+                       "; see logs/" + log_name +
+                       ", make sure that the disk has room, and run again");
+}
+
 // Waits for a thread of the host; when the progress callback throws, the thread
 // is asked to stop and waited for.
 void WaitFor(colmap::Thread* thread, const std::function<void()>& report) {
@@ -62,6 +71,20 @@ void WaitFor(colmap::Thread* thread, const std::function<void()>& report) {
     throw;
   }
   thread->Wait();
+}
+
+// Without CUDA the host draws on a display.
+bool CanUseGpu() {
+#ifdef ADASFM_HOST_HAS_CUDA
+  return colmap::GetNumCudaDevices() > 0;
+#else
+  return std::getenv("DISPLAY") != nullptr;
+#endif
+}
+
+Status NoGpu() {
+  return Status::Error(
+      "there is no GPU that the host can use; use --use_gpu 0");
 }
 
 }  // namespace
@@ -100,6 +123,7 @@ Status ExtractFeatures(const FeatureOptions& options,
   sift.use_gpu = UsesGpu(options);
 
   // A line that the host prints for every photo.
+  if (options.use_gpu == 1 && !CanUseGpu()) return NoGpu();
   CaptureOutput capture(log_path, "Processed file");
   colmap::SiftFeatureExtractor extractor(reader, sift);
   extractor.Start();
@@ -126,6 +150,7 @@ Status MatchPairs(const FeatureOptions& options,
   sift.use_gpu = UsesGpu(options);
   const size_t block_size =
       kNumPairsPerThread * EffectiveNumThreads(options.num_threads);
+  if (options.use_gpu == 1 && !CanUseGpu()) return NoGpu();
   const CaptureOutput capture(log_path, "");
   colmap::Database database(database_path);
   colmap::FeatureMatcherCache cache(kNumCachedImages, &database);
@@ -150,6 +175,50 @@ Status MatchPairs(const FeatureOptions& options,
              static_cast<double>(end) / pairs.size());
   }
   return Status::Ok();
+}
+
+Status CheckFeatures(const std::string& database_path) {
+  try {
+    SqliteConnection database(database_path, SqliteConnection::Mode::kRead);
+    SqliteStatement statement(
+        &database,
+        "SELECT COUNT(*), MIN(name), (SELECT COUNT(*) FROM images) FROM images "
+        "WHERE image_id NOT IN (SELECT image_id FROM keypoints) OR "
+        "image_id NOT IN (SELECT image_id FROM descriptors)");
+    if (!statement.Step() || statement.Int(0) == 0) return Status::Ok();
+    return MissingRows(database_path, "the features of",
+                       std::to_string(statement.Int(0)) + " of " +
+                           std::to_string(statement.Int(2)) +
+                           " images are missing (the first one is " +
+                           statement.Text(1) + ")",
+                       "features.log");
+  } catch (const SqliteError& error) {
+    return Status::Error(database_path + ": " + error.what());
+  }
+}
+
+Status CheckMatches(const std::string& database_path,
+                    const std::vector<ImagePair>& pairs) {
+  try {
+    SqliteConnection database(database_path, SqliteConnection::Mode::kRead);
+    SqliteStatement statement(
+        &database,
+        "SELECT 1 FROM matches JOIN two_view_geometries USING (pair_id) "
+        "WHERE pair_id = ?");
+    size_t num_missing = 0;
+    for (const ImagePair& pair : pairs) {
+      statement.Reset();
+      statement.BindInt(1, PairIdFromImagePair(pair));
+      if (!statement.Step()) ++num_missing;
+    }
+    if (num_missing == 0) return Status::Ok();
+    return MissingRows(database_path, "the matches of",
+                       std::to_string(num_missing) + " of " +
+                           std::to_string(pairs.size()) + " pairs are missing",
+                       "matching.log");
+  } catch (const SqliteError& error) {
+    return Status::Error(database_path + ": " + error.what());
+  }
 }
 
 }  // namespace adasfm

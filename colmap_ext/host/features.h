@@ -70,4 +70,12 @@ Status MatchPairs(const FeatureOptions& options,
                   const std::string& database_path, const std::string& log_path,
                   const ProgressCallback& progress);
 
+// An error when keypoints or descriptors of an image are missing: COLMAP
+// reports no failed write.
+Status CheckFeatures(const std::string& database_path);
+
+// The same for matches and two-view geometries of the pairs.
+Status CheckMatches(const std::string& database_path,
+                    const std::vector<ImagePair>& pairs);
+
 }  // namespace adasfm

@@ -153,6 +153,19 @@ std::vector<std::string> FindModels(const std::string& path) {
   return models;
 }
 
+Status CheckBinaryModelFile(const std::string& path) {
+  const std::pair<const char*, bool (*)(const std::string&)> files[] = {
+      {"cameras.bin", IsCamerasFile},
+      {"images.bin", IsImagesFile},
+      {"points3D.bin", IsPointsFile}};
+  const std::string file_name = fs::path(path).filename().string();
+  for (const auto& [name, is_valid] : files) {
+    if (name == file_name && is_valid(path)) return Status::Ok();
+  }
+  return Status::Error(path +
+                       " is cut short or not COLMAP's; make the model again");
+}
+
 StatusOr<colmap::Reconstruction> ReadModel(const std::string& path) {
   const bool is_binary = HasFiles(path, ".bin");
   if (!is_binary && !HasFiles(path, ".txt")) {
@@ -170,15 +183,9 @@ StatusOr<colmap::Reconstruction> ReadModel(const std::string& path) {
                            ", which this program does not have; make the "
                            "model with another camera model");
     }
-    const std::pair<std::string, bool (*)(const std::string&)> files[] = {
-        {(folder / "cameras.bin").string(), IsCamerasFile},
-        {(folder / "images.bin").string(), IsImagesFile},
-        {(folder / "points3D.bin").string(), IsPointsFile}};
-    for (const auto& [file, is_valid] : files) {
-      if (is_valid(file)) continue;
-      return Status::Error(file +
-                           " is cut short or not COLMAP's; make the model "
-                           "again");
+    for (const char* name : {"cameras.bin", "images.bin", "points3D.bin"}) {
+      const Status status = CheckBinaryModelFile((folder / name).string());
+      if (!status.ok()) return status;
     }
   }
   colmap::Reconstruction reconstruction;

@@ -14,6 +14,10 @@ namespace adasfm {
 // those of its subfolders that do, sorted by name.
 std::vector<std::string> FindModels(const std::string& path);
 
+// An error when the file, one of cameras.bin, images.bin and points3D.bin, does
+// not consist of as many records as it says, each of them whole.
+Status CheckBinaryModelFile(const std::string& path);
+
 // Reads a binary or text model. Files that are missing, cut short or otherwise
 // malformed are an error; COLMAP's own reader would end the process, or never
 // return.

@@ -1,9 +1,13 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "colmap_ext/host/model_folder.h"
 
+#include <algorithm>
 #include <filesystem>
 #include <fstream>
 #include <stdexcept>
+
+#include "colmap_ext/host/model.h"
+#include "colmap_ext/io/output_files.h"
 
 namespace adasfm {
 namespace {
@@ -12,31 +16,86 @@ namespace fs = std::filesystem;
 
 constexpr char kTemporaryName[] = ".models.tmp";
 
-// COLMAP does not report short writes: the number of records at the head of a
-// file and a size of at least that many bytes are what can be checked.
-bool IsWritten(const fs::path& path, size_t num_records, size_t record_size) {
+bool IsModelFile(const std::string& name) {
+  static const std::vector<std::string> names = {
+      "cameras.bin",  "cameras.txt",  "images.bin", "images.txt",
+      "points3D.bin", "points3D.txt", "rigs.bin",   "rigs.txt",
+      "frames.bin",   "frames.txt",   "project.ini"};
+  return std::find(names.begin(), names.end(), name) != names.end();
+}
+
+bool IsNumber(const std::string& name) {
+  return !name.empty() && std::all_of(name.begin(), name.end(), [](char c) {
+    return c >= '0' && c <= '9';
+  });
+}
+
+// At the head of each file.
+bool HasRecords(const fs::path& path, uint64_t num_records) {
   std::ifstream file(path, std::ios::binary);
   uint64_t num_written = 0;
   file.read(reinterpret_cast<char*>(&num_written), sizeof(num_written));
-  return file && num_written == num_records &&
-         fs::file_size(path) >= sizeof(num_written) + num_records * record_size;
+  return file && num_written == num_records;
 }
 
-bool WriteModel(const colmap::Reconstruction& model,
-                const std::map<image_t, FrameOfImage>& frames,
-                const fs::path& path) {
-  fs::create_directories(path);
-  model.WriteBinary(path.string());
-  if (!frames.empty() && !WriteFrameFiles(model, frames, path.string())) {
-    return false;
+Status WriteModels(const std::vector<const colmap::Reconstruction*>& models,
+                   const std::map<image_t, FrameOfImage>& frames,
+                   const fs::path& temporary) {
+  for (size_t i = 0; i < models.size(); ++i) {
+    const fs::path path = temporary / std::to_string(i);
+    fs::create_directories(path);
+    const Status status = WriteBinaryModel(*models[i], path.string());
+    if (!status.ok()) return status;
+    if (frames.empty()) continue;
+    if (!WriteFrameFiles(*models[i], frames, path.string())) {
+      return Status::Error("cannot write the frames of a model to " +
+                           path.string() + "; check the free space");
+    }
+    for (const char* name : {"rigs.bin", "frames.bin"}) {
+      const Status synced = SyncToDisk((path / name).string());
+      if (!synced.ok()) return synced;
+    }
   }
-  // Least bytes of a record: see COLMAP's file formats.
-  return IsWritten(path / "cameras.bin", model.NumCameras(), 24) &&
-         IsWritten(path / "images.bin", model.NumRegImages(), 73) &&
-         IsWritten(path / "points3D.bin", model.NumPoints3D(), 51);
+  return Status::Ok();
+}
+
+// Puts the models in the place of those of an earlier run.
+Status ReplaceModels(const fs::path& temporary, const fs::path& folder,
+                     size_t num_models) {
+  Status status;
+  for (size_t i = 0; status.ok() && i < num_models; ++i) {
+    const std::string name = std::to_string(i);
+    status = RemoveModelFolder((folder / name).string());
+    if (status.ok()) fs::rename(temporary / name, folder / name);
+  }
+  for (size_t i = num_models; status.ok(); ++i) {
+    const fs::path path = folder / std::to_string(i);
+    if (fs::symlink_status(path).type() == fs::file_type::not_found) break;
+    status = RemoveModelFolder(path.string());
+  }
+  return status.ok() ? SyncToDisk(folder.string()) : status;
 }
 
 }  // namespace
+
+Status WriteBinaryModel(const colmap::Reconstruction& model,
+                        const std::string& path) {
+  model.WriteBinary(path);
+  const std::pair<const char*, uint64_t> files[] = {
+      {"cameras.bin", model.NumCameras()},
+      {"images.bin", model.NumRegImages()},
+      {"points3D.bin", model.NumPoints3D()}};
+  for (const auto& [name, num_records] : files) {
+    const std::string file = path + "/" + name;
+    if (!HasRecords(file, num_records) || !CheckBinaryModelFile(file).ok()) {
+      return Status::Error("cannot write " + file + ": " +
+                           DescribeWriteFailure(file));
+    }
+    const Status status = SyncToDisk(file);
+    if (!status.ok()) return status;
+  }
+  return SyncToDisk(path);
+}
 
 Status WriteModelFolder(
     const std::string& output_path,
@@ -44,30 +103,73 @@ Status WriteModelFolder(
     const std::map<image_t, FrameOfImage>& frames) {
   const fs::path folder(output_path);
   const fs::path temporary = folder / kTemporaryName;
+  Status status = CheckModelFolders(output_path);
+  if (!status.ok()) return status;
   try {
     fs::remove_all(temporary);
-    for (size_t i = 0; i < models.size(); ++i) {
-      if (!WriteModel(*models[i], frames, temporary / std::to_string(i))) {
-        fs::remove_all(temporary);
-        return Status::Error("cannot write a model to " + output_path +
-                             "; check the free space");
-      }
-    }
-    for (size_t i = 0; i < models.size(); ++i) {
-      const std::string name = std::to_string(i);
-      fs::remove_all(folder / name);
-      fs::rename(temporary / name, folder / name);
-    }
-    for (size_t i = models.size(); fs::exists(folder / std::to_string(i));
-         ++i) {
-      fs::remove_all(folder / std::to_string(i));
-    }
+    status = WriteModels(models, frames, temporary);
+    if (status.ok()) status = ReplaceModels(temporary, folder, models.size());
     fs::remove_all(temporary);
   } catch (const fs::filesystem_error& error) {
     return Status::Error("cannot write to " + output_path + ": " +
                          error.code().message());
   }
+  return status;
+}
+
+Status CheckModelFolders(const std::string& output_path) {
+  std::error_code error;
+  for (const fs::directory_entry& entry :
+       fs::directory_iterator(output_path, error)) {
+    if (!IsNumber(entry.path().filename().string())) continue;
+    const Status status = CheckModelFolder(entry.path().string());
+    if (!status.ok()) return status;
+  }
   return Status::Ok();
+}
+
+Status CheckModelFolder(const std::string& path,
+                        const std::vector<std::string>& other_names) {
+  constexpr char kAdvice[] =
+      " is in the way of a model and is not replaced; choose another output "
+      "folder, or move it";
+  std::error_code error;
+  const fs::file_type type = fs::symlink_status(path, error).type();
+  if (type == fs::file_type::not_found) return Status::Ok();
+  if (type != fs::file_type::directory) {
+    return Status::Error(path + ", which is not a folder," + kAdvice);
+  }
+  for (const fs::directory_entry& entry : fs::directory_iterator(path, error)) {
+    const std::string name = entry.path().filename().string();
+    const bool is_known =
+        IsModelFile(name) || std::find(other_names.begin(), other_names.end(),
+                                       name) != other_names.end();
+    if (is_known && entry.symlink_status().type() == fs::file_type::regular) {
+      continue;
+    }
+    return Status::Error(entry.path().string() +
+                         ", which is no file of a model," + kAdvice);
+  }
+  if (error) {
+    return Status::Error("cannot read " + path + ": " + error.message());
+  }
+  return Status::Ok();
+}
+
+Status RemoveModelFolder(const std::string& path,
+                         const std::vector<std::string>& other_names) {
+  const Status status = CheckModelFolder(path, other_names);
+  std::error_code error;
+  if (!status.ok() || !fs::exists(path, error)) return status;
+  std::vector<fs::path> files;
+  for (const fs::directory_entry& entry : fs::directory_iterator(path, error)) {
+    files.push_back(entry.path());
+  }
+  // Never a folder with content: what appears meanwhile stays.
+  for (const fs::path& file : files) fs::remove(file, error);
+  fs::remove(path, error);
+  if (!error) return Status::Ok();
+  return Status::Error("cannot remove " + path + ": " + error.message());
 }
 
 }  // namespace adasfm

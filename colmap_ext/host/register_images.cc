@@ -10,6 +10,7 @@
 #include <optional>
 #include <tuple>
 
+#include "colmap_ext/host/camera.h"
 #include "colmap_ext/host/database_schema.h"
 #include "colmap_ext/host/features.h"
 #include "colmap_ext/host/host_features.h"
@@ -48,8 +49,12 @@ bool ParseCameraParams(const FeatureOptions& options,
   } catch (const std::exception&) {
     return false;
   }
-  return colmap::CameraModelVerifyParams(
-      colmap::CameraModelNameToId(options.camera_model), *params);
+  const int model_id = colmap::CameraModelNameToId(options.camera_model);
+  if (!colmap::CameraModelVerifyParams(model_id, *params)) return false;
+  colmap::Camera camera;
+  camera.SetModelId(model_id);
+  camera.SetParams(*params);
+  return HasUsableParams(camera);
 }
 
 colmap::Camera MakeCamera(const FeatureOptions& options,
@@ -114,6 +119,11 @@ class ImageWriter {
     return Status::Ok();
   }
 
+  // COLMAP reports no failed write.
+  bool IsComplete() const {
+    return static_cast<int>(database_.NumImages()) == result_.num_images;
+  }
+
   ImageRegistration& Result() { return result_; }
 
  private:
@@ -148,7 +158,8 @@ bool FeatureOptions::IsValid(std::string* error) const {
              " must be one of COLMAP's, as PINHOLE or OPENCV_FISHEYE";
   } else if (!ParseCameraParams(*this, &params)) {
     *error = "camera_params = " + camera_params +
-             " must be the parameters of " + camera_model + ": " +
+             " must be the parameters, and the focal length positive, of " +
+             camera_model + ": " +
              colmap::CameraModelParamsInfo(
                  colmap::CameraModelNameToId(camera_model));
   } else if (single_camera < -1 || single_camera > 1) {
@@ -207,6 +218,11 @@ StatusOr<ImageRegistration> RegisterImages(
     return Status::Error("none of the " + std::to_string(names.size()) +
                          " files in " + image_path +
                          " is an image; check --image_path");
+  }
+  if (!writer.IsComplete()) {
+    return Status::Error(database_path +
+                         ": not all images could be written; make sure that "
+                         "the disk has room, and run again");
   }
   return writer.Result();
 }

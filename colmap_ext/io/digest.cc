@@ -32,6 +32,12 @@ class Hash {
 
 }  // namespace
 
+std::string DigestText(const std::string& text) {
+  Hash hash;
+  hash.Add(text.data(), text.size());
+  return hash.Text();
+}
+
 StatusOr<std::string> DigestPath(const std::string& path) {
   if (path.empty()) return std::string("none");
   std::error_code error;
@@ -89,15 +95,16 @@ StatusOr<std::vector<std::string>> ListFilesRecursively(
   for (; !error && entry != fs::recursive_directory_iterator();
        entry.increment(error)) {
     const bool is_hidden = entry->path().filename().string()[0] == '.';
-    if (entry->is_directory()) {
-      std::error_code none;
+    // A link that leads nowhere, or to itself, is no file.
+    std::error_code none;
+    if (entry->is_directory(none)) {
       if (is_hidden || (!excluded.empty() &&
                         fs::equivalent(entry->path(), excluded, none))) {
         entry.disable_recursion_pending();
       }
       continue;
     }
-    if (is_hidden || !entry->is_regular_file()) continue;
+    if (is_hidden || !entry->is_regular_file(none)) continue;
     names.push_back(entry->path().lexically_relative(folder).generic_string());
   }
   if (error) {

@@ -11,6 +11,9 @@ namespace adasfm {
 
 // Short texts that change when files do, to tell whether a result is outdated.
 
+// Of a text.
+std::string DigestText(const std::string& text);
+
 // Of a file's bytes or, for a folder, of its files' names and sizes. "none" for
 // an empty path. An error when there is no such file.
 StatusOr<std::string> DigestPath(const std::string& path);

@@ -1,14 +1,67 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "colmap_ext/io/output_files.h"
 
+#include <fcntl.h>
 #include <unistd.h>
 
+#include <cerrno>
+#include <cstring>
 #include <filesystem>
-#include <fstream>
 
 namespace adasfm {
+namespace {
 
 namespace fs = std::filesystem;
+
+// More than the largest buffer of a file system and of a library.
+constexpr size_t kProbeBytes = 1 << 20;
+
+std::string AdviceFor(int error) {
+  switch (error) {
+    case ENOSPC:
+    case EDQUOT:
+    case EFBIG:
+      return "make room, or choose another folder, and run again";
+    case EIO:
+      return "check the disk";
+    default:
+      return "choose a path in a folder that is writable";
+  }
+}
+
+std::string ReasonAndAdvice(int error) {
+  return std::string(std::strerror(error)) + "; " + AdviceFor(error);
+}
+
+// Returns 0, or the error of the system.
+int WriteAll(int file, const char* data, size_t num_bytes) {
+  while (num_bytes > 0) {
+    const ssize_t written = write(file, data, num_bytes);
+    if (written < 0) {
+      if (errno == EINTR) continue;
+      return errno;
+    }
+    data += written;
+    num_bytes -= written;
+  }
+  return 0;
+}
+
+// Creates or replaces the file and syncs it.
+int WriteAndSync(const std::string& path, const std::string& text) {
+  const int file =
+      open(path.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
+  if (file < 0) return errno;
+  int error = WriteAll(file, text.data(), text.size());
+  if (error == 0 && fsync(file) != 0) error = errno;
+  if (close(file) != 0 && error == 0) error = errno;
+  return error;
+}
+
+// Some file systems cannot sync folders, or nothing at all.
+bool IsUnsupported(int error) { return error == EINVAL || error == ENOTSUP; }
+
+}  // namespace
 
 Status PrepareOutputFolder(const std::string& path) {
   std::error_code error;
@@ -28,20 +81,62 @@ Status PrepareOutputFolder(const std::string& path) {
 
 Status WriteTextFile(const std::string& path, const std::string& text) {
   const std::string temporary = path + ".tmp";
-  {
-    std::ofstream file(temporary, std::ios::binary);
-    file << text;
-    file.close();
-    if (file) {
-      std::error_code error;
-      fs::rename(temporary, path, error);
-      if (!error) return Status::Ok();
-    }
+  int error = WriteAndSync(temporary, text);
+  if (error == 0 && rename(temporary.c_str(), path.c_str()) != 0) error = errno;
+  if (error != 0) {
+    unlink(temporary.c_str());
+    return Status::Error("cannot write " + path + ": " +
+                         ReasonAndAdvice(error));
   }
-  std::error_code ignored;
-  fs::remove(temporary, ignored);
+  const std::string folder = fs::path(path).parent_path().string();
+  return SyncToDisk(folder.empty() ? "." : folder);
+}
+
+Status CheckOutputFile(const std::string& path) {
+  const fs::path folder = fs::path(path).parent_path();
+  std::error_code none;
+  if (fs::is_directory(path, none)) {
+    return Status::Error("cannot write " + path +
+                         ": it is a folder; choose a file in it");
+  }
+  if (access(folder.empty() ? "." : folder.c_str(), W_OK | X_OK) == 0) {
+    return Status::Ok();
+  }
+  return Status::Error("cannot write " + path + ": " + ReasonAndAdvice(errno));
+}
+
+Status CheckOutputIsNoInput(
+    const std::string& output_path,
+    const std::vector<std::pair<std::string, std::string>>& inputs) {
+  for (const auto& [option, path] : inputs) {
+    std::error_code none;
+    if (path.empty() || !fs::equivalent(output_path, path, none)) continue;
+    return Status::Error("the output " + output_path + " is the input --" +
+                         option + "; choose another path for it");
+  }
+  return Status::Ok();
+}
+
+Status SyncToDisk(const std::string& path) {
+  const int file = open(path.c_str(), O_RDONLY | O_CLOEXEC);
+  int error = file < 0 ? errno : 0;
+  if (error == 0 && fsync(file) != 0) error = errno;
+  if (file >= 0) close(file);
+  if (error == 0 || IsUnsupported(error)) return Status::Ok();
   return Status::Error("cannot write " + path +
-                       "; choose a path in a folder that is writable");
+                       " to the disk: " + ReasonAndAdvice(error));
+}
+
+std::string DescribeWriteFailure(const std::string& path) {
+  const int file = open(path.c_str(), O_WRONLY | O_APPEND | O_CLOEXEC);
+  if (file < 0) return ReasonAndAdvice(errno);
+  int error =
+      WriteAll(file, std::string(kProbeBytes, '\0').data(), kProbeBytes);
+  if (error == 0 && fsync(file) != 0) error = errno;
+  close(file);
+  return error != 0 ? ReasonAndAdvice(error)
+                    : "a part of it was not written; check the free space and "
+                      "run again";
 }
 
 }  // namespace adasfm

@@ -19,7 +19,10 @@ StatusOr<StepJournal> StepJournal::Read(const std::string& path) {
   if (!std::filesystem::exists(path, error)) return journal;
   try {
     std::ifstream file(path);
-    for (const nlohmann::json& entry : nlohmann::json::parse(file)) {
+    // Throws for anything but a list.
+    const auto entries =
+        nlohmann::json::parse(file).get<nlohmann::json::array_t>();
+    for (const nlohmann::json& entry : entries) {
       Step step;
       step.name = entry.at("name");
       step.inputs = entry.at("inputs").get<StepInputs>();
@@ -92,13 +95,18 @@ Status StepJournal::KeepOnly(const std::string& name) {
 
 StatusOr<double> StepJournal::Run(const std::string& name,
                                   const StepInputs& inputs,
-                                  const std::function<Status()>& reset,
-                                  const std::function<Status()>& work,
+                                  const StepActions& actions,
                                   const MessageCallback& message) {
-  const State state = GetState(name, inputs);
+  State state = GetState(name, inputs);
   if (state == State::kDone) {
-    message(name + ": done before");
-    return Find(name)->seconds;
+    const Status found = actions.check();
+    if (found.ok()) {
+      message(name + ": done before");
+      return Find(name)->seconds;
+    }
+    message(name + ": done before, but " + found.message() +
+            "; doing this and all that follows again");
+    state = State::kBegun;
   }
   if (state == State::kChanged) {
     message(name + ": " + DescribeChange(name, inputs) +
@@ -109,10 +117,11 @@ StatusOr<double> StepJournal::Run(const std::string& name,
   if (state != State::kBegun) {
     // After a crash in here no inputs are those of the step.
     status = Begin(name, {{"removing", "old results"}});
-    if (status.ok()) status = reset();
+    if (status.ok()) status = actions.reset();
   }
   if (status.ok()) status = Begin(name, inputs);
-  if (status.ok()) status = work();
+  if (status.ok()) status = actions.work();
+  if (status.ok()) status = actions.check();
   if (!status.ok()) return status;
   const std::chrono::duration<double> elapsed =
       std::chrono::steady_clock::now() - start;

@@ -48,12 +48,20 @@ class StepJournal {
   // Forgets all steps but this one.
   Status KeepOnly(const std::string& name);
 
-  // Does the step, unless it is done with these inputs: `reset`, unless it was
-  // begun with them, removes what other inputs left; `work` does it, continuing
-  // from what is there. Returns the seconds that it took, now or then.
+  struct StepActions {
+    // Removes what other inputs left, unless the step was begun with these.
+    std::function<Status()> reset;
+    // Does the step, continuing from what is there.
+    std::function<Status()> work;
+    // Whether the result is there and whole; an error says what is missing.
+    std::function<Status()> check;
+  };
+
+  // Does the step, unless it is done with these inputs and its result is there.
+  // What `check` misses after the work is an error, and the step is not done.
+  // Returns the seconds that it took, now or then.
   StatusOr<double> Run(const std::string& name, const StepInputs& inputs,
-                       const std::function<Status()>& reset,
-                       const std::function<Status()>& work,
+                       const StepActions& actions,
                        const MessageCallback& message);
 
   const std::vector<Step>& Steps() const { return steps_; }

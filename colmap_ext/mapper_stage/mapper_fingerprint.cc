@@ -17,6 +17,7 @@ class Hash {
     }
   }
   void Add(const std::string& text) {
+    Add(text.size());
     for (const char c : text) Add(c);
   }
   void Add(const Rigid3d& pose) {

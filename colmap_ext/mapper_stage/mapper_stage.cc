@@ -8,8 +8,10 @@
 #include <sstream>
 #include <stdexcept>
 
+#include "colmap_ext/io/output_files.h"
 #include "colmap_ext/mapper_stage/mapper_fingerprint.h"
 #include "colmap_ext/mapper_stage/mapper_steps.h"
+#include "colmap_ext/mapper_stage/model_checkpoint.h"
 #include "colmap_ext/mapper_stage/part_memory.h"
 #include "core/parallel.h"
 
@@ -31,9 +33,14 @@ LocalMapperOptions StricterOptions(LocalMapperOptions options) {
   return options;
 }
 
-bool IsMetric(const SceneData& data) {
-  return std::any_of(data.priors.begin(), data.priors.end(),
-                     [](const auto& prior) { return prior.HasLength(); });
+// Lengths between other images, such as those of another coarse model, say
+// nothing.
+bool IsMetric(const SceneData& data, const CoarsePoseMap& coarse) {
+  return std::any_of(
+      data.priors.begin(), data.priors.end(), [&coarse](const auto& prior) {
+        return prior.HasLength() && coarse.count(prior.image_id1) > 0 &&
+               coarse.count(prior.image_id2) > 0;
+      });
 }
 
 MapperStageOptions WithThreads(MapperStageOptions options) {
@@ -78,42 +85,48 @@ MapperStage::MapperStage(const MapperStageOptions& options,
       part_mapper_(std::move(part_mapper)) {
   std::string error;
   if (!options.IsValid(&error)) throw std::invalid_argument(error);
-  summary_.is_metric = IsMetric(data);
+  summary_.is_metric = IsMetric(data, coarse);
 }
 
 void MapperStage::Report(const std::string& line, double share_done) const {
-  share_done_ = std::max(share_done_.load(), share_done);
-  if (progress_) progress_(line, share_done_);
+  double largest = share_done_;
+  while (share_done > largest &&
+         !share_done_.compare_exchange_weak(largest, share_done)) {
+  }
+  if (progress_) progress_(line, std::max(largest, share_done));
 }
 
 Status MapperStage::Plan() {
   const StepTimer timer;
   const std::string path = checkpoint_path_ + "/plan.json";
-  if (ReadPlan().ok()) {
+  CheckpointCondition condition;
+  const Status found = ReadPlan(&condition);
+  if (found.ok()) {
     Report("plan of " + std::to_string(summary_.plan.parts.size()) +
                " parts taken from " + path,
            0.02);
     return Status::Ok();
   }
-  // Parts of another plan must not be mixed with this one's.
-  std::error_code error;
-  if (fs::exists(path)) {
+  Status status = CheckCheckpointFolder(checkpoint_path_);
+  // The parts of a plan that is lost are still those of the new one: both
+  // follow from what the fingerprint is of.
+  if (condition == CheckpointCondition::kDamaged) {
+    Report(path + " is damaged: making it again", 0.0);
+  } else if (condition == CheckpointCondition::kOutdated) {
     Report("options or database have changed: starting anew", 0.0);
+    if (status.ok()) status = RemoveCheckpoints(checkpoint_path_);
   }
-  fs::remove_all(checkpoint_path_, error);
-  fs::create_directories(checkpoint_path_, error);
-  if (error) {
-    return Status::Error("cannot create the folder " + checkpoint_path_);
-  }
+  if (status.ok()) status = PrepareOutputFolder(checkpoint_path_);
+  if (!status.ok()) return status;
   summary_.plan = BuildPartitionPlan(options_.partition, data_, coarse_);
-  const Status status = WritePartitionPlan(path, fingerprint_, summary_.plan);
+  status = WritePartitionPlan(path, fingerprint_, summary_.plan);
   summary_.plan_seconds = timer.Seconds();
   return status;
 }
 
-Status MapperStage::ReadPlan() {
-  StatusOr<PartitionPlan> plan =
-      ReadPartitionPlan(checkpoint_path_ + "/plan.json", fingerprint_);
+Status MapperStage::ReadPlan(CheckpointCondition* condition) {
+  StatusOr<PartitionPlan> plan = ReadPartitionPlan(
+      checkpoint_path_ + "/plan.json", fingerprint_, condition);
   if (!plan.ok()) return plan.status();
   summary_.plan = std::move(*plan);
   return Status::Ok();
@@ -172,7 +185,14 @@ PartReport MapperStage::MapPart(int part_index, int num_threads,
 
 Status MapperStage::RunPartWithThreads(int part_index, int num_threads) {
   const std::string path = PartCheckpointPath(checkpoint_path_, part_index);
-  if (ReadPartReport(path, fingerprint_).ok()) return Status::Ok();
+  const StatusOr<PartReport> found =
+      ReadPartReport(path, fingerprint_, part_index);
+  // What made a part fail, such as too little memory, may have gone.
+  if (found.ok() && found->failure.empty()) return Status::Ok();
+  if (!found.ok() && fs::exists(path)) {
+    Report(found.status().message() + ": making part " +
+           std::to_string(part_index) + " again");
+  }
   LocalMapResult result;
   const PartReport report = MapPart(part_index, num_threads, &result);
   return WritePartCheckpoint(

@@ -102,7 +102,7 @@ class MapperStage {
   const std::string& Fingerprint() const { return fingerprint_; }
 
  private:
-  Status ReadPlan();
+  Status ReadPlan(CheckpointCondition* condition = nullptr);
   Status RunPartWithThreads(int part_index, int num_threads);
   PartReport MapPart(int part_index, int num_threads,
                      LocalMapResult* result) const;
@@ -129,8 +129,11 @@ class MapperStage {
   MapperStageSummary summary_;
 };
 
-// As JSON, and as the lines for the screen.
-std::string FormatMapperSummaryJson(const MapperStageSummary& summary);
+struct Verdict;
+
+// As JSON, with the verdict unless it is null, and as the lines for the screen.
+std::string FormatMapperSummaryJson(const MapperStageSummary& summary,
+                                    const Verdict* verdict = nullptr);
 std::string FormatMapperSummaryText(const MapperStageSummary& summary);
 
 }  // namespace adasfm

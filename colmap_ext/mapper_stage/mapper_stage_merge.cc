@@ -67,12 +67,13 @@ Status MapperStage::ReadPartReports(bool require_all_parts) {
   summary_.parts.clear();
   for (size_t k = 0; k < summary_.plan.parts.size(); ++k) {
     const StatusOr<PartReport> report =
-        ReadPartReport(PartCheckpointPath(checkpoint_path_, k), fingerprint_);
+        ReadPartReport(PartCheckpointPath(checkpoint_path_, k), fingerprint_,
+                       static_cast<int>(k));
     if (report.ok()) {
       summary_.parts.push_back(*report);
       continue;
     }
-    missing += " " + std::to_string(k);
+    missing += " " + std::to_string(k) + " (" + report.status().message() + ")";
     PartReport missing_report;
     missing_report.part_index = static_cast<int>(k);
     missing_report.num_images = static_cast<int>(summary_.plan.parts[k].size());
@@ -98,8 +99,10 @@ Status MapperStage::MergePartModels(const std::string& fingerprint) {
     part.part_index = report.part_index;
     part.prior_only_images = report.prior_only_images;
     if (report.failure.empty()) {
-      ReadPartModel(PartCheckpointPath(checkpoint_path_, report.part_index),
-                    &part.reconstruction);
+      StatusOr<colmap::Reconstruction> model = ReadPartModel(
+          PartCheckpointPath(checkpoint_path_, report.part_index));
+      if (!model.ok()) return model.status();
+      part.reconstruction = std::move(*model);
     }
     parts.push_back(std::move(part));
   }
@@ -181,6 +184,7 @@ StatusOr<colmap::Reconstruction> MapperStage::Merge(bool require_all_parts) {
   StatusOr<int> num_done = ReadMergeCheckpoint(checkpoint_path_, fingerprint,
                                                &summary_, scene.get());
   if (!num_done.ok()) {
+    Report(num_done.status().message() + ": merging the parts", 0.63);
     scene.reset();  // Merging needs one of its own.
     status = MergePartModels(fingerprint);
     if (!status.ok()) return status;

@@ -4,6 +4,7 @@
 #include <sstream>
 
 #include "colmap_ext/mapper_stage/mapper_stage.h"
+#include "colmap_ext/mapper_stage/verdict.h"
 
 namespace adasfm {
 namespace {
@@ -37,7 +38,8 @@ nlohmann::json PartAsJson(const MapperStageSummary& summary, size_t k) {
 
 }  // namespace
 
-std::string FormatMapperSummaryJson(const MapperStageSummary& summary) {
+std::string FormatMapperSummaryJson(const MapperStageSummary& summary,
+                                    const Verdict* verdict) {
   nlohmann::json json = {
       {"num_images", summary.num_images},
       {"num_points", summary.num_points},
@@ -61,6 +63,7 @@ std::string FormatMapperSummaryJson(const MapperStageSummary& summary) {
       {"parts_seconds", summary.parts_seconds},
       {"merge_seconds", summary.merge_seconds},
       {"refine_seconds", summary.refine_seconds}};
+  if (verdict != nullptr) json["verdict"] = VerdictToJson(*verdict);
   json["parts"] = nlohmann::json::array();
   for (size_t k = 0; k < summary.parts.size(); ++k) {
     json["parts"].push_back(PartAsJson(summary, k));

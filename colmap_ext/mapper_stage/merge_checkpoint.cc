@@ -103,15 +103,36 @@ void PutIntoScene(const colmap::Reconstruction& model, MapperScene* scene) {
   }
 }
 
+Status ReadRound(const std::string& path, const std::string& fingerprint,
+                 int num_rounds, MapperStageSummary* summary,
+                 MapperScene* scene) {
+  const StatusOr<nlohmann::json> state = ReadCheckpointState(path, fingerprint);
+  if (!state.ok()) return state.status();
+  const StatusOr<colmap::Reconstruction> model = ReadCheckpointModel(path);
+  if (!model.ok()) return model.status();
+  try {
+    if (state->at("num_rounds").get<int>() != num_rounds) {
+      return Status::Error(path + " holds another round");
+    }
+    SummaryFromJson(*state, summary);
+  } catch (const nlohmann::json::exception&) {
+    return Status::Error(path + " is damaged");
+  }
+  PutIntoScene(*model, scene);
+  return Status::Ok();
+}
+
 }  // namespace
 
 Status WriteMergeCheckpoint(const std::string& checkpoint_path,
                             const std::string& fingerprint, int num_rounds,
                             const MapperStageSummary& summary,
                             const MapperScene& scene) {
+  nlohmann::json state = AsJson(summary);
+  state["num_rounds"] = num_rounds;
   const Status status =
       WriteModelCheckpoint(RoundPath(checkpoint_path, num_rounds), fingerprint,
-                           AsJson(summary), &scene.reconstruction);
+                           std::move(state), &scene.reconstruction);
   if (!status.ok()) return status;
   for (int round = 0; round < num_rounds; ++round) {
     std::error_code ignored;
@@ -124,22 +145,17 @@ StatusOr<int> ReadMergeCheckpoint(const std::string& checkpoint_path,
                                   const std::string& fingerprint,
                                   MapperStageSummary* summary,
                                   MapperScene* scene) {
+  std::string problems;
   for (int num_rounds = kNumRefinementRounds; num_rounds >= 0; --num_rounds) {
     const std::string path = RoundPath(checkpoint_path, num_rounds);
-    const StatusOr<nlohmann::json> state =
-        ReadCheckpointState(path, fingerprint);
-    if (!state.ok() || !HasCheckpointModel(path)) continue;
-    try {
-      SummaryFromJson(*state, summary);
-    } catch (const nlohmann::json::exception&) {
-      continue;
-    }
-    colmap::Reconstruction model;
-    ReadCheckpointModel(path, &model);
-    PutIntoScene(model, scene);
-    return num_rounds;
+    if (!std::filesystem::exists(path)) continue;
+    const Status status =
+        ReadRound(path, fingerprint, num_rounds, summary, scene);
+    if (status.ok()) return num_rounds;
+    problems += (problems.empty() ? "" : "; ") + status.message();
   }
-  return Status::Error("no merged model in " + checkpoint_path);
+  return Status::Error(
+      problems.empty() ? "no merged model in " + checkpoint_path : problems);
 }
 
 }  // namespace adasfm

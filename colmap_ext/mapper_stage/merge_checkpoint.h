@@ -19,7 +19,8 @@ Status WriteMergeCheckpoint(const std::string& checkpoint_path,
 
 // Reads the checkpoint of most rounds into the summary and the scene, none of
 // whose images may be registered, and returns its rounds. An error when there
-// is none of this fingerprint.
+// is none of this fingerprint that is sound; it says what is wrong with those
+// that are there.
 StatusOr<int> ReadMergeCheckpoint(const std::string& checkpoint_path,
                                   const std::string& fingerprint,
                                   MapperStageSummary* summary,

@@ -53,13 +53,18 @@ Status WritePartCheckpoint(const std::string& path,
 }
 
 StatusOr<PartReport> ReadPartReport(const std::string& path,
-                                    const std::string& fingerprint) {
+                                    const std::string& fingerprint,
+                                    int part_index) {
   const StatusOr<nlohmann::json> state = ReadCheckpointState(path, fingerprint);
   if (!state.ok()) return state.status();
   try {
     PartReport report = FromJson(*state);
-    if (report.failure.empty() && !HasCheckpointModel(path)) {
-      return Status::Error(path + " lacks a file of its model");
+    if (report.part_index != part_index) {
+      return Status::Error(path + " holds part " +
+                           std::to_string(report.part_index));
+    }
+    if (report.failure.empty() && !state->contains("files")) {
+      return Status::Error(path + " has no model");
     }
     return report;
   } catch (const nlohmann::json::exception&) {
@@ -67,9 +72,8 @@ StatusOr<PartReport> ReadPartReport(const std::string& path,
   }
 }
 
-void ReadPartModel(const std::string& path,
-                   colmap::Reconstruction* reconstruction) {
-  ReadCheckpointModel(path, reconstruction);
+StatusOr<colmap::Reconstruction> ReadPartModel(const std::string& path) {
+  return ReadCheckpointModel(path);
 }
 
 }  // namespace adasfm

@@ -35,12 +35,13 @@ Status WritePartCheckpoint(const std::string& path,
                            const PartReport& report,
                            const colmap::Reconstruction* reconstruction);
 
-// An error when the folder is missing, damaged or of another fingerprint.
+// An error when the folder is missing, damaged, of another fingerprint or of
+// another part.
 StatusOr<PartReport> ReadPartReport(const std::string& path,
-                                    const std::string& fingerprint);
+                                    const std::string& fingerprint,
+                                    int part_index);
 
 // The model of a part whose report has no failure.
-void ReadPartModel(const std::string& path,
-                   colmap::Reconstruction* reconstruction);
+StatusOr<colmap::Reconstruction> ReadPartModel(const std::string& path);
 
 }  // namespace adasfm

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "colmap_ext/mapper_stage/partition_plan.h"
 
-#include <filesystem>
-#include <fstream>
 #include <nlohmann/json.hpp>
 
 namespace adasfm {
@@ -67,43 +65,28 @@ PartitionPlan BuildPartitionPlan(const PartitionPlanOptions& options,
 Status WritePartitionPlan(const std::string& path,
                           const std::string& fingerprint,
                           const PartitionPlan& plan) {
-  nlohmann::json json;
-  json["fingerprint"] = fingerprint;
-  json["parts"] = plan.parts;
-  json["overlap_ratios"] = plan.overlap_ratios;
-  const std::string temporary_path = path + ".tmp";
-  {
-    std::ofstream file(temporary_path);
-    file << json.dump(1) << "\n";
-    if (!file) return Status::Error("cannot write " + temporary_path);
-  }
-  std::error_code error;
-  std::filesystem::rename(temporary_path, path, error);
-  if (error) return Status::Error("cannot write " + path);
-  return Status::Ok();
+  return WriteCheckpointFile(
+      path, fingerprint,
+      {{"parts", plan.parts}, {"overlap_ratios", plan.overlap_ratios}});
 }
 
 StatusOr<PartitionPlan> ReadPartitionPlan(const std::string& path,
-                                          const std::string& fingerprint) {
-  std::ifstream file(path);
-  if (!file) {
-    return Status::Error("no partition plan at " + path +
+                                          const std::string& fingerprint,
+                                          CheckpointCondition* condition) {
+  const CheckpointFile file = ReadCheckpointFile(path, fingerprint);
+  if (condition != nullptr) *condition = file.condition;
+  if (file.condition != CheckpointCondition::kSound) {
+    return Status::Error(file.problem +
                          "; run --AdaSfmMapper.stage plan first");
   }
   try {
-    const nlohmann::json json = nlohmann::json::parse(file);
-    if (json.at("fingerprint").get<std::string>() != fingerprint) {
-      return Status::Error(
-          path +
-          " was made with other options or another database; run "
-          "--AdaSfmMapper.stage plan again");
-    }
     PartitionPlan plan;
-    plan.parts = json.at("parts").get<std::vector<std::vector<image_t>>>();
-    plan.overlap_ratios = json.at("overlap_ratios").get<std::vector<double>>();
+    file.content.at("parts").get_to(plan.parts);
+    file.content.at("overlap_ratios").get_to(plan.overlap_ratios);
     return plan;
   } catch (const nlohmann::json::exception&) {
-    return Status::Error(path + " is damaged; delete it and run again");
+    if (condition != nullptr) *condition = CheckpointCondition::kDamaged;
+    return Status::Error(path + " is damaged; run --AdaSfmMapper.stage plan");
   }
 }
 

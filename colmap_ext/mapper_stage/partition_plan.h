@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "colmap_ext/mapper/local_mapper_scene.h"
+#include "colmap_ext/mapper_stage/checkpoint_file.h"
 #include "colmap_ext/scene/scene_data.h"
 #include "core/status.h"
 #include "core/types.h"
@@ -43,8 +44,10 @@ PartitionPlan BuildPartitionPlan(const PartitionPlanOptions& options,
 Status WritePartitionPlan(const std::string& path,
                           const std::string& fingerprint,
                           const PartitionPlan& plan);
-// An error for a missing or damaged file and for another fingerprint.
-StatusOr<PartitionPlan> ReadPartitionPlan(const std::string& path,
-                                          const std::string& fingerprint);
+// An error for a missing or damaged file and for another fingerprint;
+// `condition`, unless null, says which.
+StatusOr<PartitionPlan> ReadPartitionPlan(
+    const std::string& path, const std::string& fingerprint,
+    CheckpointCondition* condition = nullptr);
 
 }  // namespace adasfm

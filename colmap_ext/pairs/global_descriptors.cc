@@ -18,7 +18,8 @@ constexpr size_t kBlockSize = 64;
 
 int CountImages(SqliteConnection* database) {
   SqliteStatement statement(database,
-                            "SELECT COUNT(*) FROM descriptors WHERE rows > 0");
+                            "SELECT COUNT(*) FROM descriptors WHERE rows > 0 "
+                            "AND image_id IN (SELECT image_id FROM images)");
   return statement.Step() ? statement.Int(0) : 0;
 }
 
@@ -166,6 +167,11 @@ StatusOr<GlobalDescriptors> ComputeGlobalDescriptors(
     }
     GlobalDescriptors result =
         DescribeImages(options, num_images, &database, progress);
+    if (result.vectors.cols() == 0) {
+      result.warnings.push_back(
+          "the local descriptors of all images are the same: no images are "
+          "similar, only neighbours are paired");
+    }
     const int num_missing =
         static_cast<int>(ReadImages(&database).size()) - num_images;
     if (num_missing > 0) {

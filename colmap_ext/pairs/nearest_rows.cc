@@ -21,7 +21,7 @@ std::vector<std::vector<int>> FindNearestRows(
   std::vector<std::vector<int>> nearest(num_rows);
   // One more than asked for: the row itself is among them.
   const int num_found = std::min(num_neighbors + 1, num_rows);
-  if (num_neighbors < 1 || num_rows < 2) return nearest;
+  if (num_neighbors < 1 || num_rows < 2 || vectors.cols() == 0) return nearest;
   float* data = const_cast<float*>(vectors.data());
   flann::Index<flann::L2<float>> index(
       flann::Matrix<float>(data, num_rows, vectors.cols()),

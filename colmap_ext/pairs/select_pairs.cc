@@ -10,6 +10,7 @@
 #include "colmap_ext/host/database.h"
 #include "colmap_ext/pairs/nearest_rows.h"
 #include "colmap_ext/scene/capture_order.h"
+#include "colmap_ext/scene/image_finder.h"
 #include "sensors/io/read_image_times.h"
 
 namespace adasfm {
@@ -26,23 +27,32 @@ StatusOr<std::map<image_t, timestamp_t>> TimesFromDatabase(
   return times;
 }
 
-std::string BaseName(const std::string& path) {
-  return path.substr(path.find_last_of('/') + 1);
-}
-
 StatusOr<std::map<image_t, timestamp_t>> TimesFromFile(
-    const std::string& path, const std::vector<DatabaseImage>& images) {
+    const std::string& path, const std::vector<DatabaseImage>& images,
+    std::vector<std::string>* warnings) {
   const StatusOr<std::vector<ImageTime>> list = ReadImageTimes(path);
   if (!list.ok()) return list.status();
-  // Time lists often leave the folder out.
-  std::map<std::string, timestamp_t> by_name;
-  for (const ImageTime& time : *list) {
-    by_name.emplace(BaseName(time.name), time.timestamp_ns);
+  ImageFinder finder;
+  for (const DatabaseImage& image : images) {
+    finder.Add(image.image_id, image.name);
   }
   std::map<image_t, timestamp_t> times;
-  for (const DatabaseImage& image : images) {
-    const auto time = by_name.find(BaseName(image.name));
-    if (time != by_name.end()) times[image.image_id] = time->second;
+  for (const ImageTime& time : *list) {
+    const image_t image_id = finder.Find(time.name);
+    if (image_id == kInvalidImageId) continue;
+    if (!times.emplace(image_id, time.timestamp_ns).second) {
+      return Status::Error(path + ": image " + time.name + " has two times");
+    }
+  }
+  if (times.empty() && !images.empty()) {
+    return Status::Error(path +
+                         " has no image of the database (whose first one is " +
+                         images.front().name + "); check --image_times_path");
+  }
+  if (times.size() < images.size()) {
+    warnings->push_back(path + " has times of " + std::to_string(times.size()) +
+                        " of the " + std::to_string(images.size()) +
+                        " images: the order of the names is taken");
   }
   return times;
 }
@@ -117,7 +127,10 @@ bool PairSelectionOptions::IsValid(std::string* error) const {
 
 StatusOr<std::vector<image_t>> OrderImages(const std::string& database_path,
                                            const std::string& image_times_path,
-                                           bool* ordered_by_time) {
+                                           bool* ordered_by_time,
+                                           std::vector<std::string>* warnings) {
+  std::vector<std::string> unread_warnings;
+  if (warnings == nullptr) warnings = &unread_warnings;
   std::vector<DatabaseImage> images;
   try {
     SqliteConnection database(database_path, SqliteConnection::Mode::kRead);
@@ -126,8 +139,9 @@ StatusOr<std::vector<image_t>> OrderImages(const std::string& database_path,
     return Status::Error(database_path + ": " + error.what());
   }
   const StatusOr<std::map<image_t, timestamp_t>> times_or =
-      image_times_path.empty() ? TimesFromDatabase(database_path)
-                               : TimesFromFile(image_times_path, images);
+      image_times_path.empty()
+          ? TimesFromDatabase(database_path)
+          : TimesFromFile(image_times_path, images, warnings);
   if (!times_or.ok()) return times_or.status();
   const std::map<image_t, timestamp_t>& times = *times_or;
   std::vector<CapturedImage> captured;
@@ -149,8 +163,9 @@ StatusOr<PairSelection> SelectPairs(const PairSelectionOptions& options,
   Status status = CheckDatabase(database_path);
   if (!status.ok()) return status;
   PairSelection selection;
-  const StatusOr<std::vector<image_t>> order = OrderImages(
-      database_path, options.image_times_path, &selection.ordered_by_time);
+  const StatusOr<std::vector<image_t>> order =
+      OrderImages(database_path, options.image_times_path,
+                  &selection.ordered_by_time, &selection.warnings);
   if (!order.ok()) return order.status();
   const int num_images = order->size();
   selection.num_images = num_images;

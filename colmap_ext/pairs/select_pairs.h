@@ -46,9 +46,9 @@ StatusOr<PairSelection> SelectPairs(const PairSelectionOptions& options,
 // The image ids in the order of time: by the file or adasfm_image_times where
 // every image has a time there, else by name (digits count as numbers: image2
 // comes before image10).
-StatusOr<std::vector<image_t>> OrderImages(const std::string& database_path,
-                                           const std::string& image_times_path,
-                                           bool* ordered_by_time);
+StatusOr<std::vector<image_t>> OrderImages(
+    const std::string& database_path, const std::string& image_times_path,
+    bool* ordered_by_time, std::vector<std::string>* warnings = nullptr);
 
 // Lines `name1 name2`, for matches_importer --match_type pairs. An error for
 // names with spaces, which that format cannot hold.

@@ -16,6 +16,7 @@
 #include "colmap_ext/host/model.h"
 #include "colmap_ext/host/pose_conversion.h"
 #include "colmap_ext/priors/read_sensor_logs.h"
+#include "colmap_ext/scene/image_finder.h"
 #include "colmap_ext/scene/scene_data.h"
 #include "colmap_ext/scene/two_view_poses.h"
 #include "global/two_view/refine_relative_poses.h"
@@ -26,42 +27,20 @@
 namespace adasfm {
 namespace {
 
-std::string BaseName(const std::string& path) {
-  return path.substr(path.find_last_of('/') + 1);
+ImageFinder BuildImageFinder(const SceneData& scene) {
+  ImageFinder finder;
+  for (const auto& [image_id, image] : scene.images) {
+    finder.Add(image_id, image.name);
+  }
+  return finder;
 }
-
-// Images by their name in the database and, where that is unique, by their file
-// name: time lists often leave the folder out.
-class ImageFinder {
- public:
-  explicit ImageFinder(const SceneData& scene) {
-    for (const auto& [image_id, image] : scene.images) {
-      by_name_[image.name] = image_id;
-      const auto [entry, is_new] =
-          by_base_name_.emplace(BaseName(image.name), image_id);
-      if (!is_new) entry->second = kInvalidImageId;
-    }
-  }
-
-  // kInvalidImageId when there is no such image.
-  image_t Find(const std::string& name) const {
-    const auto exact = by_name_.find(name);
-    if (exact != by_name_.end()) return exact->second;
-    const auto similar = by_base_name_.find(BaseName(name));
-    return similar == by_base_name_.end() ? kInvalidImageId : similar->second;
-  }
-
- private:
-  std::map<std::string, image_t> by_name_;
-  std::map<std::string, image_t> by_base_name_;
-};
 
 StatusOr<std::vector<ImageStamp>> StampsFromFile(
     const std::string& path, const SceneData& scene,
     std::vector<std::string>* warnings) {
   const StatusOr<std::vector<ImageTime>> times = ReadImageTimes(path);
   if (!times.ok()) return times.status();
-  const ImageFinder finder(scene);
+  const ImageFinder finder = BuildImageFinder(scene);
   std::map<image_t, ImageStamp> stamps;
   std::vector<std::string> unknown;
   for (const ImageTime& time : *times) {
@@ -264,7 +243,7 @@ StatusOr<std::map<image_t, Rigid3d>> ReadTrajectoryPoses(
   if (std::filesystem::is_directory(path)) {
     const StatusOr<colmap::Reconstruction> model = ReadModel(path);
     if (!model.ok()) return model.status();
-    const ImageFinder finder(scene);
+    const ImageFinder finder = BuildImageFinder(scene);
     for (const auto& [model_id, cam_from_world] : CamsFromWorld(*model)) {
       const image_t image_id = finder.Find(model->Image(model_id).Name());
       if (image_id != kInvalidImageId) poses[image_id] = cam_from_world;

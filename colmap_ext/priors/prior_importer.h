@@ -7,8 +7,8 @@
 #include "colmap_ext/database/prior_tables.h"
 #include "core/status.h"
 #include "sensors/estimate_priors.h"
-#include "sensors/log_cleaning/log_fault.h"
 #include "sensors/io/bag_topics.h"
+#include "sensors/log_cleaning/log_fault.h"
 #include "sensors/trajectory_priors.h"
 
 namespace adasfm {

@@ -166,6 +166,12 @@ nlohmann::json ChartData(const ReportOptions& options, const ReportInput& input,
   return data;
 }
 
+std::string FormatVerdictLine(const ReportVerdict& verdict) {
+  if (verdict.result.empty()) return "";
+  return "<p class=\"verdict " + verdict.result + "\" role=\"status\">" +
+         EscapeHtml(verdict.line) + "</p>\n";
+}
+
 std::string FormatNotes(const std::vector<std::string>& notes) {
   std::string html;
   for (const std::string& note : notes) {
@@ -199,6 +205,7 @@ StatusOr<std::string> BuildReport(const ReportOptions& options) {
   return FillTemplate(
       kReportTemplate,
       {{"SOURCE", EscapeHtml(options.input_path)},
+       {"VERDICT", FormatVerdictLine(FindVerdict(input->summaries))},
        {"FIGURES", FormatFigures(ListFigures(*input))},
        {"NOTES", FormatNotes(input->notes)},
        {"SENSORS", FormatTable(FormatSensors(input->summaries))},

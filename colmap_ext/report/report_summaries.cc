@@ -107,6 +107,16 @@ ReportSummaries ReadReportSummaries(const std::string& database_path,
   return summaries;
 }
 
+ReportVerdict FindVerdict(const ReportSummaries& summaries) {
+  if (!summaries.mapper.is_object()) return {};
+  const auto verdict = summaries.mapper.find("verdict");
+  if (verdict == summaries.mapper.end()) return {};
+  const std::string result = TextAt(*verdict, "result");
+  // It becomes the name of a style.
+  if (result != "good" && result != "doubtful" && result != "failed") return {};
+  return {result, TextAt(*verdict, "line")};
+}
+
 std::optional<bool> IsMetric(const ReportSummaries& summaries) {
   const Json& mapper = summaries.mapper;
   if (mapper.is_object() && mapper.contains("is_metric")) {

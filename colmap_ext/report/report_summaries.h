@@ -28,6 +28,14 @@ ReportSummaries ReadReportSummaries(const std::string& database_path,
                                     const std::string& coarse_folder,
                                     const std::string& mapper_folder);
 
+// The mapper's verdict: "good", "doubtful" or "failed", and its line. Empty
+// when there is none.
+struct ReportVerdict {
+  std::string result;
+  std::string line;
+};
+ReportVerdict FindVerdict(const ReportSummaries& summaries);
+
 // None when no stage says.
 std::optional<bool> IsMetric(const ReportSummaries& summaries);
 

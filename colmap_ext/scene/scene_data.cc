@@ -1,11 +1,13 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "colmap_ext/scene/scene_data.h"
 
+#include <algorithm>
 #include <utility>
 
 #include "colmap_ext/database/prior_corrections.h"
 #include "colmap_ext/database/prior_tables.h"
 #include "colmap_ext/database/two_view_geometry_backup.h"
+#include "colmap_ext/host/camera.h"
 #include "colmap_ext/host/camera_models.h"
 #include "colmap_ext/host/database.h"
 #include "core/sqlite.h"
@@ -20,6 +22,15 @@ void ReadSceneImages(SqliteConnection* database, SceneData* scene) {
     if (scene->cameras.count(row.camera_id) == 0) {
       throw SqliteError("image " + row.name + " has a camera, id " +
                         std::to_string(row.camera_id) + ", that is missing");
+    }
+    if (!HasUsableParams(scene->cameras.at(row.camera_id))) {
+      throw SqliteError("camera " + std::to_string(row.camera_id) +
+                        ", that of image " + row.name +
+                        ", has parameters that no camera has");
+    }
+    if (row.name.find('\0') != std::string::npos) {
+      throw SqliteError("the name of image " + std::to_string(row.image_id) +
+                        " has a zero byte");
     }
     SceneImage& image = scene->images[row.image_id];
     image.image_id = row.image_id;
@@ -68,6 +79,41 @@ void CheckIndices(const SceneData& scene, const ImagePair& pair,
   }
 }
 
+// A keypoint that is not a number cannot be seen: its matches go.
+bool IsUsable(const SceneImage& image, point2D_t index) {
+  return image.keypoints[index].allFinite();
+}
+
+void DropUnusableMatches(const SceneData& scene, const ImagePair& pair,
+                         std::vector<FeatureMatch>* matches) {
+  const SceneImage& image1 = scene.images.at(pair.image_id1);
+  const SceneImage& image2 = scene.images.at(pair.image_id2);
+  const auto end = std::remove_if(
+      matches->begin(), matches->end(), [&](const FeatureMatch& match) {
+        return !IsUsable(image1, match.point2D_idx1) ||
+               !IsUsable(image2, match.point2D_idx2);
+      });
+  matches->erase(end, matches->end());
+}
+
+// Names the first image that has such keypoints. They stand for nothing any
+// more, but keep their places.
+void ReplaceUnusableKeypoints(SceneData* scene) {
+  size_t count = 0;
+  std::string name;
+  for (auto& [image_id, image] : scene->images) {
+    for (Eigen::Vector2d& keypoint : image.keypoints) {
+      if (keypoint.allFinite()) continue;
+      if (count++ == 0) name = image.name;
+      keypoint.setZero();
+    }
+  }
+  if (count == 0) return;
+  scene->warnings.push_back(std::to_string(count) +
+                            " keypoints are not numbers (the first image " +
+                            "with one is " + name + "); they were left out");
+}
+
 // The rows to start from, by pair: the present ones, or the originals where
 // adasfm_global replaced them.
 std::map<ImagePair, DatabaseTwoViewGeometry> ReadRows(
@@ -100,13 +146,20 @@ std::map<ImagePair, DatabaseTwoViewGeometry> ReadRows(
 
 void ReadScenePairs(SqliteConnection* database, const SceneDataOptions& options,
                     SceneData* scene) {
+  int num_unknown = 0;
   for (auto& [pair, row] : ReadRows(database, options)) {
+    if (pair.image_id1 == pair.image_id2) {
+      throw SqliteError("an image, id " + std::to_string(pair.image_id1) +
+                        ", is paired with itself");
+    }
     // COLMAP leaves the pairs of deleted images in the table.
     if (scene->images.count(pair.image_id1) == 0 ||
         scene->images.count(pair.image_id2) == 0) {
+      ++num_unknown;
       continue;
     }
     CheckIndices(*scene, pair, row.inlier_matches);
+    DropUnusableMatches(*scene, pair, &row.inlier_matches);
     ScenePair scene_pair;
     scene_pair.image_id1 = pair.image_id1;
     scene_pair.image_id2 = pair.image_id2;
@@ -116,6 +169,11 @@ void ReadScenePairs(SqliteConnection* database, const SceneDataOptions& options,
     scene_pair.essential_matrix = row.essential_matrix;
     scene->pairs.push_back(std::move(scene_pair));
   }
+  if (num_unknown == 0) return;
+  scene->warnings.push_back(
+      std::to_string(num_unknown) +
+      " verified pairs belong to images that the database does not have any "
+      "more; they were left out");
 }
 
 void ReadRawMatches(SqliteConnection* database, SceneData* scene) {
@@ -132,6 +190,7 @@ void ReadRawMatches(SqliteConnection* database, SceneData* scene) {
                   return;
                 }
                 CheckIndices(*scene, pair, matches);
+                DropUnusableMatches(*scene, pair, &matches);
                 next->raw_matches = std::move(matches);
               });
 }
@@ -152,6 +211,7 @@ StatusOr<SceneData> ReadSceneData(const std::string& database_path,
     if (options.read_priors) ReadScenePriors(&database, options, &scene);
     ReadScenePairs(&database, options, &scene);
     if (options.read_raw_matches) ReadRawMatches(&database, &scene);
+    ReplaceUnusableKeypoints(&scene);
   } catch (const SqliteError& error) {
     return Status::Error(database_path + ": " + error.what() +
                          "; the database is damaged or out of step with "

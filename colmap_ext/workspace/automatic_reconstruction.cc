@@ -2,12 +2,18 @@
 #include "colmap_ext/workspace/automatic_reconstruction.h"
 
 #include <filesystem>
+#include <fstream>
+#include <memory>
+#include <nlohmann/json.hpp>
 #include <sstream>
 #include <stdexcept>
 
 #include "colmap_ext/coarse/global_report.h"
+#include "colmap_ext/database/prior_tables.h"
 #include "colmap_ext/host/color_points.h"
+#include "colmap_ext/host/model.h"
 #include "colmap_ext/io/digest.h"
+#include "colmap_ext/io/folder_lock.h"
 #include "colmap_ext/io/output_files.h"
 #include "colmap_ext/io/step_journal.h"
 #include "colmap_ext/report/report.h"
@@ -87,6 +93,7 @@ class Reconstructor {
     if (status.ok()) status = Coarse();
     if (status.ok()) status = Model();
     if (status.ok()) status = Report();
+    if (status.ok()) status = ReadVerdict();
     if (!status.ok()) return status;
     return result_;
   }
@@ -119,11 +126,10 @@ class Reconstructor {
     }
   }
 
-  template <typename Reset, typename Work>
   Status RunStep(const std::string& name, const StepInputs& inputs,
-                 const Reset& reset, const Work& work) {
+                 const StepJournal::StepActions& actions) {
     const StatusOr<double> seconds =
-        journal_.Run(name, inputs, reset, work, message_);
+        journal_.Run(name, inputs, actions, message_);
     if (!seconds.ok()) return seconds.status();
     result_.steps.push_back({name, *seconds});
     return Status::Ok();
@@ -138,12 +144,16 @@ class Reconstructor {
   Status Coarse();
   Status Model();
   Status Report();
+  Status ReadVerdict();
+  // A model and its summary in a folder of the workspace.
+  Status CheckResult(const std::string& folder) const;
 
   AutomaticReconstructionOptions options_;
   AutomaticReconstructionPaths paths_;
   const ProgressCallback& progress_;
   const MessageCallback& message_;
   std::string database_path_;
+  std::shared_ptr<FolderLock> lock_;
   StepJournal journal_;
   AutomaticReconstructionResult result_;
 };
@@ -156,11 +166,14 @@ Status Reconstructor::Prepare() {
         "give the photos as either --image_path or --bag_path");
   }
   Status status = PrepareOutputFolder(InWorkspace("logs"));
+  if (!status.ok()) return status;
+  const auto lock =
+      FolderLock::Acquire(paths_.workspace_path, FolderLock::Mode::kExclusive);
+  if (!lock.ok()) return lock.status();
+  lock_ = *lock;
   // A bag's photos and logs are input as any others once they are files.
   const bool has_bag = !paths_.bag_path.empty();
-  if (status.ok() && !has_bag) {
-    status = PrepareReconstruction(&options_, &paths_);
-  }
+  if (!has_bag) status = PrepareReconstruction(&options_, &paths_);
   if (!status.ok()) return status;
   database_path_ = InWorkspace("database.db");
   result_.model_path = InWorkspace("sparse/0");
@@ -186,16 +199,22 @@ Status Reconstructor::Bag() {
   StatusOr<StepInputs> inputs = DigestBag(paths_.bag_path, bag);
   if (!inputs.ok()) return inputs.status();
   const std::string folder = BagFolder(paths_.workspace_path);
-  const Status status = RunStep(
-      kBagStep, *inputs, [&folder] { return RemoveBagFiles(folder); },
-      [&] {
-        const StatusOr<BagExtraction> extraction =
-            ExtractBag(paths_.bag_path, bag, folder, ProgressIn(kBag, "bag"));
-        if (!extraction.ok()) return extraction.status();
-        Warn(extraction->warnings);
-        message_(extraction->summary);
-        return Status::Ok();
-      });
+  const auto reset = [&folder] { return RemoveBagFiles(folder); };
+  const auto work = [&]() -> Status {
+    const StatusOr<BagExtraction> extraction =
+        ExtractBag(paths_.bag_path, bag, folder, ProgressIn(kBag, "bag"));
+    if (!extraction.ok()) return extraction.status();
+    Warn(extraction->warnings);
+    message_(extraction->summary);
+    return Status::Ok();
+  };
+  const auto check = [&folder] {
+    const BagFiles files = FindBagFiles(folder);
+    return files.image_path.empty() || files.image_times_path.empty()
+               ? Status::Error("the photos of the bag are not in " + folder)
+               : Status::Ok();
+  };
+  const Status status = RunStep(kBagStep, *inputs, {reset, work, check});
   if (status.ok()) UseBagFiles(FindBagFiles(folder), &options_, &paths_);
   return status;
 }
@@ -248,10 +267,10 @@ Status Reconstructor::Features() {
       {"single_camera", std::to_string(features.single_camera)},
       {"max_image_size", std::to_string(features.max_image_size)},
       {"max_num_features", std::to_string(features.max_num_features)}};
-  return RunStep(
-      "features", inputs,
-      [this] { return ResetFeatures(paths_.workspace_path); },
-      [&] { return ExtractAll(*names); });
+  return RunStep("features", inputs,
+                 {[this] { return ResetFeatures(paths_.workspace_path); },
+                  [&] { return ExtractAll(*names); },
+                  [this] { return CheckFeatures(database_path_); }});
 }
 
 Status Reconstructor::Matching() {
@@ -265,7 +284,7 @@ Status Reconstructor::Matching() {
   inputs.value()["num_similar_images"] =
       std::to_string(pairs.num_similar_images);
   const auto reset = [this] { return ResetMatches(database_path_); };
-  return RunStep("matching", *inputs, reset, [&] {
+  const auto work = [&]() -> Status {
     const ProgressCallback progress = ProgressIn(kMatching, "matching");
     const StatusOr<PairSelection> selection =
         SelectPairs(pairs, database_path_,
@@ -278,12 +297,16 @@ Status Reconstructor::Matching() {
              " pairs of neighbours in time, " +
              std::to_string(selection->num_similar) +
              " more of similar images");
-    return MatchPairs(options_.features, selection->pairs, database_path_,
-                      InWorkspace("logs/matching.log"),
-                      [&progress](const std::string& what, double share_done) {
-                        progress(what, 0.05 + 0.95 * share_done);
-                      });
-  });
+    const Status matched =
+        MatchPairs(options_.features, selection->pairs, database_path_,
+                   InWorkspace("logs/matching.log"),
+                   [&progress](const std::string& what, double share_done) {
+                     progress(what, 0.05 + 0.95 * share_done);
+                   });
+    return matched.ok() ? CheckMatches(database_path_, selection->pairs)
+                        : matched;
+  };
+  return RunStep("matching", *inputs, {reset, work, &KeepAll});
 }
 
 Status Reconstructor::Priors() {
@@ -294,10 +317,10 @@ Status Reconstructor::Priors() {
                    {"sensors", paths_.sensors_path}});
   if (!inputs.ok()) return inputs.status();
   const auto reset = [this] { return ResetPriors(database_path_); };
-  return RunStep("priors", *inputs, reset, [this] {
-    if (paths_.imu_path.empty() && paths_.wheel_path.empty()) {
-      return Status::Ok();
-    }
+  const bool has_sensors =
+      !paths_.imu_path.empty() || !paths_.wheel_path.empty();
+  const auto work = [&]() -> Status {
+    if (!has_sensors) return Status::Ok();
     ProgressIn(kPriors, "priors")("reading the logs", 0.0);
     PriorImportPaths paths;
     paths.database_path = database_path_;
@@ -310,13 +333,22 @@ Status Reconstructor::Priors() {
     if (!import.ok()) return import.status();
     message_(FormatPriorImport(*import));
     return Status::Ok();
-  });
+  };
+  const auto check = [&]() -> Status {
+    if (!has_sensors) return Status::Ok();
+    const StatusOr<LoadedPriorTables> tables = ReadPriorTables(database_path_);
+    if (!tables.ok()) return tables.status();
+    return tables->tables.priors.empty()
+               ? Status::Error("the priors are missing in " + database_path_)
+               : Status::Ok();
+  };
+  return RunStep("priors", *inputs, {reset, work, check});
 }
 
 Status Reconstructor::Coarse() {
   const StepInputs inputs = {
       {"refine_intrinsics", std::to_string(options_.map.refine_focal_length)}};
-  return RunStep("coarse", inputs, &KeepAll, [this] {
+  const auto work = [this]() -> Status {
     const StatusOr<CoarseModelReport> report = EstimateCoarseModel(
         options_.global, database_path_, InWorkspace("coarse"),
         ProgressIn(kCoarse, "coarse model"));
@@ -324,11 +356,13 @@ Status Reconstructor::Coarse() {
     Warn(report->warnings);
     message_(FormatGlobalReportText(report->result, report->seconds));
     return Status::Ok();
-  });
+  };
+  return RunStep("coarse", inputs,
+                 {&KeepAll, work, [this] { return CheckResult("coarse"); }});
 }
 
 Status Reconstructor::Model() {
-  return RunStep("model", {}, &KeepAll, [this] {
+  const auto work = [this]() -> Status {
     MapRequest request;
     request.database_path = database_path_;
     request.input_path = InWorkspace("coarse/0");
@@ -339,14 +373,16 @@ Status Reconstructor::Model() {
     message_(FormatMapperSummaryText(report->summary));
     return ColorPoints(paths_.image_path, InWorkspace("sparse"),
                        InWorkspace("logs/colors.log"));
-  });
+  };
+  return RunStep("model", {},
+                 {&KeepAll, work, [this] { return CheckResult("sparse"); }});
 }
 
 Status Reconstructor::Report() {
   const StatusOr<StepInputs> inputs =
       DigestPaths({{"ground_truth", paths_.ground_truth_path}});
   if (!inputs.ok()) return inputs.status();
-  return RunStep("report", *inputs, &KeepAll, [this] {
+  const auto work = [this]() -> Status {
     ProgressIn(kReport, "report")("drawing", 0.0);
     ReportOptions options;
     options.input_path = InWorkspace("sparse");
@@ -358,7 +394,41 @@ Status Reconstructor::Report() {
     const StatusOr<std::string> page = BuildReport(options);
     if (!page.ok()) return page.status();
     return WriteTextFile(result_.report_path, *page);
-  });
+  };
+  const auto check = [this] {
+    std::error_code none;
+    return std::filesystem::exists(result_.report_path, none)
+               ? Status::Ok()
+               : Status::Error(result_.report_path + " is missing");
+  };
+  return RunStep("report", *inputs, {&KeepAll, work, check});
+}
+
+Status Reconstructor::CheckResult(const std::string& folder) const {
+  for (const char* name : {"cameras.bin", "images.bin", "points3D.bin"}) {
+    const Status status =
+        CheckBinaryModelFile(InWorkspace(folder + "/0/" + name));
+    if (!status.ok()) return status;
+  }
+  const std::string summary = InWorkspace(folder + "/summary.json");
+  std::error_code none;
+  return std::filesystem::exists(summary, none)
+             ? Status::Ok()
+             : Status::Error(summary + " is missing");
+}
+
+Status Reconstructor::ReadVerdict() {
+  const std::string path = InWorkspace("sparse/summary.json");
+  std::ifstream file(path);
+  const nlohmann::json json =
+      nlohmann::json::parse(file, nullptr, /*allow_exceptions=*/false);
+  try {
+    json.at("verdict").at("line").get_to(result_.verdict);
+    result_.has_failed = json.at("verdict").at("result") == "failed";
+  } catch (const nlohmann::json::exception&) {
+    return Status::Error(path + " has no verdict; remove it and run again");
+  }
+  return Status::Ok();
 }
 
 }  // namespace

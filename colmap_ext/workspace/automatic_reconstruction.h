@@ -60,6 +60,10 @@ struct AutomaticReconstructionResult {
   std::vector<Step> steps;
   std::string model_path;
   std::string report_path;
+  // Of the model, by this call or an earlier one: one line, and whether it is
+  // that the model failed.
+  std::string verdict;
+  bool has_failed = false;
 };
 
 // From a folder of photos, and sensor logs where there are any, to the model

@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <vector>
 
+#include "colmap_ext/database/prior_corrections.h"
 #include "core/sqlite.h"
 
 namespace adasfm {
@@ -18,15 +19,17 @@ Status Remove(const std::string& path) {
   return Status::Error("cannot remove " + path + ": " + error.message());
 }
 
-// All statements, or none.
+// All statements and the rest, or nothing.
 Status Execute(const std::string& database_path,
-               const std::vector<std::string>& statements) {
+               const std::vector<std::string>& statements,
+               void (*rest)(SqliteConnection*)) {
   try {
     SqliteConnection database(database_path, SqliteConnection::Mode::kWrite);
     SqliteTransaction transaction(&database);
     for (const std::string& statement : statements) {
       database.Execute(statement);
     }
+    rest(&database);
     transaction.Commit();
     return Status::Ok();
   } catch (const SqliteError& error) {
@@ -49,7 +52,8 @@ Status ResetFeatures(const std::string& workspace_path) {
 Status ResetMatches(const std::string& database_path) {
   return Execute(database_path,
                  {"DELETE FROM matches", "DELETE FROM two_view_geometries",
-                  "DROP TABLE IF EXISTS adasfm_two_view_geometries"});
+                  "DROP TABLE IF EXISTS adasfm_two_view_geometries"},
+                 RemovePriorCorrections);
 }
 
 Status ResetPriors(const std::string& database_path) {
@@ -58,8 +62,8 @@ Status ResetPriors(const std::string& database_path) {
   return Execute(database_path,
                  {"DROP TABLE IF EXISTS adasfm_image_times",
                   "DROP TABLE IF EXISTS adasfm_relative_pose_priors",
-                  "DROP TABLE IF EXISTS adasfm_gravity",
-                  "DROP TABLE IF EXISTS adasfm_prior_corrections"});
+                  "DROP TABLE IF EXISTS adasfm_gravity"},
+                 RemovePriorCorrections);
 }
 
 }  // namespace adasfm

@@ -2,8 +2,10 @@
 #include "core/parallel.h"
 
 #include <gtest/gtest.h>
+#include <sys/resource.h>
 
 #include <atomic>
+#include <cstdlib>
 #include <stdexcept>
 #include <vector>
 
@@ -18,6 +20,18 @@ TEST(ParallelFor, CallsEveryIndexOnce) {
       for (const std::atomic<int>& call : calls) EXPECT_EQ(call, 1);
     }
   }
+}
+
+// A stack is memory: with little of it few threads begin.
+TEST(ParallelFor, DoesTheWorkOnTheThreadsThatThereAre) {
+  const auto run = [] {
+    const rlimit limit = {200u << 20, 200u << 20};
+    setrlimit(RLIMIT_AS, &limit);
+    std::atomic<int> num_calls{0};
+    ParallelFor(1000, 5000, [&num_calls](size_t) { ++num_calls; });
+    std::_Exit(num_calls == 5000 ? 0 : 1);
+  };
+  EXPECT_EXIT(run(), testing::ExitedWithCode(0), "");
 }
 
 TEST(ParallelFor, RethrowsAnException) {

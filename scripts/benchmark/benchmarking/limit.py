@@ -13,10 +13,12 @@ CAMERA_MODELS = ['SIMPLE_PINHOLE', 'PINHOLE', 'SIMPLE_RADIAL', 'RADIAL',
                  'THIN_PRISM_FISHEYE']
 
 
-def write_true_poses(database, ground_truth_path, model_path):
-  """A model of the matched images of the database, at their true poses.
+def write_true_poses(database, ground_truth_path, model_path,
+                     matched_only=True):
+  """A model of the images of the database, at their true poses.
 
-  Images without a verified pair stay out: the data say nothing about them.
+  With matched_only, images without a verified pair stay out: vision says
+  nothing about them.
   """
   connection = sqlite3.connect(database)
   names = dict(connection.execute('SELECT name, image_id FROM images'))
@@ -41,7 +43,7 @@ def write_true_poses(database, ground_truth_path, model_path):
       if not fields or fields[0].startswith('#') or fields[0] not in names:
         continue
       image_id = names[fields[0]]
-      if image_id in matched:
+      if image_id in matched or not matched_only:
         pose = [float(x) for x in fields[1:8]]
         poses[image_id] = (fields[0], pose[:4], pose[4:])
   write_poses(poses, camera_line, model_path)

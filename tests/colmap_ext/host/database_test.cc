@@ -240,6 +240,32 @@ TEST_F(DatabaseTest, RefusesRowsThatContradictEachOther) {
   }
 }
 
+// Counts whose product with a row's size is that of an empty blob.
+TEST_F(DatabaseTest, RefusesCountsThatOverflow) {
+  const std::string original = ReadBytes(path_);
+  for (const char* sql :
+       {"UPDATE two_view_geometries SET rows = 1 << 61, data = x''",
+        "UPDATE keypoints SET rows = 1 << 62, cols = 4, data = x''",
+        "UPDATE keypoints SET rows = 1 << 40, cols = 1 << 40, data = x''"}) {
+    Execute(sql);
+    const StatusOr<SceneData> scene = ReadSceneData(path_, SceneDataOptions());
+    ASSERT_FALSE(scene.ok()) << sql;
+    EXPECT_NE(scene.status().message().find("malformed"), std::string::npos)
+        << scene.status().message();
+    folder_.Write("database.db", original);
+  }
+}
+
+TEST_F(DatabaseTest, RefusesAnImagePairedWithItself) {
+  Execute("UPDATE two_view_geometries SET pair_id = " +
+          std::to_string(PairIdFromImagePair(ImagePair(5, 5))) +
+          " WHERE pair_id = (SELECT MIN(pair_id) FROM two_view_geometries)");
+  const StatusOr<SceneData> scene = ReadSceneData(path_, SceneDataOptions());
+  ASSERT_FALSE(scene.ok());
+  EXPECT_NE(scene.status().message().find("paired with itself"),
+            std::string::npos);
+}
+
 TEST_F(DatabaseTest, IgnoresPairsOfDeletedImages) {
   Execute(
       "DELETE FROM keypoints WHERE image_id = 4;"

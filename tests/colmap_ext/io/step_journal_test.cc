@@ -52,9 +52,56 @@ TEST(StepJournal, BeginningForgetsWhatFollows) {
   EXPECT_EQ(journal.GetState("3", {}), State::kNew);
 }
 
+TEST(StepJournal, DoneIsBelievedOnlyWithItsResult) {
+  const TemporaryFolder folder;
+  StepJournal journal = ReadOrDie(folder.File("steps.json"));
+  int num_resets = 0, num_works = 0;
+  bool is_there = true, works = true;
+  std::string messages;
+  const auto run = [&] {
+    return journal.Run("step", {},
+                       {[&] {
+                          ++num_resets;
+                          return Status::Ok();
+                        },
+                        [&] {
+                          ++num_works;
+                          is_there = works;
+                          return Status::Ok();
+                        },
+                        [&] {
+                          return is_there ? Status::Ok()
+                                          : Status::Error("a file is missing");
+                        }},
+                       [&](const std::string& text) { messages += text; });
+  };
+  // Work that leaves no result is not done, however often.
+  works = false;
+  for (int i = 0; i < 2; ++i) {
+    const StatusOr<double> result = run();
+    ASSERT_FALSE(result.ok());
+    EXPECT_EQ(result.status().message(), "a file is missing");
+  }
+  works = true;
+  ASSERT_TRUE(run().ok());
+  EXPECT_EQ(num_works, 3);
+  ASSERT_TRUE(run().ok());
+  EXPECT_EQ(num_works, 3);
+  // A result that is gone is made again, from what else is there.
+  is_there = false;
+  ASSERT_TRUE(journal.Begin("later", {}).ok());
+  ASSERT_TRUE(run().ok());
+  EXPECT_EQ(num_works, 4);
+  EXPECT_EQ(num_resets, 1);
+  EXPECT_EQ(journal.GetState("later", {}), State::kNew);
+  EXPECT_NE(messages.find("done before, but a file is missing"),
+            std::string::npos);
+}
+
 TEST(StepJournal, DamagedFileIsAnError) {
   const TemporaryFolder folder;
-  for (const char* text : {"", "{", "[1]", "[{\"name\": \"x\"}]"}) {
+  for (const char* text :
+       {"", "{", "null", "{}", "[1]", "[{\"name\": \"x\"}]"}) {
     const StatusOr<StepJournal> journal =
         StepJournal::Read(folder.Write("steps.json", text));
     ASSERT_FALSE(journal.ok()) << text;

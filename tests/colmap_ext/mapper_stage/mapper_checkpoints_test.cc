@@ -4,6 +4,8 @@
 #include <gtest/gtest.h>
 
 #include <filesystem>
+#include <fstream>
+#include <functional>
 #include <mutex>
 #include <new>
 #include <nlohmann/json.hpp>
@@ -11,6 +13,7 @@
 
 #include "colmap_ext/mapper_stage/mapper_stage.h"
 #include "colmap_ext/mapper_stage/part_memory.h"
+#include "tests/testing/colmap_ext/file_size_limit.h"
 #include "tests/testing/colmap_ext/mapper_stage_fixture.h"
 
 namespace adasfm {
@@ -50,6 +53,98 @@ TEST_F(MapperCheckpointsTest, ContinuesFromWhatIsThere) {
   for (const auto& [image_id, pose] : undisturbed) {
     EXPECT_TRUE(PosesNear(pose, continued.at(image_id), 1e-9, 1e-9));
   }
+}
+
+// Whatever is damaged is named and made again, and the model is the same.
+TEST_F(MapperCheckpointsTest, DamagedCheckpointsAreMadeAgain) {
+  MapperWorldOptions options;
+  options.world.num_images = 60;
+  const MapperWorld world = BuildMapperWorld(options);
+  options_.num_threads = 1;
+  const auto undisturbed = Run(world);
+  const std::string checkpoints = folder_ + "/checkpoints/";
+  const auto flip = [](const std::string& path, std::streamoff offset) {
+    std::fstream file(path, std::ios::in | std::ios::out | std::ios::binary);
+    file.seekp(offset);
+    file.put('\x7f');
+  };
+  const std::vector<std::pair<std::string, std::function<void()>>> damages = {
+      {"part_0/points3D.bin is damaged",
+       [&] { fs::resize_file(checkpoints + "part_0/points3D.bin", 3000); }},
+      {"part_0/cameras.bin is damaged",
+       [&] { flip(checkpoints + "part_0/cameras.bin", 40); }},
+      {"part_0/images.bin is missing",
+       [&] { fs::remove(checkpoints + "part_0/images.bin"); }},
+      {"part_0/state.json is damaged",
+       [&] { flip(checkpoints + "part_0/state.json", 60); }},
+      {"part_0 holds part 1",
+       [&] {
+         fs::remove_all(checkpoints + "part_0");
+         fs::copy(checkpoints + "part_1", checkpoints + "part_0");
+       }},
+      {"plan.json is damaged",
+       [&] { fs::resize_file(checkpoints + "plan.json", 0); }},
+      {"refine_3/points3D.bin is damaged",
+       [&] { fs::resize_file(checkpoints + "refine_3/points3D.bin", 0); }}};
+  for (const auto& [message, damage] : damages) {
+    damage();
+    const auto part_time = fs::last_write_time(checkpoints + "part_1");
+    std::string lines;
+    MapperStage stage(
+        options_, world.data, world.coarse_poses, folder_,
+        [&](const std::string& line, double) { lines += line + "\n"; });
+    ASSERT_TRUE(stage.Plan().ok()) << message;
+    ASSERT_TRUE(stage.RunAllParts().ok()) << message;
+    const auto model = stage.Merge(true);
+    ASSERT_TRUE(model.ok()) << message << model.status().message();
+    EXPECT_NE(lines.find(message), std::string::npos) << message << lines;
+    EXPECT_EQ(part_time, fs::last_write_time(checkpoints + "part_1"));
+    const auto poses = Poses(*model);
+    ASSERT_EQ(poses.size(), undisturbed.size());
+    for (const auto& [image_id, pose] : undisturbed) {
+      EXPECT_TRUE(PosesNear(pose, poses.at(image_id), 1e-12, 1e-12)) << message;
+    }
+  }
+}
+
+TEST_F(MapperCheckpointsTest, FailedWriteNamesTheCauseAndIsMadeGood) {
+  MapperWorldOptions options;
+  options.world.num_images = 60;
+  const MapperWorld world = BuildMapperWorld(options);
+  options_.num_threads = 1;
+  const auto undisturbed = Run(world);
+  fs::remove_all(folder_);
+  MapperStage stage(options_, world.data, world.coarse_poses, folder_);
+  ASSERT_TRUE(stage.Plan().ok());
+  {
+    const FileSizeLimit limit(20000);
+    const Status status = stage.RunPart(0);
+    ASSERT_FALSE(status.ok());
+    EXPECT_NE(status.message().find("File too large"), std::string::npos)
+        << status.message();
+  }
+  const auto again = Run(world);
+  ASSERT_EQ(again.size(), undisturbed.size());
+  for (const auto& [image_id, pose] : undisturbed) {
+    EXPECT_TRUE(PosesNear(pose, again.at(image_id), 1e-12, 1e-12));
+  }
+}
+
+TEST_F(MapperCheckpointsTest, ForeignFilesStayWhenOptionsChange) {
+  MapperWorldOptions options;
+  options.world.num_images = 60;
+  const MapperWorld world = BuildMapperWorld(options);
+  ASSERT_TRUE(MapperStage(options_, world.data, world.coarse_poses, folder_)
+                  .Plan()
+                  .ok());
+  const std::string foreign = folder_ + "/checkpoints/weights.pth";
+  std::ofstream(foreign) << "x";
+  options_.local.registration.max_reproj_error_px = 6.0;
+  const Status status =
+      MapperStage(options_, world.data, world.coarse_poses, folder_).Plan();
+  ASSERT_FALSE(status.ok());
+  EXPECT_NE(status.message().find(foreign), std::string::npos);
+  EXPECT_TRUE(fs::exists(foreign));
 }
 
 TEST_F(MapperCheckpointsTest, ContinuesInsideTheRefinement) {

@@ -218,6 +218,72 @@ TEST_F(SelectPairsTest, OrderIsThatOfTimesElseOfNames) {
   EXPECT_TRUE(std::is_sorted(order->rbegin(), order->rend()));
 }
 
+// Two cameras whose files have the same names.
+TEST_F(SelectPairsTest, TimesGoByWholeNames) {
+  MakeDatabase(SmallWorld(12));
+  {
+    SqliteConnection database(database_, SqliteConnection::Mode::kWrite);
+    database.Execute(
+        "UPDATE images SET name = CASE WHEN image_id > 6 THEN 'right/' || "
+        "(image_id - 6) ELSE 'left/' || image_id END || '.png'");
+  }
+  std::string times = "#timestamp [ns],filename\n";
+  for (const char* folder : {"left/", "right/"}) {
+    for (int i = 1; i <= 6; ++i) {
+      times += std::to_string(1000 + i + (*folder == 'r' ? 30 : 0)) + "," +
+               folder + std::to_string(i) + ".png\n";
+    }
+  }
+  bool by_time = false;
+  std::vector<std::string> warnings;
+  StatusOr<std::vector<image_t>> order = OrderImages(
+      database_, folder_.Write("times.csv", times), &by_time, &warnings);
+  ASSERT_TRUE(order.ok()) << order.status().message();
+  EXPECT_TRUE(by_time);
+  EXPECT_TRUE(warnings.empty());
+  EXPECT_TRUE(std::is_sorted(order->begin(), order->end()));
+  // Some images only, and none.
+  order = OrderImages(database_, folder_.Write("few.csv", times.substr(0, 50)),
+                      &by_time, &warnings);
+  ASSERT_TRUE(order.ok()) << order.status().message();
+  ASSERT_EQ(warnings.size(), 1);
+  EXPECT_NE(warnings[0].find("of the 12 images"), std::string::npos);
+  EXPECT_FALSE(OrderImages(database_,
+                           folder_.Write("other.csv",
+                                         "#timestamp [ns],filename\n"
+                                         "1000,other.png\n"),
+                           &by_time)
+                   .ok());
+}
+
+// Nothing is more similar than anything else.
+TEST_F(SelectPairsTest, EqualDescriptorsLeaveTheNeighbours) {
+  MakeDatabase(SmallWorld(12));
+  {
+    SqliteConnection database(database_, SqliteConnection::Mode::kWrite);
+    database.Execute("UPDATE descriptors SET data = zeroblob(rows * cols)");
+  }
+  const StatusOr<PairSelection> selection = SelectPairs({}, database_);
+  ASSERT_TRUE(selection.ok()) << selection.status().message();
+  EXPECT_EQ(selection->num_similar, 0);
+  EXPECT_GT(selection->num_temporal, 0);
+  ASSERT_FALSE(selection->warnings.empty());
+  EXPECT_NE(selection->warnings[0].find("are the same"), std::string::npos);
+}
+
+TEST_F(SelectPairsTest, DescriptorsOfHugeCountAreRefused) {
+  MakeDatabase(SmallWorld(12));
+  {
+    SqliteConnection database(database_, SqliteConnection::Mode::kWrite);
+    database.Execute(
+        "UPDATE descriptors SET rows = 1 << 58, data = x'' WHERE image_id = 3");
+  }
+  const StatusOr<PairSelection> selection = SelectPairs({}, database_);
+  ASSERT_FALSE(selection.ok());
+  EXPECT_NE(selection.status().message().find("malformed descriptors"),
+            std::string::npos);
+}
+
 TEST_F(SelectPairsTest, DigitsAreNumbers) {
   MakeDatabase(SmallWorld(12));
   {

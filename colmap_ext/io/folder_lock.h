@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <memory>
+#include <string>
+
+#include "core/status.h"
+
+namespace adasfm {
+
+// Keeps a second run out of a folder while this one writes to it.
+//
+// Method: flock on a hidden file in the folder, which the system gives up when
+// the process ends, however it ends; the file itself stays. It names its
+// holder. On a file system without locks nothing is locked.
+class FolderLock {
+ public:
+  enum class Mode {
+    kExclusive,
+    kShared,  // beside others of this mode
+  };
+
+  // The folder must exist. `name` distinguishes locks of one folder. An error,
+  // at once, when another run has the lock; it says which.
+  static StatusOr<std::shared_ptr<FolderLock>> Acquire(
+      const std::string& folder, Mode mode,
+      const std::string& name = ".adasfm.lock");
+
+  ~FolderLock();
+  FolderLock(const FolderLock&) = delete;
+  FolderLock& operator=(const FolderLock&) = delete;
+
+ private:
+  explicit FolderLock(int file) : file_(file) {}
+
+  int file_;  // -1: nothing is locked
+};
+
+}  // namespace adasfm

@@ -1,0 +1,69 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <nlohmann/json_fwd.hpp>
+#include <string>
+#include <vector>
+
+#include "colmap_ext/mapper_stage/mapper_stage.h"
+#include "colmap_ext/scene/scene_data.h"
+
+namespace adasfm {
+
+// What a model is worth, for somebody who does not know the field and for
+// programs.
+//
+// Inputs: the finished model, the database that it was made from, and what the
+// stages said. Method: figures that need no ground truth, each against a limit
+// (docs/reference/mapper.md tells what they catch on worlds with truth).
+
+enum class VerdictResult { kGood, kDoubtful, kFailed };
+
+// How far vision and one kind of prior agree: priors between images that points
+// hold too, after the adjustment.
+struct PriorAgreement {
+  std::string kind;  // "rotation" or "translation"
+  int num_priors = 0;
+  // Median over the priors of the squared whitened residual, divided by that of
+  // honest ones: 1 or less when the covariances are right, since the adjustment
+  // has drawn the poses to the priors.
+  double chi2_ratio = 0.0;
+  // The share of priors beyond what one honest prior in 1,000 has.
+  double share_contradicting = 0.0;
+};
+
+struct Verdict {
+  VerdictResult result = VerdictResult::kGood;
+  // Why it is not good, the worst first.
+  std::vector<std::string> reasons;
+  int num_database_images = 0;
+  int num_images = 0;
+  // Images that see enough points for a pose of their own.
+  int num_images_held_by_points = 0;
+  int num_points = 0;
+  // Of the registered images.
+  double median_points_per_image = 0.0;
+  bool is_metric = false;
+  // Where metres come from; empty without.
+  std::string metric_source;
+  std::vector<PriorAgreement> priors;
+  double keypoint_sigma_px = 0.0;
+  double keypoint_sigma_factor = 1.0;
+  double mean_reproj_error_px = 0.0;
+};
+
+// `warnings` are those of the stages before: of the import and of the coarse
+// model.
+Verdict AssessModel(const SceneData& data, const MapperStageSummary& summary,
+                    const std::vector<std::string>& warnings,
+                    const colmap::Reconstruction& model);
+
+// "good", "doubtful" or "failed".
+const char* VerdictName(VerdictResult result);
+
+// One line for the screen.
+std::string FormatVerdict(const Verdict& verdict);
+
+nlohmann::json VerdictToJson(const Verdict& verdict);
+
+}  // namespace adasfm

@@ -1,0 +1,214 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: BSD-3-Clause
+"""Verdict against error: is a model that is called good a good one?
+
+Runs the chain on synthetic worlds, as they are, hard, and spoilt in ways that
+users spoil them, and prints a table of the verdict of adasfm_mapper beside the
+model's error over the limit: the error of the mapper from the true poses on the
+unspoilt data. Fails when a model above MAX_GOOD_RATIO times the limit is called
+good, or one within it is called failed. Needs only Python's standard library.
+"""
+
+import argparse
+import json
+import os
+import random
+import shutil
+import sqlite3
+import subprocess
+import sys
+
+from benchmarking.limit import write_true_poses
+from benchmarking.spoil import edit_rows, scale_wheels, shift_clocks, turn_camera
+from benchmarking.spoil import cut_logs, scale_focal_length
+from global_worlds import PLAIN, WORLDS, world
+
+MAX_GOOD_RATIO = 3.0
+# So that 100 images have room for it.
+BASE = dict(PLAIN, num_blackouts=1, blackout_images=8)
+# What a figure of a few decimetres of drive is worth at best [m].
+LEAST_LIMIT_M = 0.01
+
+
+def set_value(folder, row, column, value):
+  def change(rows):
+    rows[row % len(rows)][column] = '%.9g' % value
+    return rows
+  edit_rows(folder, 'imu.csv', change)
+
+
+def scale_imu(folder, columns, factor):
+  edit_rows(folder, 'imu.csv', lambda rows: [
+      [('%.9g' % (factor * float(value))) if i in columns else value
+       for i, value in enumerate(row)] for row in rows])
+
+
+def zero_samples(folder, begin, count):
+  edit_rows(folder, 'imu.csv', lambda rows: [
+      row[:1] + ['0'] * 6 if begin <= i < begin + count else row
+      for i, row in enumerate(rows)])
+
+
+def execute(folder, sql):
+  database = sqlite3.connect(os.path.join(folder, 'database.db'))
+  database.execute(sql)
+  database.commit()
+  database.close()
+
+
+def lose_pairs(folder, share):
+  execute(folder, 'DELETE FROM two_view_geometries WHERE pair_id / 2147483647 '
+          '> %g * (SELECT COUNT(*) FROM images)' % share)
+
+
+def exchange_times(folder):
+  def change(rows):
+    names = [row[1] for row in rows]
+    random.Random(1).shuffle(names)
+    return [[row[0], name] for row, name in zip(rows, names)]
+  edit_rows(folder, 'times.csv', change)
+
+
+FORCE = {'import': ['--force', '1']}
+WRONG = {
+    'one gyroscope sample of 17 rad/s': world(
+        spoil=lambda w: set_value(w, 2000, 3, 17.0)),
+    'one accelerometer sample of 1e4': world(
+        spoil=lambda w: set_value(w, 1500, 5, 1e4)),
+    'IMU zero for 0.5 s': world(spoil=lambda w: zero_samples(w, 1500, 100)),
+    'accelerometer negative': world(
+        spoil=lambda w: scale_imu(w, (4, 5, 6), -1.0)),
+    'gyroscope twice, forced': world(
+        spoil=lambda w: scale_imu(w, (1, 2, 3), 2.0), **FORCE),
+    'wheels in km/h': world(spoil=lambda w: scale_wheels(w, 3.6)),
+    'wheels negative': world(spoil=lambda w: scale_wheels(w, -1.0)),
+    'wheel clock 0.5 s off': world(
+        spoil=lambda w: shift_clocks(w, ('wheel.csv',), 500)),
+    'wheel clock 3 s off': world(
+        spoil=lambda w: shift_clocks(w, ('wheel.csv',), 3000)),
+    'wheel clock 1 h off': world(
+        spoil=lambda w: shift_clocks(w, ('wheel.csv',), 3.6e6)),
+    'T_cam_imu 30 deg off, forced': world(
+        spoil=lambda w: turn_camera(w, 30), **FORCE),
+    'focal length 20 % off': world(spoil=lambda w: scale_focal_length(w, 1.2)),
+    'pairs for two thirds, no sensors after': world(
+        spoil=lambda w: (lose_pairs(w, 0.66),
+                         cut_logs(w, ('imu.csv', 'wheel.csv'), 0.66, 2))),
+    'pairs for a third, no sensors after': world(
+        spoil=lambda w: (lose_pairs(w, 0.33),
+                         cut_logs(w, ('imu.csv', 'wheel.csv'), 0.33, 2))),
+    'no verified pairs': world(
+        spoil=lambda w: execute(w, 'DELETE FROM two_view_geometries')),
+    'times of other images, forced': world(spoil=exchange_times, **FORCE),
+}
+
+
+class Chain:
+  def __init__(self, colmap, folder):
+    self.colmap = colmap
+    self.folder = folder
+
+  def path(self, name):
+    return os.path.join(self.folder, name)
+
+  def call(self, command, *arguments):
+    return subprocess.run([self.colmap, 'adasfm_' + command, *arguments],
+                          capture_output=True, text=True)
+
+  def importer(self, options):
+    arguments = ['--database_path', self.path('database.db'),
+                 '--image_times_path', self.path('times.csv'),
+                 '--sensors_path', self.path('sensors.yaml')]
+    for log in options['sensors']:
+      arguments += ['--%s_path' % log.split('.')[0], self.path(log)]
+    return self.call('prior_importer', *arguments, *options.get('import', []))
+
+  def mapper(self, source, output, options):
+    return self.call('mapper', '--database_path', self.path('database.db'),
+                     '--input_path', self.path(source), '--output_path',
+                     self.path(output), *options.get('mapper', []))
+
+  def error_m(self, output):
+    """In metres as they are, or of the shape when there are none."""
+    self.call('evaluator', '--input_path', self.path(output),
+              '--ground_truth_path', self.path('gt.txt'), '--json_path',
+              self.path('evaluation.json'))
+    with open(self.path('evaluation.json')) as file:
+      evaluation = json.load(file)
+    with open(self.path(output + '/summary.json')) as file:
+      is_metric = json.load(file)['is_metric']
+    kind = 'se3_least_squares' if is_metric else 'sim3_least_squares'
+    return evaluation[kind]['translation_rmse_m']
+
+
+def run_world(colmap, folder, options, images, seed):
+  """Verdict, error, limit and the last line of what was said."""
+  shutil.rmtree(folder, ignore_errors=True)
+  chain = Chain(colmap, folder)
+  arguments = dict(BASE, **options['synthesizer'])
+  made = chain.call('synthesizer', '--output_path', folder, '--num_images',
+                    str(images), '--seed', str(seed),
+                    *(word for name, value in arguments.items()
+                      for word in ('--' + name, str(value))))
+  if made.returncode != 0:
+    return 'not made', None, None, made.stderr
+  chain.importer(options)
+  write_true_poses(chain.path('database.db'), chain.path('gt.txt'),
+                   chain.path('truth'), matched_only=False)
+  limit = chain.mapper('truth', 'limit', {})
+  limit_m = (max(LEAST_LIMIT_M, chain.error_m('limit'))
+             if limit.returncode == 0 else None)
+  if options['spoil']:
+    options['spoil'](folder)
+    imported = chain.importer(options)
+    if imported.returncode != 0:
+      return 'refused by the importer', None, limit_m, imported.stderr
+  coarse = chain.call('global', '--database_path', chain.path('database.db'),
+                      '--output_path', chain.path('g'),
+                      *options.get('global', []))
+  if coarse.returncode != 0:
+    return 'refused by adasfm_global', None, limit_m, coarse.stderr
+  done = chain.mapper('g/0', 'm', options)
+  try:
+    with open(chain.path('m/summary.json')) as file:
+      verdict = json.load(file)['verdict']
+  except OSError:
+    return 'no model', None, limit_m, done.stderr
+  return verdict['result'], chain.error_m('m'), limit_m, verdict['line']
+
+
+def main():
+  parser = argparse.ArgumentParser(description=__doc__)
+  parser.add_argument('colmap', help='our colmap')
+  parser.add_argument('folder', help='for the worlds; removed one by one')
+  parser.add_argument('--images', type=int, default=100)
+  parser.add_argument('--seeds', type=int, nargs='+', default=[1])
+  parser.add_argument('--only', default='', help='rows with this in the name')
+  args = parser.parse_args()
+  colmap = os.path.abspath(args.colmap)
+  num_wrong = 0
+  print('| world | seed | verdict | error [m] | limit [m] | ratio | said |')
+  print('|---|---|---|---|---|---|---|')
+  for name, options in {**WORLDS, **WRONG}.items():
+    if args.only not in name:
+      continue
+    for seed in args.seeds:
+      folder = os.path.join(os.path.abspath(args.folder), 'world')
+      result, error_m, limit_m, said = run_world(colmap, folder, options,
+                                                 args.images, seed)
+      ratio = error_m / limit_m if error_m is not None and limit_m else None
+      is_wrong = ratio is not None and (
+          result == 'good' and ratio > MAX_GOOD_RATIO or
+          result == 'failed' and ratio <= MAX_GOOD_RATIO)
+      num_wrong += is_wrong
+      numbers = ['-' if value is None else '%.3g' % value
+                 for value in (error_m, limit_m, ratio)]
+      print('| %s | %d | %s%s | %s | %s |' % (
+          name, seed, result, ' (WRONG)' if is_wrong else '',
+          ' | '.join(numbers), said.strip().replace('|', '/')[:300]),
+            flush=True)
+  return 1 if num_wrong else 0
+
+
+if __name__ == '__main__':
+  sys.exit(main())

@@ -1,0 +1,65 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "colmap_ext/host/features.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "colmap_ext/datasets/write_synthetic_world.h"
+#include "core/sqlite.h"
+#include "tests/testing/colmap_ext/temporary_folder.h"
+
+namespace adasfm {
+namespace {
+
+using testing::HasSubstr;
+
+// What COLMAP wrote is counted, not what it was told to write.
+TEST(Features, MissingRowsAreFound) {
+  const TemporaryFolder folder;
+  const std::string path = folder.File("database.db");
+  SyntheticWorldOptions options;
+  options.num_images = 12;
+  const SyntheticWorld world = BuildSyntheticWorld(options);
+  ASSERT_TRUE(WriteSyntheticDatabase(world, path).ok());
+  const auto execute = [&path](const std::string& sql) {
+    SqliteConnection(path, SqliteConnection::Mode::kWrite).Execute(sql);
+  };
+  EXPECT_THAT(CheckFeatures(path).message(),
+              HasSubstr("12 of 12 images are missing"));
+  execute(
+      "INSERT INTO descriptors SELECT image_id, 0, 128, x'' FROM keypoints");
+  EXPECT_TRUE(CheckFeatures(path).ok());
+  execute("DELETE FROM keypoints WHERE image_id = 5");
+  EXPECT_THAT(CheckFeatures(path).message(),
+              HasSubstr("1 of 12 images are missing (the first one is " +
+                        world.images[4].name));
+
+  std::vector<ImagePair> pairs;
+  for (const SyntheticPair& pair : world.pairs) {
+    pairs.emplace_back(pair.image_id1, pair.image_id2);
+  }
+  EXPECT_TRUE(CheckMatches(path, pairs).ok());
+  execute(
+      "DELETE FROM two_view_geometries WHERE pair_id = (SELECT MIN(pair_id) "
+      "FROM two_view_geometries)");
+  execute(
+      "DELETE FROM matches WHERE pair_id = (SELECT MAX(pair_id) FROM matches)");
+  EXPECT_THAT(CheckMatches(path, pairs).message(),
+              HasSubstr("2 of " + std::to_string(pairs.size()) + " pairs"));
+}
+
+TEST(Features, CameraParamsMustBeUsable) {
+  FeatureOptions options;
+  options.camera_model = "PINHOLE";
+  std::string error;
+  for (const char* params : {"0,0,0,0", "nan,1,1,1", "100,-1,50,50"}) {
+    options.camera_params = params;
+    EXPECT_FALSE(options.IsValid(&error)) << params;
+    EXPECT_THAT(error, HasSubstr("camera_params"));
+  }
+  options.camera_params = "100,100,50,50";
+  EXPECT_TRUE(options.IsValid(&error)) << error;
+}
+
+}  // namespace
+}  // namespace adasfm

@@ -1,0 +1,150 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "colmap_ext/mapper_stage/verdict.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "tests/testing/colmap_ext/mapper_stage_fixture.h"
+
+namespace adasfm {
+namespace {
+
+using testing::HasSubstr;
+
+class VerdictTest : public MapperStageTest {
+ protected:
+  void SetUp() override {
+    MapperStageTest::SetUp();
+    MapperWorldOptions options;
+    options.world.num_images = 40;
+    world_ = BuildMapperWorld(options);
+    MapperStage stage(options_, world_.data, world_.coarse_poses, folder_);
+    ASSERT_TRUE(stage.Plan().ok());
+    ASSERT_TRUE(stage.RunAllParts().ok());
+    StatusOr<colmap::Reconstruction> model = stage.Merge(true);
+    ASSERT_TRUE(model.ok()) << model.status().message();
+    model_ = std::move(*model);
+    summary_ = stage.Summary();
+  }
+
+  Verdict Assess(const std::vector<std::string>& warnings = {}) const {
+    return AssessModel(world_.data, summary_, warnings, model_);
+  }
+
+  void ExpectResult(const Verdict& verdict, VerdictResult result,
+                    const std::string& reason) {
+    EXPECT_EQ(verdict.result, result) << FormatVerdict(verdict);
+    EXPECT_THAT(FormatVerdict(verdict), HasSubstr(reason));
+  }
+
+  // Images that the database has and the model has not.
+  void AddImages(int count) {
+    for (int i = 0; i < count; ++i) {
+      world_.data.images[1000 + i].image_id = 1000 + i;
+    }
+  }
+
+  MapperWorld world_;
+  colmap::Reconstruction model_;
+};
+
+TEST_F(VerdictTest, HonestModelIsGood) {
+  const Verdict verdict = Assess();
+  ExpectResult(verdict, VerdictResult::kGood, "in metres from wheels");
+  EXPECT_EQ(verdict.num_images, 40);
+  EXPECT_EQ(verdict.num_images_held_by_points, 40);
+  ASSERT_EQ(verdict.priors.size(), 2);
+  for (const PriorAgreement& priors : verdict.priors) {
+    EXPECT_EQ(priors.num_priors, 39);
+    EXPECT_GT(priors.chi2_ratio, 0.0);
+    EXPECT_LT(priors.chi2_ratio, 1.5);
+    EXPECT_LT(priors.share_contradicting, 0.05);
+  }
+  const nlohmann::json json = nlohmann::json::parse(
+      FormatMapperSummaryJson(summary_, &verdict))["verdict"];
+  EXPECT_EQ(json["result"], "good");
+  EXPECT_EQ(json["num_images"], 40);
+  EXPECT_EQ(json["priors"][0]["kind"], "rotation");
+  EXPECT_EQ(json["line"], FormatVerdict(verdict));
+}
+
+TEST_F(VerdictTest, LostImages) {
+  AddImages(1);
+  ExpectResult(Assess(), VerdictResult::kGood, "40 of 41 images");
+  AddImages(6);
+  ExpectResult(Assess(), VerdictResult::kDoubtful, "6 of 46 images are lost");
+  AddImages(50);
+  ExpectResult(Assess(), VerdictResult::kFailed, "50 of 90 images are lost");
+}
+
+TEST_F(VerdictTest, ModelWithoutPointsFailed) {
+  for (const colmap::point3D_t point_id : model_.Point3DIds()) {
+    model_.DeletePoint3D(point_id);
+  }
+  ExpectResult(Assess(), VerdictResult::kFailed, "the model has no points");
+}
+
+// Poses of a wrong log: the matches are there, and no points come of them.
+TEST_F(VerdictTest, MatchedImagesWithoutPointsFailed) {
+  std::vector<image_t> images = model_.RegImageIds();
+  std::sort(images.begin(), images.end());
+  for (size_t i = 0; i < images.size() * 6 / 10; ++i) {
+    for (const colmap::Point2D& point : model_.Image(images[i]).Points2D()) {
+      if (point.HasPoint3D()) model_.DeletePoint3D(point.Point3DId());
+    }
+  }
+  ExpectResult(Assess(), VerdictResult::kFailed,
+               "images with verified matches");
+  // Nobody expects points of images in the dark.
+  world_.data.pairs.erase(
+      std::remove_if(world_.data.pairs.begin(), world_.data.pairs.end(),
+                     [&](const ScenePair& pair) {
+                       const auto is_dark = [&](image_t image_id) {
+                         return model_.Image(image_id).NumPoints3D() < 15;
+                       };
+                       return is_dark(pair.image_id1) ||
+                              is_dark(pair.image_id2);
+                     }),
+      world_.data.pairs.end());
+  ExpectResult(Assess(), VerdictResult::kDoubtful, "see too few points");
+}
+
+TEST_F(VerdictTest, SensorsThatContradictVision) {
+  const SceneData honest = world_.data;
+  const auto turn_every = [&](size_t step, double num_sigmas) {
+    world_.data = honest;
+    for (size_t i = 0; i < world_.data.priors.size(); i += step) {
+      RelativePosePrior& prior = world_.data.priors[i];
+      const double sigma_rad = std::sqrt(prior.covariance(0, 0));
+      prior.cam2_from_cam1.rotation =
+          ExpSo3(Eigen::Vector3d(num_sigmas * sigma_rad, 0.0, 0.0)) *
+          prior.cam2_from_cam1.rotation;
+    }
+  };
+  turn_every(1, 10.0);
+  ExpectResult(Assess(), VerdictResult::kFailed, "rotations contradict");
+  turn_every(8, 10.0);
+  ExpectResult(Assess(), VerdictResult::kDoubtful, "rotations contradict");
+  turn_every(39, 10.0);
+  ExpectResult(Assess(), VerdictResult::kGood, "");
+}
+
+TEST_F(VerdictTest, WhatTheStagesSaid) {
+  ExpectResult(Assess({"the wheels slip"}), VerdictResult::kDoubtful,
+               "an earlier step warned: the wheels slip");
+  summary_.refine.num_images_put_back = 5;
+  ExpectResult(Assess(), VerdictResult::kDoubtful, "5 images contradicted");
+  summary_.refine.num_images_put_back = 0;
+  summary_.parts[0].failure = "a bad point";
+  ExpectResult(Assess(), VerdictResult::kDoubtful, "parts could not be used");
+  summary_.parts[0].failure.clear();
+  summary_.is_metric = false;
+  ExpectResult(Assess(), VerdictResult::kDoubtful, "no metres");
+}
+
+}  // namespace
+}  // namespace adasfm

@@ -1,0 +1,225 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// What the commands do to files: none that is foreign is lost, nothing damaged
+// or unfinished is believed, and the last line says what a model is worth.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstring>
+#include <filesystem>
+#include <nlohmann/json.hpp>
+
+#include "colmap_ext/io/folder_lock.h"
+#include "core/sqlite.h"
+#include "tests/testing/colmap_ext/command_line_fixture.h"
+
+namespace adasfm {
+namespace {
+
+namespace fs = std::filesystem;
+using testing::HasSubstr;
+
+class FilesTest : public CommandLineTest {
+ protected:
+  void SetUp() override {
+    const Run world = Call("adasfm_synthesizer --num_images 40 --output_path " +
+                           folder_.Path());
+    ASSERT_EQ(world.ExitCode(), 0) << world.err;
+    std::string arguments =
+        "adasfm_prior_importer --database_path " + database_;
+    for (const char* name : {"imu", "wheel", "sensors", "image_times"}) {
+      const std::string file =
+          std::string(name) == "image_times" ? "times" : name;
+      arguments += std::string(" --") + name + "_path " +
+                   folder_.File(file + (file == "sensors" ? ".yaml" : ".csv"));
+    }
+    importer_ = arguments;
+    const Run import = Call(arguments);
+    ASSERT_EQ(import.ExitCode(), 0) << import.err;
+  }
+
+  std::string Global(const std::string& output) {
+    return "adasfm_global --database_path " + database_ + " --output_path " +
+           folder_.File(output);
+  }
+  std::string Mapper(const std::string& output,
+                     const std::string& input = "g/0") {
+    return "adasfm_mapper --database_path " + database_ + " --input_path " +
+           folder_.File(input) + " --output_path " + folder_.File(output);
+  }
+  void Execute(const std::string& sql) {
+    SqliteConnection(database_, SqliteConnection::Mode::kWrite).Execute(sql);
+  }
+  nlohmann::json Verdict() {
+    return nlohmann::json::parse(
+        ReadBytes(folder_.File("m/summary.json")))["verdict"];
+  }
+
+  std::string database_ = folder_.File("database.db");
+  std::string importer_;
+};
+
+TEST_F(FilesTest, VerdictClosesTheMapper) {
+  ASSERT_EQ(Call(Global("g")).ExitCode(), 0);
+  // The last step is in the summary, too.
+  const nlohmann::json steps =
+      nlohmann::json::parse(ReadBytes(folder_.File("g/summary.json")))["steps"];
+  EXPECT_EQ(steps.back()["name"], "writing");
+  const Run run = Call(Mapper("m"));
+  ASSERT_EQ(run.ExitCode(), 0) << run.err;
+  EXPECT_THAT(run.out, HasSubstr("\nVerdict: good. 40 of 40 images"));
+  EXPECT_EQ(Verdict()["result"], "good");
+  EXPECT_EQ(Verdict()["metric_source"], "wheels");
+  // And opens the report.
+  const Run report = Call("adasfm_reporter --input_path " + folder_.File("m") +
+                          " --output_path " + folder_.File("report.html"));
+  ASSERT_EQ(report.ExitCode(), 0) << report.err;
+  EXPECT_THAT(ReadBytes(folder_.File("report.html")),
+              HasSubstr("<p class=\"verdict good\" role=\"status\">Verdict: "
+                        "good"));
+}
+
+TEST_F(FilesTest, WhoForgotTheMatcherIsToldSo) {
+  ASSERT_EQ(Call(Global("g")).ExitCode(), 0);
+  Execute("DELETE FROM two_view_geometries");
+  Execute("DROP TABLE IF EXISTS adasfm_two_view_geometries");
+  const std::string summary = ReadBytes(folder_.File("g/summary.json"));
+  ExpectError(Global("g"), "no pair has enough verified ones");
+  ExpectError(Mapper("m"), "no pair has enough verified ones");
+  Execute("DELETE FROM matches");
+  ExpectError(Global("g"), "run a matcher of COLMAP first");
+  EXPECT_EQ(ReadBytes(folder_.File("g/summary.json")), summary);
+}
+
+TEST_F(FilesTest, LostImagesAreSaid) {
+  Execute(
+      "DELETE FROM two_view_geometries WHERE pair_id / 2147483647 > 25 OR "
+      "pair_id % 2147483647 > 25");
+  Execute("DELETE FROM adasfm_relative_pose_priors WHERE rowid > 24");
+  const Run global = Call(Global("g"));
+  ASSERT_EQ(global.ExitCode(), 0) << global.err;
+  EXPECT_THAT(global.out, HasSubstr("15 of 40 images are in no model"));
+  const Run mapper = Call(Mapper("m"));
+  EXPECT_EQ(mapper.ExitCode(), 0) << mapper.err;
+  EXPECT_EQ(Verdict()["result"], "doubtful");
+  EXPECT_THAT(mapper.out, HasSubstr("15 of 40 images are lost"));
+}
+
+TEST_F(FilesTest, KeypointThatIsNoNumber) {
+  // Two of image 5, as five of 60 would be.
+  const float nan = std::nanf("");
+  std::string bytes;
+  {
+    SqliteConnection database(database_, SqliteConnection::Mode::kWrite);
+    SqliteStatement select(&database,
+                           "SELECT data FROM keypoints WHERE image_id = 5");
+    ASSERT_TRUE(select.Step());
+    bytes.assign(static_cast<const char*>(select.Blob(0)), select.NumBytes(0));
+  }
+  for (int i = 0; i < 2; ++i) std::memcpy(&bytes[i * 24], &nan, sizeof(nan));
+  {
+    SqliteConnection database(database_, SqliteConnection::Mode::kWrite);
+    SqliteStatement update(&database,
+                           "UPDATE keypoints SET data = ? WHERE image_id = 5");
+    update.BindBlob(1, bytes.data(), bytes.size());
+    update.Step();
+  }
+  const Run global = Call(Global("g"));
+  ASSERT_EQ(global.ExitCode(), 0) << global.err;
+  EXPECT_THAT(global.out, HasSubstr("keypoints are not numbers"));
+  const Run mapper = Call(Mapper("m"));
+  EXPECT_EQ(mapper.ExitCode(), 0) << mapper.err;
+  EXPECT_EQ(Verdict()["num_images"], 40);
+}
+
+TEST_F(FilesTest, CameraThatIsNone) {
+  Execute("UPDATE cameras SET params = zeroblob(32)");
+  ExpectError(Global("g"), "parameters that no camera has");
+}
+
+TEST_F(FilesTest, ForeignFilesStay) {
+  fs::create_directory(folder_.File("0"));
+  const std::string photo = folder_.Write("0/photo.jpg", "x");
+  ExpectError(Global("."), "/0/photo.jpg, which is no file of a model");
+  EXPECT_EQ(ReadBytes(photo), "x");
+  ASSERT_EQ(Call(Global("g")).ExitCode(), 0);
+  fs::create_directories(folder_.File("m/checkpoints"));
+  const std::string weights = folder_.Write("m/checkpoints/weights.pth", "x");
+  ExpectError(Mapper("m"), weights);
+  EXPECT_EQ(ReadBytes(weights), "x");
+}
+
+TEST_F(FilesTest, OutputsReplaceNoInputs) {
+  const std::string before = ReadBytes(database_);
+  ASSERT_EQ(Call(Global("g")).ExitCode(), 0);
+  const std::string model = ReadBytes(folder_.File("g/0/images.bin"));
+  ExpectError(Mapper("g"), "would be replaced");
+  EXPECT_EQ(ReadBytes(folder_.File("g/0/images.bin")), model);
+  const std::string after = ReadBytes(database_);
+  ExpectError("adasfm_reporter --input_path " + folder_.File("g") +
+                  " --database_path " + database_ + " --output_path " +
+                  database_,
+              "is the input --database_path");
+  EXPECT_EQ(ReadBytes(database_), after);
+  const std::string truth = ReadBytes(folder_.File("gt.txt"));
+  ExpectError("adasfm_evaluator --input_path " + folder_.File("g") +
+                  " --ground_truth_path " + folder_.File("gt.txt") +
+                  " --json_path " + folder_.File("gt.txt"),
+              "is the input --ground_truth_path");
+  EXPECT_EQ(ReadBytes(folder_.File("gt.txt")), truth);
+  ExpectError(importer_ + " --summary_path " + folder_.File("imu.csv"),
+              "is the input --imu_path");
+  // Somebody's own project, and a world of ours.
+  fs::remove(folder_.File("landmarks.txt"));
+  ExpectError(
+      "adasfm_synthesizer --num_images 5 --output_path " + folder_.Path(),
+      "was not made by this command");
+  EXPECT_EQ(ReadBytes(folder_.File("gt.txt")), truth);
+}
+
+TEST_F(FilesTest, SecondRunIsToldWhoHasTheFolder) {
+  fs::create_directory(folder_.File("g"));
+  const auto lock =
+      FolderLock::Acquire(folder_.File("g"), FolderLock::Mode::kExclusive);
+  ASSERT_TRUE(lock.ok());
+  ExpectError(Global("g"), "process " + std::to_string(getpid()));
+}
+
+// The models of before stay when the database cannot be written.
+TEST_F(FilesTest, LockedDatabaseLeavesTheModels) {
+  ASSERT_EQ(Call(Global("g")).ExitCode(), 0);
+  const std::string summary = ReadBytes(folder_.File("g/summary.json"));
+  SqliteConnection database(database_, SqliteConnection::Mode::kWrite);
+  const SqliteTransaction transaction(&database);
+  ExpectError(Global("g"), "database is locked; nothing was written");
+  EXPECT_EQ(ReadBytes(folder_.File("g/summary.json")), summary);
+}
+
+TEST_F(FilesTest, StrayWordsAndMisplacedOptions) {
+  ExpectError(Global("g") + " extra", "'extra' is no option");
+  ExpectError(Global("g") + " --project_path " + folder_.Path(),
+              "cannot read the project file");
+  ASSERT_EQ(Call(Global("g")).ExitCode(), 0);
+  ExpectError(Mapper("m") + " --AdaSfmMapper.part_index 0",
+              "--AdaSfmMapper.stage part only");
+}
+
+TEST_F(FilesTest, WorldOnAFullDisk) {
+  // Each size fails elsewhere: at a log, at the database.
+  for (const char* blocks : {"8", "400", "1500"}) {
+    const std::string world = folder_.File(std::string("world") + blocks);
+    const int status = std::system(
+        ("trap '' XFSZ; ulimit -f " + std::string(blocks) + "; " +
+         LauncherPath() + " adasfm_synthesizer --num_images 60 --output_path " +
+         world + " > " + folder_.File("out") + " 2> " + folder_.File("err"))
+            .c_str());
+    EXPECT_NE(status, 0) << blocks;
+    EXPECT_THAT(ReadBytes(folder_.File("err")), HasSubstr("File too large"));
+    EXPECT_FALSE(fs::exists(world + "/database.db"));
+    EXPECT_FALSE(fs::exists(world + "/database.db.tmp"));
+    EXPECT_FALSE(fs::exists(world + "/database.db.tmp-wal"));
+  }
+}
+
+}  // namespace
+}  // namespace adasfm
