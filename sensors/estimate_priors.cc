@@ -259,11 +259,10 @@ bool PriorEstimator::CorrectNoise() {
     speed.redundancy += yaw.redundancy;
     yaw = NoiseCheck();
   }
-  bool any = Correct(speed.Factor(), 1.0 / kMaxNoiseFactor,
-                     &summary.wheel_speed_noise_factor);
-  any |= Correct(yaw.Factor(), 1.0 / kMaxNoiseFactor,
-                 &summary.wheel_yaw_noise_factor);
-  // A smaller figure than the stated one is not believed (RaiseToLog).
+  // A smaller figure than the stated one is not believed: what wheels err by is
+  // more than the noise of their readings.
+  bool any = Correct(speed.Factor(), 1.0, &summary.wheel_speed_noise_factor);
+  any |= Correct(yaw.Factor(), 1.0, &summary.wheel_yaw_noise_factor);
   double accelerometer = calibration_.imu_noise.accelerometer_noise_density /
                          stated_.imu_noise.accelerometer_noise_density;
   any |= Correct(fused_.accelerometer_check.Factor(), 1.0, &accelerometer);

@@ -170,6 +170,11 @@ void BundleProblem::AddObservation(const colmap::Reconstruction& reconstruction,
 
 void BundleProblem::AddPriors(const std::vector<PosePriorEdge>& edges) {
   using Term = PosePriorCost::Term;
+  int num_windows = 0;
+  for (const PosePriorEdge& edge : edges) {
+    num_windows = std::max(num_windows, edge.window + 1);
+  }
+  shared_.resize(kGyroscopeBias + num_windows);
   for (const PosePriorEdge& edge : edges) {
     const auto image1 = images_.find(edge.image_id1);
     const auto image2 = images_.find(edge.image_id2);
@@ -210,12 +215,13 @@ std::vector<double*> BundleProblem::SharedParameters(const PosePriorEdge& edge,
                                                      PosePriorCost::Term term) {
   if (cost.parameter_block_sizes().size() == 2) return {};
   if (term != PosePriorCost::Term::kRotation) {
-    driving_direction_.is_used = true;
-    return {driving_direction_.values};
+    shared_[kDrivingDirection].is_used = true;
+    return {shared_[kDrivingDirection].values};
   }
-  SharedBlock& bias = gyroscope_bias_[edge.window];
-  bias.is_used = extrinsic_rotation_.is_used = true;
-  return {extrinsic_rotation_.values, bias.values};
+  SharedBlock& rotation = shared_[kExtrinsicRotation];
+  SharedBlock& bias = shared_[kGyroscopeBias + edge.window];
+  rotation.is_used = bias.is_used = true;
+  return {rotation.values, bias.values};
 }
 
 void BundleProblem::AddSharedErrorPriors() {
@@ -232,12 +238,14 @@ void BundleProblem::AddSharedErrorPriors() {
     problem_->AddResidualBlock(other_costs_.back().get(), nullptr,
                                block->values);
   };
-  add(&extrinsic_rotation_, shared.extrinsic_rotation_sigma_rad);
-  add(&driving_direction_, shared.driving_direction_sigma_rad);
+  add(&shared_[kExtrinsicRotation], shared.extrinsic_rotation_sigma_rad);
+  add(&shared_[kDrivingDirection], shared.driving_direction_sigma_rad);
   const double step_sigma = shared.gyroscope_random_walk_rad_s_sqrt_s *
                             std::sqrt(shared.gyroscope_window_s);
   SharedBlock* before = nullptr;
-  for (auto& [window, block] : gyroscope_bias_) {
+  for (size_t k = kGyroscopeBias; k < shared_.size(); ++k) {
+    SharedBlock& block = shared_[k];
+    if (!block.is_used) continue;
     add(&block, shared.gyroscope_bias_sigma_rad_s);
     if (before != nullptr && shared.enabled && step_sigma > 0.0 &&
         shared.gyroscope_bias_sigma_rad_s > 0.0) {
@@ -254,10 +262,11 @@ SharedErrors BundleProblem::EstimatedSharedErrors() const {
   const auto vector = [](const SharedBlock& block) {
     return Eigen::Vector3d(block.values[0], block.values[1], block.values[2]);
   };
-  errors.extrinsic_rotation = vector(extrinsic_rotation_);
-  errors.driving_direction = vector(driving_direction_);
-  for (const auto& [window, block] : gyroscope_bias_) {
-    errors.gyroscope_bias[window] = vector(block);
+  errors.extrinsic_rotation = vector(shared_[kExtrinsicRotation]);
+  errors.driving_direction = vector(shared_[kDrivingDirection]);
+  for (size_t k = kGyroscopeBias; k < shared_.size(); ++k) {
+    if (!shared_[k].is_used) continue;
+    errors.gyroscope_bias[k - kGyroscopeBias] = vector(shared_[k]);
   }
   return errors;
 }
@@ -304,12 +313,11 @@ std::shared_ptr<ceres::ParameterBlockOrdering> BundleProblem::Ordering() {
   for (auto& [camera_id, block] : cameras_) {
     if (block.is_used) ordering->AddElementToGroup(block.params.data(), 1);
   }
-  const auto add_shared = [&ordering](SharedBlock* block) {
-    if (block->is_used) ordering->AddElementToGroup(block->values, 1);
-  };
-  add_shared(&extrinsic_rotation_);
-  add_shared(&driving_direction_);
-  for (auto& [window, block] : gyroscope_bias_) add_shared(&block);
+  // A group of its own: which of the arrays has the lower addresses differs
+  // from run to run.
+  for (SharedBlock& block : shared_) {
+    if (block.is_used) ordering->AddElementToGroup(block.values, 2);
+  }
   return ordering;
 }
 

@@ -106,9 +106,10 @@ class BundleProblem final : private ceres::EvaluationCallback {
     double values[3] = {0, 0, 0};
     bool is_used = false;
   };
-  SharedBlock extrinsic_rotation_;
-  SharedBlock driving_direction_;
-  std::map<int, SharedBlock> gyroscope_bias_;  // by window
+  static constexpr size_t kExtrinsicRotation = 0;
+  static constexpr size_t kDrivingDirection = 1;
+  static constexpr size_t kGyroscopeBias = 2;  // of the first window
+  std::vector<SharedBlock> shared_;
   std::deque<ReprojectionCost> reprojection_costs_;
   std::vector<std::unique_ptr<ceres::CostFunction>> other_costs_;
   std::unique_ptr<ceres::LossFunction> reprojection_loss_;

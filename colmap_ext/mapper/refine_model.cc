@@ -137,23 +137,26 @@ class ModelRefiner {
   }
 
   // Until parts and gaps are in place, priors are off for other reasons than
-  // keypoints; the balance found then serves this adjustment only.
+  // keypoints or shared errors; the balance found then serves this adjustment
+  // only, and what all priors share is left to the last round.
   void AdjustTentatively(int max_num_iterations) {
     std::vector<PosePriorEdge> priors = FindPriors();
     MarkPriorsInGaps(&priors);
     double keypoint_sigma_factor = summary_.keypoint_sigma_factor;
-    Adjust(max_num_iterations, 1e-3, std::move(priors), &keypoint_sigma_factor);
+    Adjust(max_num_iterations, 1e-3, std::move(priors), &keypoint_sigma_factor,
+           /*estimate_shared_errors=*/false);
   }
 
   void Adjust(int max_num_iterations, double function_tolerance,
-              std::vector<PosePriorEdge> priors,
-              double* keypoint_sigma_factor) {
+              std::vector<PosePriorEdge> priors, double* keypoint_sigma_factor,
+              bool estimate_shared_errors = true) {
     PriorBundleAdjustmentProblem problem;
     problem.images = RegisteredImages();
     problem.priors = std::move(priors);
     AddCoarseEdges(&problem.priors);
     PriorBundleAdjustmentOptions options;
     options.keypoint_sigma_px = options_.keypoint_sigma_px;
+    options.shared_errors.enabled = estimate_shared_errors;
     options.refine_focal_length = options_.refine_focal_length;
     options.refine_principal_point = options_.refine_principal_point;
     options.refine_extra_params = options_.refine_extra_params;

@@ -21,8 +21,6 @@ constexpr double kFirstSpeedSigma = 50.0;  // m/s
 // Slip thresholds start high and come down, so that links are judged by a
 // solution that is nearly right already.
 constexpr double kFirstThresholdFactor = 8.0;
-// How far a slip's ends reach beyond what is seen of it, seconds.
-constexpr double kSlipMarginS = 0.5;
 // What wheels that are slipping or stuck at the start begin with.
 constexpr double kFirstSlipWeight = 1e-4;
 // Converged: a step of all unknowns together by this share of a sigma.
@@ -92,9 +90,6 @@ class Smoother {
   Change Step();
   // Thresholds are the options' times factor.
   void UpdateWeights(double factor);
-  // A slip's ends are below the threshold, but all on the same side: wheels
-  // close to it in time weigh no more than it does.
-  void SpreadSlips();
   // The motion over a link, without its covariance, and its derivative by the
   // link's coordinates.
   OdometryMotion Motion(size_t k) const;
@@ -220,27 +215,6 @@ void Smoother::UpdateWeights(double factor) {
           RobustWeight(residuals.vision_chi2, vision_threshold);
     }
   }
-  SpreadSlips();
-}
-
-void Smoother::SpreadSlips() {
-  std::vector<double> spread(weights_.size());
-  for (size_t k = 0; k < weights_.size(); ++k) spread[k] = weights_[k].wheel;
-  for (size_t k = 0; k < weights_.size(); ++k) {
-    const double weight = weights_[k].wheel;
-    if (weight > kSlipWeight) continue;
-    double time = 0.0;
-    for (size_t i = k; i > 0 && time < kSlipMarginS; --i) {
-      spread[i - 1] = std::min(spread[i - 1], weight);
-      time += problem_.links[i - 1].dt_s;
-    }
-    time = 0.0;
-    for (size_t i = k + 1; i < weights_.size() && time < kSlipMarginS; ++i) {
-      spread[i] = std::min(spread[i], weight);
-      time += problem_.links[i].dt_s;
-    }
-  }
-  for (size_t k = 0; k < weights_.size(); ++k) weights_[k].wheel = spread[k];
 }
 
 OdometryMotion Smoother::Motion(size_t k) const {
