@@ -19,6 +19,10 @@
 namespace adasfm {
 namespace {
 
+// Volatile: the path stands in the program in one piece, where a packager can
+// find and replace it.
+const char* volatile kBuiltInHost = ADASFM_HOST_COLMAP;
+
 namespace fs = std::filesystem;
 
 using Version = std::pair<int, int>;
@@ -72,9 +76,10 @@ bool IsThisProgram(const std::string& path) {
 std::string FindHostProgram() {
   const char* chosen = std::getenv("ADASFM_HOST_COLMAP");
   if (chosen != nullptr && *chosen != '\0') return chosen;
-  if (IsProgram(ADASFM_HOST_COLMAP)) return ADASFM_HOST_COLMAP;
+  const std::string built_in = kBuiltInHost;
+  if (IsProgram(built_in)) return built_in;
   const std::string found = FindOnPath();
-  return found.empty() ? ADASFM_HOST_COLMAP : found;
+  return found.empty() ? built_in : found;
 }
 
 std::string ReadHostHelp(const std::string& path,
