@@ -24,6 +24,10 @@ TEST(ParallelFor, CallsEveryIndexOnce) {
 
 // A stack is memory: with little of it few threads begin.
 TEST(ParallelFor, DoesTheWorkOnTheThreadsThatThereAre) {
+#ifdef __SANITIZE_ADDRESS__
+  GTEST_SKIP() << "AddressSanitizer itself needs more address space than this "
+                  "test leaves";
+#endif
   const auto run = [] {
     const rlimit limit = {200u << 20, 200u << 20};
     setrlimit(RLIMIT_AS, &limit);
