@@ -5,6 +5,7 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "colmap_ext/bundle_adjustment/estimate_keypoint_sigma.h"
 #include "colmap_ext/host/pose_conversion.h"
 #include "core/so3.h"
 
@@ -15,9 +16,12 @@ constexpr double kMaxTerm = 25.0;
 constexpr double kTornNumSigmas = 10.0;
 // Fewer terms of a kind than this are no statistic.
 constexpr int kMinNumTerms = 10;
-// Steps of the search: small ones would only repeat the adjustment.
-constexpr double kMinStep = 1.25;
-constexpr double kMaxStep = 2.0;
+// Made-up keypoints have no noise, and weights need an end.
+constexpr double kMinKeypointSigmaPx = 0.02;
+// Steps of the search. A weight within a factor of two is good enough, and
+// smaller steps would only repeat the adjustment.
+constexpr double kMinStep = 2.0;
+constexpr double kMaxStep = 4.0;
 
 // Mean of the squared whitened errors of one kind of term.
 struct TermMean {
@@ -112,10 +116,21 @@ PriorBundleAdjustmentSummary AdjustBundleInBalance(
   if (!balance.IsValid(&error)) throw std::invalid_argument(error);
   PriorBundleAdjustmentOptions adjusted = options;
   PriorBundleAdjustmentSummary summary;
+  double keypoint_sigma_px = options.keypoint_sigma_px;
+  if (balance.estimate_keypoint_sigma) {
+    keypoint_sigma_px = std::max(
+        kMinKeypointSigmaPx,
+        EstimateKeypointSigma(*reconstruction).value_or(keypoint_sigma_px));
+    // What was found before was found with the other sigma.
+    if (*keypoint_sigma_factor > 1.0) {
+      *keypoint_sigma_factor =
+          std::max(1.0, *keypoint_sigma_factor * options.keypoint_sigma_px /
+                            keypoint_sigma_px);
+    }
+  }
   int num_iterations = 0;
   while (true) {
-    adjusted.keypoint_sigma_px =
-        options.keypoint_sigma_px * *keypoint_sigma_factor;
+    adjusted.keypoint_sigma_px = keypoint_sigma_px * *keypoint_sigma_factor;
     summary = AdjustBundle(adjusted, problem, reconstruction);
     num_iterations += summary.num_iterations;
     summary.num_iterations = num_iterations;

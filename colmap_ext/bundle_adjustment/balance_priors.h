@@ -21,9 +21,13 @@ struct PriorBalanceOptions {
   // Squared whitened residuals per degree of freedom that priors may have;
   // honest ones have 1 or less.
   double max_chi2_per_dof = 1.5;
+  // The search begins with the noise of keypoints that their residuals show
+  // (estimate_keypoint_sigma.h), where there are enough.
+  bool estimate_keypoint_sigma = true;
   // The keypoint sigma is raised by at most this factor, so that priors of a
-  // wrong calibration do not take over.
-  double max_sigma_factor = 8.0;
+  // wrong calibration do not take over. Real drives need up to 16: keypoints
+  // of 0.27 px, and calibration errors that they share of 4 px.
+  double max_sigma_factor = 32.0;
 
   bool IsValid(std::string* error) const;
 };
@@ -42,8 +46,9 @@ int CountTornPriors(const std::vector<PosePriorEdge>& priors,
                     const colmap::Reconstruction& reconstruction);
 
 // AdjustBundle, with the keypoint sigma balanced against the problem's priors.
-// keypoint_sigma_factor (>= 1) multiplies options.keypoint_sigma_px; it is
-// where the search begins and holds what was found.
+// keypoint_sigma_factor (>= 1) multiplies the estimated sigma, or
+// options.keypoint_sigma_px; it is where the search begins and holds what was
+// found.
 PriorBundleAdjustmentSummary AdjustBundleInBalance(
     const PriorBalanceOptions& balance,
     const PriorBundleAdjustmentOptions& options,

@@ -46,8 +46,9 @@ void FixGauge(bool has_lengths, BundleProblem* problem) {
   problem->FixDistanceToFarthestPose(kGaugeLengthRatio);
 }
 
-// Numbers the windows of the gyroscope's bias.
-void AssignWindows(double window_s, std::vector<PosePriorEdge>* edges) {
+// Numbers the windows of one of the shared errors.
+void AssignWindows(double window_s, int SharedErrorWindows::*number,
+                   std::vector<PosePriorEdge>* edges) {
   int window = -1;
   double elapsed_s = 0.0;
   image_t last_image = kInvalidImageId;
@@ -57,10 +58,18 @@ void AssignWindows(double window_s, std::vector<PosePriorEdge>* edges) {
       ++window;
       elapsed_s = 0.0;
     }
-    edge.window = window;
+    edge.windows.*number = window;
     elapsed_s += edge.dt_s;
     last_image = edge.image_id2;
   }
+}
+
+void AssignWindows(const SharedErrorOptions& options,
+                   std::vector<PosePriorEdge>* edges) {
+  AssignWindows(options.gyroscope_window_s, &SharedErrorWindows::gyroscope,
+                edges);
+  AssignWindows(options.direction_window_s, &SharedErrorWindows::direction,
+                edges);
 }
 
 ceres::Solver::Options SolverOptions(
@@ -170,8 +179,9 @@ PriorBundleAdjustmentSummary AdjustBundle(
   if (!options.IsValid(&error)) throw std::invalid_argument(error);
 
   PriorBundleAdjustmentSummary summary;
+  summary.keypoint_sigma_px = options.keypoint_sigma_px;
   PriorBundleAdjustmentProblem with_windows = problem;
-  AssignWindows(options.shared_errors.gyroscope_window_s, &with_windows.priors);
+  AssignWindows(options.shared_errors, &with_windows.priors);
   BundleProblem bundle(options, with_windows, *reconstruction);
   summary.num_images = bundle.NumImages();
   summary.num_points = bundle.NumPoints();
@@ -204,11 +214,11 @@ PriorBundleAdjustmentSummary AdjustBundle(
 std::vector<PosePriorEdge> CorrectSharedErrors(
     const SharedErrorOptions& options, const SharedErrors& shared_errors,
     std::vector<PosePriorEdge> priors) {
-  AssignWindows(options.gyroscope_window_s, &priors);
+  AssignWindows(options, &priors);
   for (PosePriorEdge& edge : priors) {
     if (edge.dt_s < 0.0) continue;
     edge.cam2_from_cam1 =
-        shared_errors.Correct(edge.cam2_from_cam1, edge.dt_s, edge.window);
+        shared_errors.Correct(edge.cam2_from_cam1, edge.dt_s, edge.windows);
   }
   return priors;
 }

@@ -39,11 +39,10 @@ struct PosePriorEdge {
   // nothing of the balance between keypoints and priors.
   bool is_held_by_points = true;
   // Duration of a motion that sensors measured: it has part in the errors that
-  // their whole log shares (shared_errors.h), the gyroscope's bias that of this
-  // window. Negative: the motion has none of them.
+  // their whole log shares (shared_errors.h). Negative: it has none of them.
   double dt_s = -1.0;
   // Set by AdjustBundle.
-  int window = 0;
+  SharedErrorWindows windows;
 };
 
 // The edge of a sensor prior with the sigmas of its covariance; what its flags
@@ -109,6 +108,8 @@ struct PriorBundleAdjustmentSummary {
   double initial_cost = 0.0;
   double final_cost = 0.0;
   double seconds = 0.0;
+  // The keypoint sigma that was used.
+  double keypoint_sigma_px = 0.0;
   std::string message;
   // Of the priors with a duration; all zero on failure.
   SharedErrors shared_errors;

@@ -14,29 +14,46 @@
 namespace adasfm {
 namespace {
 
-// (second - first) / sigma, 3 residuals.
+// (second - decay * first) / sigma, 3 residuals.
 class DifferenceCost final : public ceres::SizedCostFunction<3, 3, 3> {
  public:
-  explicit DifferenceCost(double sigma) : inverse_sigma_(1.0 / sigma) {}
+  DifferenceCost(double sigma, double decay)
+      : inverse_sigma_(1.0 / sigma), decay_(decay) {}
 
   bool Evaluate(double const* const* parameters, double* residuals,
                 double** jacobians) const final {
     using Jacobian = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
     for (int i = 0; i < 3; ++i) {
-      residuals[i] = inverse_sigma_ * (parameters[1][i] - parameters[0][i]);
+      residuals[i] =
+          inverse_sigma_ * (parameters[1][i] - decay_ * parameters[0][i]);
     }
     for (int block = 0; jacobians != nullptr && block < 2; ++block) {
       if (jacobians[block] == nullptr) continue;
       Eigen::Map<Jacobian> jacobian(jacobians[block]);
       jacobian = Jacobian::Identity() *
-                 (block == 0 ? -inverse_sigma_ : inverse_sigma_);
+                 (block == 0 ? -decay_ * inverse_sigma_ : inverse_sigma_);
     }
     return true;
   }
 
  private:
   double inverse_sigma_;
+  double decay_;
 };
+
+// Of the directions that the motions of sensors state; 0 when none does.
+double MedianDirectionSigma(const std::vector<PosePriorEdge>& edges) {
+  std::vector<double> sigmas;
+  for (const PosePriorEdge& edge : edges) {
+    if (edge.dt_s >= 0.0 && std::isfinite(edge.direction_sigma_rad)) {
+      sigmas.push_back(edge.direction_sigma_rad);
+    }
+  }
+  if (sigmas.empty()) return 0.0;
+  const auto median = sigmas.begin() + sigmas.size() / 2;
+  std::nth_element(sigmas.begin(), median, sigmas.end());
+  return *median;
+}
 
 }  // namespace
 
@@ -59,7 +76,7 @@ BundleProblem::BundleProblem(const PriorBundleAdjustmentOptions& options,
   AddImages(problem, reconstruction);
   AddPoints(reconstruction);
   AddPriors(problem.priors);
-  AddSharedErrorPriors();
+  AddSharedErrorPriors(problem.priors);
   SetConstantBlocks(reconstruction);
 }
 
@@ -170,11 +187,13 @@ void BundleProblem::AddObservation(const colmap::Reconstruction& reconstruction,
 
 void BundleProblem::AddPriors(const std::vector<PosePriorEdge>& edges) {
   using Term = PosePriorCost::Term;
-  int num_windows = 0;
+  SharedErrorWindows last;
   for (const PosePriorEdge& edge : edges) {
-    num_windows = std::max(num_windows, edge.window + 1);
+    last.gyroscope = std::max(last.gyroscope, edge.windows.gyroscope);
+    last.direction = std::max(last.direction, edge.windows.direction);
   }
-  shared_.resize(kGyroscopeBias + num_windows);
+  direction_drift_ = kGyroscopeBias + last.gyroscope + 1;
+  shared_.resize(direction_drift_ + last.direction + 1);
   for (const PosePriorEdge& edge : edges) {
     const auto image1 = images_.find(edge.image_id1);
     const auto image2 = images_.find(edge.image_id2);
@@ -215,43 +234,81 @@ std::vector<double*> BundleProblem::SharedParameters(const PosePriorEdge& edge,
                                                      PosePriorCost::Term term) {
   if (cost.parameter_block_sizes().size() == 2) return {};
   if (term != PosePriorCost::Term::kRotation) {
-    shared_[kDrivingDirection].is_used = true;
-    return {shared_[kDrivingDirection].values};
+    SharedBlock& direction = shared_[kDrivingDirection];
+    SharedBlock& drift = shared_[direction_drift_ + edge.windows.direction];
+    direction.is_used = drift.is_used = true;
+    return {direction.values, drift.values};
   }
   SharedBlock& rotation = shared_[kExtrinsicRotation];
-  SharedBlock& bias = shared_[kGyroscopeBias + edge.window];
+  SharedBlock& bias = shared_[kGyroscopeBias + edge.windows.gyroscope];
   rotation.is_used = bias.is_used = true;
   return {rotation.values, bias.values};
 }
 
-void BundleProblem::AddSharedErrorPriors() {
+void BundleProblem::AddSharedErrorPrior(double sigma, SharedBlock* block) {
+  if (!block->is_used) return;
+  if (!options_.shared_errors.enabled || !(sigma > 0.0)) {
+    problem_->SetParameterBlockConstant(block->values);
+    return;
+  }
+  other_costs_.push_back(std::make_unique<ceres::NormalPrior>(
+      Eigen::Matrix3d::Identity() / sigma, Eigen::Vector3d::Zero()));
+  problem_->AddResidualBlock(other_costs_.back().get(), nullptr, block->values);
+}
+
+void BundleProblem::AddSharedErrorStep(double sigma, double decay,
+                                       SharedBlock* before,
+                                       SharedBlock* block) {
+  if (!options_.shared_errors.enabled || !(sigma > 0.0)) return;
+  other_costs_.push_back(std::make_unique<DifferenceCost>(sigma, decay));
+  problem_->AddResidualBlock(other_costs_.back().get(), nullptr, before->values,
+                             block->values);
+}
+
+void BundleProblem::AddSharedErrorPriors(
+    const std::vector<PosePriorEdge>& edges) {
   const SharedErrorOptions& shared = options_.shared_errors;
-  // A normal prior around zero; sigma 0 holds the values.
-  const auto add = [this, &shared](SharedBlock* block, double sigma) {
-    if (!block->is_used) return;
-    if (!shared.enabled || !(sigma > 0.0)) {
-      problem_->SetParameterBlockConstant(block->values);
-      return;
-    }
-    other_costs_.push_back(std::make_unique<ceres::NormalPrior>(
-        Eigen::Matrix3d::Identity() / sigma, Eigen::Vector3d::Zero()));
-    problem_->AddResidualBlock(other_costs_.back().get(), nullptr,
-                               block->values);
-  };
-  add(&shared_[kExtrinsicRotation], shared.extrinsic_rotation_sigma_rad);
-  add(&shared_[kDrivingDirection], shared.driving_direction_sigma_rad);
+  AddSharedErrorPrior(shared.extrinsic_rotation_sigma_rad,
+                      &shared_[kExtrinsicRotation]);
+  AddSharedErrorPrior(shared.driving_direction_sigma_rad,
+                      &shared_[kDrivingDirection]);
+  AddGyroscopePriors();
+  AddDirectionDriftPriors(
+      shared.direction_drift_time_s > 0.0 ? MedianDirectionSigma(edges) : 0.0);
+}
+
+void BundleProblem::AddGyroscopePriors() {
+  const SharedErrorOptions& shared = options_.shared_errors;
+  const double sigma = shared.gyroscope_bias_sigma_rad_s;
   const double step_sigma = shared.gyroscope_random_walk_rad_s_sqrt_s *
                             std::sqrt(shared.gyroscope_window_s);
   SharedBlock* before = nullptr;
-  for (size_t k = kGyroscopeBias; k < shared_.size(); ++k) {
+  for (size_t k = kGyroscopeBias; k < direction_drift_; ++k) {
     SharedBlock& block = shared_[k];
     if (!block.is_used) continue;
-    add(&block, shared.gyroscope_bias_sigma_rad_s);
-    if (before != nullptr && shared.enabled && step_sigma > 0.0 &&
-        shared.gyroscope_bias_sigma_rad_s > 0.0) {
-      other_costs_.push_back(std::make_unique<DifferenceCost>(step_sigma));
-      problem_->AddResidualBlock(other_costs_.back().get(), nullptr,
-                                 before->values, block.values);
+    AddSharedErrorPrior(sigma, &block);
+    if (before != nullptr && sigma > 0.0) {
+      AddSharedErrorStep(step_sigma, 1.0, before, &block);
+    }
+    before = &block;
+  }
+}
+
+// A stationary process: its first value has the sigma, each next one decays
+// towards zero and is stirred as much as keeps the sigma.
+void BundleProblem::AddDirectionDriftPriors(double sigma_rad) {
+  const SharedErrorOptions& shared = options_.shared_errors;
+  const double decay =
+      std::exp(-shared.direction_window_s / shared.direction_drift_time_s);
+  SharedBlock* before = nullptr;
+  for (size_t k = direction_drift_; k < shared_.size(); ++k) {
+    SharedBlock& block = shared_[k];
+    if (!block.is_used) continue;
+    if (before == nullptr || !shared.enabled || !(sigma_rad > 0.0)) {
+      AddSharedErrorPrior(sigma_rad, &block);
+    } else {
+      AddSharedErrorStep(sigma_rad * std::sqrt(1.0 - decay * decay), decay,
+                         before, &block);
     }
     before = &block;
   }
@@ -266,7 +323,11 @@ SharedErrors BundleProblem::EstimatedSharedErrors() const {
   errors.driving_direction = vector(shared_[kDrivingDirection]);
   for (size_t k = kGyroscopeBias; k < shared_.size(); ++k) {
     if (!shared_[k].is_used) continue;
-    errors.gyroscope_bias[k - kGyroscopeBias] = vector(shared_[k]);
+    if (k < direction_drift_) {
+      errors.gyroscope_bias[k - kGyroscopeBias] = vector(shared_[k]);
+    } else {
+      errors.direction_drift[k - direction_drift_] = vector(shared_[k]);
+    }
   }
   return errors;
 }

@@ -64,6 +64,10 @@ class BundleProblem final : private ceres::EvaluationCallback {
     std::vector<double> params;
     bool is_used = false;
   };
+  struct SharedBlock {
+    double values[3] = {0, 0, 0};
+    bool is_used = false;
+  };
   struct Observation {
     image_t image_id = kInvalidImageId;
     Eigen::Vector2d xy;
@@ -91,7 +95,14 @@ class BundleProblem final : private ceres::EvaluationCallback {
                                         PosePriorCost::Term term);
   // What is believed of the shared errors; errors that no prior has part in do
   // not take part.
-  void AddSharedErrorPriors();
+  void AddSharedErrorPriors(const std::vector<PosePriorEdge>& edges);
+  void AddGyroscopePriors();
+  void AddDirectionDriftPriors(double sigma_rad);
+  // A normal prior around zero; sigma 0 holds the values.
+  void AddSharedErrorPrior(double sigma, SharedBlock* block);
+  // A normal prior of the change from decay * before to block.
+  void AddSharedErrorStep(double sigma, double decay, SharedBlock* before,
+                          SharedBlock* block);
   void SetConstantBlocks(const colmap::Reconstruction& reconstruction);
 
   const PriorBundleAdjustmentOptions options_;
@@ -102,14 +113,12 @@ class BundleProblem final : private ceres::EvaluationCallback {
   std::vector<AdjustedPose> poses_;
   std::vector<PointBlock> points_;
   // Parameters of shared_errors.h; those used by a prior take part.
-  struct SharedBlock {
-    double values[3] = {0, 0, 0};
-    bool is_used = false;
-  };
   static constexpr size_t kExtrinsicRotation = 0;
   static constexpr size_t kDrivingDirection = 1;
   static constexpr size_t kGyroscopeBias = 2;  // of the first window
   std::vector<SharedBlock> shared_;
+  // Where the windows of the direction's drift begin in it.
+  size_t direction_drift_ = kGyroscopeBias;
   std::deque<ReprojectionCost> reprojection_costs_;
   std::vector<std::unique_ptr<ceres::CostFunction>> other_costs_;
   std::unique_ptr<ceres::LossFunction> reprojection_loss_;

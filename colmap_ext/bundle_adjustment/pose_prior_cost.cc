@@ -120,11 +120,11 @@ PosePriorCost::PosePriorCost(const PosePriorEdge& edge, Term term,
                                         rotation_.toRotationMatrix()),
                       inverse_sigma_ * edge.dt_s * from_middle};
     } else if (term == Term::kTranslation) {
-      from_shared_ = {from_direction};
+      from_shared_ = {from_direction, from_direction};
     } else if (term == Term::kDirection && length_ > kMinLength) {
-      from_shared_ = {Eigen::Matrix3d::Zero()};
-      from_shared_[0].topRows<2>() =
-          basis_.transpose() * from_direction / length_;
+      Eigen::Matrix3d in_plane = Eigen::Matrix3d::Zero();
+      in_plane.topRows<2>() = basis_.transpose() * from_direction / length_;
+      from_shared_ = {in_plane, in_plane};
     }
   }
   *mutable_parameter_block_sizes() = {6, 6};

@@ -23,7 +23,9 @@ bool SharedErrorOptions::IsValid(std::string* error) const {
          check("extrinsic_rotation_sigma_rad", extrinsic_rotation_sigma_rad,
                true) &&
          check("driving_direction_sigma_rad", driving_direction_sigma_rad,
-               true);
+               true) &&
+         check("direction_drift_time_s", direction_drift_time_s, true) &&
+         check("direction_window_s", direction_window_s, false);
 }
 
 Eigen::Matrix3d CameraFromMiddle(const Eigen::Quaterniond& cam2_from_cam1) {
@@ -31,17 +33,19 @@ Eigen::Matrix3d CameraFromMiddle(const Eigen::Quaterniond& cam2_from_cam1) {
 }
 
 Rigid3d SharedErrors::Correct(const Rigid3d& cam2_from_cam1, double dt_s,
-                              int window) const {
+                              const SharedErrorWindows& windows) const {
   const Eigen::Quaterniond& rotation = cam2_from_cam1.rotation;
   const Eigen::Matrix3d from_middle = CameraFromMiddle(rotation);
   Eigen::Vector3d error = extrinsic_rotation - rotation * extrinsic_rotation;
-  const auto bias = gyroscope_bias.find(window);
+  const auto bias = gyroscope_bias.find(windows.gyroscope);
   if (bias != gyroscope_bias.end()) {
     error += dt_s * (from_middle * bias->second);
   }
-  return Rigid3d(
-      (ExpSo3(error) * rotation).normalized(),
-      ExpSo3(from_middle * driving_direction) * cam2_from_cam1.translation);
+  Eigen::Vector3d direction = driving_direction;
+  const auto drift = direction_drift.find(windows.direction);
+  if (drift != direction_drift.end()) direction += drift->second;
+  return Rigid3d((ExpSo3(error) * rotation).normalized(),
+                 ExpSo3(from_middle * direction) * cam2_from_cam1.translation);
 }
 
 }  // namespace adasfm

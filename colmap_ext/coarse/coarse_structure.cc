@@ -166,8 +166,8 @@ void BuildRound(const CoarseStructureOptions& options, const SceneData& scene,
       &model->reconstruction);
 }
 
-// The balance of vision and priors means something at the optimum only, so the
-// last round finds it.
+// The noise of keypoints, and its balance with the priors, mean something near
+// the optimum only, so the last round finds them.
 PriorBundleAdjustmentSummary AdjustRound(
     const CoarseStructureOptions& options,
     const PriorBundleAdjustmentProblem& problem, int round,
@@ -178,6 +178,7 @@ PriorBundleAdjustmentSummary AdjustRound(
     bundle.function_tolerance =
         std::max(bundle.function_tolerance, options.early_function_tolerance);
     balance.enabled = false;
+    balance.estimate_keypoint_sigma = false;
   }
   return AdjustBundleInBalance(balance, bundle, problem, reconstruction,
                                keypoint_sigma_factor);
@@ -281,8 +282,7 @@ CoarseModel BuildCoarseModel(
                options.triangulation.min_triangulation_angle_deg));
   model.gravity_aligned =
       AlignToGravity(scene, &model.reconstruction, input.camera_mount);
-  model.keypoint_sigma_px =
-      options.bundle.keypoint_sigma_px * keypoint_sigma_factor;
+  model.keypoint_sigma_px = model.rounds.back().keypoint_sigma_px;
   FillFigures(options, problem, &model);
   return model;
 }

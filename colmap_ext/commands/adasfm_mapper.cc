@@ -74,6 +74,8 @@ void AddMapperOptions(MapperCommandOptions* options, CommandOptions* command) {
       "sensor priors as terms of the bundle adjustment");
   add("keypoint_sigma_px", &local.keypoint_sigma_px,
       "1 sigma of keypoints, weighs priors [px]");
+  add("estimate_keypoint_sigma", &local.balance.estimate_keypoint_sigma,
+      "the last refinement takes the keypoint sigma from the residuals");
   add("balance_priors", &local.balance.enabled,
       "raise the keypoint sigma until the priors agree within their "
       "covariance");

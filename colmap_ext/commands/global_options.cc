@@ -153,6 +153,9 @@ void GlobalOptionAdder::AddStructure() {
       "one image of so many sees points in the rounds before the last; 1: all");
   Add("ba_keypoint_sigma_px", &stage_->structure.bundle.keypoint_sigma_px,
       "1 sigma of a keypoint, against which sensor priors weigh [px]");
+  Add("ba_estimate_keypoint_sigma",
+      &stage_->structure.balance.estimate_keypoint_sigma,
+      "the last round takes the keypoint sigma from the residuals");
   Add("ba_refine_focal_length", &stage_->structure.bundle.refine_focal_length,
       "adjust focal lengths too");
   Add("refine_unknown_focal_length",

@@ -93,7 +93,9 @@ void PartAdjuster::AdjustImages(const std::set<image_t>& images,
     AdjustBundle(options, problem, &reconstruction_);
     return;
   }
-  AdjustBundleInBalance(options_.balance, options, problem, &reconstruction_,
+  PriorBalanceOptions balance = options_.balance;
+  balance.estimate_keypoint_sigma = false;  // A part that grows has few points.
+  AdjustBundleInBalance(balance, options, problem, &reconstruction_,
                         &keypoint_sigma_factor_);
 }
 

@@ -144,31 +144,31 @@ class ModelRefiner {
     MarkPriorsInGaps(&priors);
     double keypoint_sigma_factor = summary_.keypoint_sigma_factor;
     Adjust(max_num_iterations, 1e-3, std::move(priors), &keypoint_sigma_factor,
-           /*estimate_shared_errors=*/false);
+           /*is_tentative=*/true);
   }
 
   void Adjust(int max_num_iterations, double function_tolerance,
               std::vector<PosePriorEdge> priors, double* keypoint_sigma_factor,
-              bool estimate_shared_errors = true) {
+              bool is_tentative = false) {
     PriorBundleAdjustmentProblem problem;
     problem.images = RegisteredImages();
     problem.priors = std::move(priors);
     AddCoarseEdges(&problem.priors);
     PriorBundleAdjustmentOptions options;
     options.keypoint_sigma_px = options_.keypoint_sigma_px;
-    options.shared_errors.enabled = estimate_shared_errors;
+    options.shared_errors.enabled = !is_tentative;
     options.refine_focal_length = options_.refine_focal_length;
     options.refine_principal_point = options_.refine_principal_point;
     options.refine_extra_params = options_.refine_extra_params;
     options.max_num_iterations = max_num_iterations;
     options.function_tolerance = function_tolerance;
     options.num_threads = options_.num_threads;
-    const PriorBundleAdjustmentSummary adjustment =
-        AdjustBundleInBalance(options_.balance, options, problem,
-                              &reconstruction_, keypoint_sigma_factor);
+    PriorBalanceOptions balance = options_.balance;
+    if (is_tentative) balance.estimate_keypoint_sigma = false;
+    const PriorBundleAdjustmentSummary adjustment = AdjustBundleInBalance(
+        balance, options, problem, &reconstruction_, keypoint_sigma_factor);
     summary_.num_iterations += adjustment.num_iterations;
-    summary_.keypoint_sigma_px =
-        options_.keypoint_sigma_px * *keypoint_sigma_factor;
+    summary_.keypoint_sigma_px = adjustment.keypoint_sigma_px;
     summary_.prior_chi2_per_dof = ComputePriorChi2PerDof(
         CorrectSharedErrors(options.shared_errors, adjustment.shared_errors,
                             problem.priors),

@@ -15,7 +15,8 @@ struct RefineModelOptions {
   double filter_max_reproj_error_px = 4.0;
   double min_triangulation_angle_deg = 1.5;
   double keypoint_sigma_px = 0.5;
-  // As in LocalMapperOptions.
+  // As in LocalMapperOptions. The last round alone estimates the noise of
+  // keypoints: before it, parts and gaps are not in place.
   PriorBalanceOptions balance;
   // Intrinsics are adjusted here and nowhere else, so that all parts agree
   // about them.
@@ -32,8 +33,9 @@ struct RefineModelOptions {
 
 struct RefineModelSummary {
   int num_iterations = 0;
-  // By which the keypoints' sigma is multiplied. Every round begins with what
-  // the parts had; what the last one finds is kept.
+  // By which the keypoints' sigma is multiplied in balance with the priors.
+  // Every round begins with what the parts had; what the last one finds is
+  // kept.
   double keypoint_sigma_factor = 1.0;
   // 1 sigma of keypoints that agrees with the priors (balance_priors.h).
   double keypoint_sigma_px = 0.0;

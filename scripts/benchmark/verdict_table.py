@@ -128,13 +128,19 @@ class Chain:
                      '--input_path', self.path(source), '--output_path',
                      self.path(output), *options.get('mapper', []))
 
-  def error_m(self, output):
-    """In metres as they are, or of the shape when there are none."""
+  def evaluate(self, output):
     self.call('evaluator', '--input_path', self.path(output),
               '--ground_truth_path', self.path('gt.txt'), '--json_path',
               self.path('evaluation.json'))
     with open(self.path('evaluation.json')) as file:
-      evaluation = json.load(file)
+      return json.load(file)
+
+  def shape_error_m(self, output):
+    return self.evaluate(output)['sim3_least_squares']['translation_rmse_m']
+
+  def error_m(self, output):
+    """In metres as they are, or of the shape when there are none."""
+    evaluation = self.evaluate(output)
     with open(self.path(output + '/summary.json')) as file:
       is_metric = json.load(file)['is_metric']
     kind = 'se3_least_squares' if is_metric else 'sim3_least_squares'

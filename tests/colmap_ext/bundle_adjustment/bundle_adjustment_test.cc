@@ -160,7 +160,7 @@ std::vector<PosePriorEdge> BiasedPriors(const BundleWorldOptions& options,
     opposite.extrinsic_rotation = -errors.extrinsic_rotation;
     opposite.driving_direction = -errors.driving_direction;
     Rigid3d& motion = edge.cam2_from_cam1;
-    motion = opposite.Correct(motion, edge.dt_s, 0);
+    motion = opposite.Correct(motion, edge.dt_s, {});
     motion.rotation = (ExpSo3(random->GaussianVector(edge.rotation_sigma_rad)) *
                        motion.rotation)
                           .normalized();
@@ -210,6 +210,57 @@ TEST(AdjustBundleTest, FindsTheErrorsThatAllPriorsShare) {
     EXPECT_NEAR(summary.shared_errors.driving_direction.y(), 0.02, 2e-3);
     EXPECT_NEAR(summary.shared_errors.driving_direction.x(), 0.01, 2e-3);
   }
+}
+
+// Directions of driving whose errors are smooth in time, as a smoother's are:
+// each is as stated, but neighbours do not average out.
+std::vector<PosePriorEdge> DriftingPriors(const BundleWorldOptions& options,
+                                          Random* random) {
+  constexpr double kDt = 0.3;
+  constexpr double kSigma = 8e-3;
+  const double decay = std::exp(-kDt / 5.0);
+  Eigen::Vector3d drift = random->GaussianVector(kSigma);
+  std::vector<PosePriorEdge> edges = TruePriors(options);
+  for (PosePriorEdge& edge : edges) {
+    edge.dt_s = kDt;
+    edge.rotation_sigma_rad = 2e-4;
+    edge.direction_sigma_rad = kSigma;
+    edge.length_sigma_m = 0.02;
+    Rigid3d& motion = edge.cam2_from_cam1;
+    motion.rotation = (ExpSo3(random->GaussianVector(edge.rotation_sigma_rad)) *
+                       motion.rotation)
+                          .normalized();
+    motion.translation = ExpSo3(drift) * motion.translation;
+    drift = decay * drift +
+            random->GaussianVector(kSigma * std::sqrt(1.0 - decay * decay));
+  }
+  return edges;
+}
+
+TEST(AdjustBundleTest, DirectionsThatErrTogetherDoNotOutvoteVision) {
+  BundleWorldOptions world;
+  world.num_images = 200;
+  world.num_keypoints_per_image = 60;
+  world.pixel_noise_px = 0.3;
+  double with_drift = 0.0;
+  double without_drift = 0.0;
+  for (const uint64_t seed : {1, 2, 3, 4, 5, 6}) {
+    world.seed = seed;
+    Random random(seed);
+    const colmap::Reconstruction given = BuildBundleWorld(world);
+    PriorBundleAdjustmentProblem problem = ProblemOfAll(given);
+    problem.priors = DriftingPriors(world, &random);
+    PriorBundleAdjustmentOptions options = ConvergeFully();
+    options.keypoint_sigma_px = world.pixel_noise_px;
+    colmap::Reconstruction with = given;
+    ASSERT_TRUE(AdjustBundle(options, problem, &with).success);
+    options.shared_errors.direction_drift_time_s = 0.0;
+    colmap::Reconstruction without = given;
+    ASSERT_TRUE(AdjustBundle(options, problem, &without).success);
+    with_drift += AlignedCenterError(world, with);
+    without_drift += AlignedCenterError(world, without);
+  }
+  EXPECT_LT(with_drift, 0.8 * without_drift);
 }
 
 TEST(AdjustBundleTest, WeightsDoNotMoveANoiseFreeSolution) {

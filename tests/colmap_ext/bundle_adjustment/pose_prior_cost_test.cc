@@ -142,15 +142,18 @@ TEST_P(PosePriorCostTest, SharedErrorsAreThoseThatCorrectTakesOut) {
     errors.gyroscope_bias[0] = random.GaussianVector(1e-3);
     errors.extrinsic_rotation = random.GaussianVector(1e-3);
     errors.driving_direction = random.GaussianVector(1e-3);
+    errors.direction_drift[0] = random.GaussianVector(1e-3);
     AdjustedPose pose1 = RandomPose(&random);
-    AdjustedPose pose2(errors.Correct(edge.cam2_from_cam1, edge.dt_s, 0) *
+    AdjustedPose pose2(errors.Correct(edge.cam2_from_cam1, edge.dt_s, {}) *
                        pose1.CamFromWorld());
     const PosePriorCost cost(edge, GetParam(), &pose1, &pose2);
     const bool is_rotation = GetParam() == PosePriorCost::Term::kRotation;
     const double* parameters[] = {pose1.parameters, pose2.parameters,
                                   is_rotation ? errors.extrinsic_rotation.data()
                                               : errors.driving_direction.data(),
-                                  errors.gyroscope_bias.at(0).data()};
+                                  is_rotation
+                                      ? errors.gyroscope_bias.at(0).data()
+                                      : errors.direction_drift.at(0).data()};
     std::vector<double> residuals(cost.num_residuals());
     cost.Evaluate(parameters, residuals.data(), nullptr);
     // Second-order terms of errors of 1e-3.

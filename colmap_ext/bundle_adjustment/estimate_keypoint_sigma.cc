@@ -1,0 +1,55 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "colmap_ext/bundle_adjustment/estimate_keypoint_sigma.h"
+
+#include <base/projection.h>
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+namespace adasfm {
+namespace {
+
+// A point of two images has one degree of freedom, whose median says little.
+constexpr size_t kMinTrackLength = 3;
+constexpr size_t kMinNumPoints = 100;
+
+// The median of chi-square with k degrees of freedom over k.
+double MedianOfChi2PerDof(double num_dof) {
+  const double root = 1.0 - 2.0 / (9.0 * num_dof);
+  return root * root * root;
+}
+
+}  // namespace
+
+std::optional<double> EstimateKeypointSigma(
+    const colmap::Reconstruction& reconstruction) {
+  std::vector<double> variances;
+  double num_dof_of_points = 0.0;
+  for (const auto& [point_id, point] : reconstruction.Points3D()) {
+    const size_t length = point.Track().Length();
+    const double num_dof = 2.0 * length - 3.0;
+    if (length >= 2) num_dof_of_points += num_dof;
+    if (length < kMinTrackLength) continue;
+    double sum = 0.0;
+    for (const colmap::TrackElement& element : point.Track().Elements()) {
+      const colmap::Image& image = reconstruction.Image(element.image_id);
+      sum += colmap::CalculateSquaredReprojectionError(
+          image.Point2D(element.point2D_idx).XY(), point.XYZ(), image.Qvec(),
+          image.Tvec(), reconstruction.Camera(image.CameraId()));
+    }
+    // A point behind a camera has no residual.
+    if (sum < 1e12)
+      variances.push_back(sum / (num_dof * MedianOfChi2PerDof(num_dof)));
+  }
+  const double num_dof_of_poses = 6.0 * reconstruction.NumRegImages();
+  if (variances.size() < kMinNumPoints ||
+      num_dof_of_poses >= 0.5 * num_dof_of_points) {
+    return std::nullopt;
+  }
+  const auto median = variances.begin() + variances.size() / 2;
+  std::nth_element(variances.begin(), median, variances.end());
+  return std::sqrt(*median / (1.0 - num_dof_of_poses / num_dof_of_points));
+}
+
+}  // namespace adasfm

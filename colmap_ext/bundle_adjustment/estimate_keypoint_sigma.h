@@ -1,0 +1,22 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <base/reconstruction.h>
+
+#include <optional>
+
+namespace adasfm {
+
+// 1 sigma of a keypoint's position per axis, in px, from the residuals of an
+// adjusted reconstruction. Of a point that n images see, the squared residuals
+// over sigma^2 are chi-square with k = 2 n - 3 degrees of freedom; the median
+// over the points of their sum / (k (1 - 2 / (9 k))^3), which is sigma^2 for
+// every k, does not feel wrong matches. The poses, which were adjusted to the
+// same residuals, are allowed for by the share of the degrees of freedom that
+// they took. Errors that keypoints have in common (calibration, forward motion)
+// leave no residuals: balance_priors.h looks for those. None with less than a
+// hundred points of three images or more.
+std::optional<double> EstimateKeypointSigma(
+    const colmap::Reconstruction& reconstruction);
+
+}  // namespace adasfm

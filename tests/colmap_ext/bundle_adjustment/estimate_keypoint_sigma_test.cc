@@ -1,0 +1,61 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "colmap_ext/bundle_adjustment/estimate_keypoint_sigma.h"
+
+#include <gtest/gtest.h>
+
+#include "colmap_ext/bundle_adjustment/bundle_adjustment.h"
+#include "core/random.h"
+#include "tests/testing/colmap_ext/bundle_world.h"
+
+namespace adasfm {
+namespace {
+
+colmap::Reconstruction AdjustedWorld(const BundleWorldOptions& options) {
+  colmap::Reconstruction reconstruction = BuildBundleWorld(options);
+  PriorBundleAdjustmentProblem problem;
+  problem.images = {reconstruction.RegImageIds().begin(),
+                    reconstruction.RegImageIds().end()};
+  EXPECT_TRUE(AdjustBundle({}, problem, &reconstruction).success);
+  return reconstruction;
+}
+
+TEST(EstimateKeypointSigmaTest, FindsTheNoiseOfTheWorld) {
+  for (const double noise_px : {0.2, 0.7, 1.5}) {
+    for (const uint64_t seed : {1, 2, 3}) {
+      BundleWorldOptions options;
+      options.seed = seed;
+      options.pixel_noise_px = noise_px;
+      const std::optional<double> sigma_px =
+          EstimateKeypointSigma(AdjustedWorld(options));
+      ASSERT_TRUE(sigma_px.has_value());
+      // The median of some hundred points is good to 4 %.
+      EXPECT_NEAR(*sigma_px / noise_px, 1.0, 0.1) << "seed " << seed;
+    }
+  }
+}
+
+TEST(EstimateKeypointSigmaTest, WrongMatchesDoNotCount) {
+  BundleWorldOptions options;
+  options.pixel_noise_px = 0.5;
+  colmap::Reconstruction reconstruction = AdjustedWorld(options);
+  Random random(1);
+  for (const colmap::image_t image_id : reconstruction.RegImageIds()) {
+    colmap::Image& image = reconstruction.Image(image_id);
+    for (colmap::point2D_t k = 0; k < image.NumPoints2D(); ++k) {
+      if (random.Uniform(0.0, 1.0) > 0.02) continue;
+      image.Point2D(k).SetXY(image.Point2D(k).XY() +
+                             Eigen::Vector2d(20.0, -10.0));
+    }
+  }
+  const std::optional<double> sigma_px = EstimateKeypointSigma(reconstruction);
+  ASSERT_TRUE(sigma_px.has_value());
+  // A tenth of the points has a wrong observation, which moves the median.
+  EXPECT_NEAR(*sigma_px, 0.5, 0.1);
+}
+
+TEST(EstimateKeypointSigmaTest, NothingToTellFrom) {
+  EXPECT_FALSE(EstimateKeypointSigma(colmap::Reconstruction()).has_value());
+}
+
+}  // namespace
+}  // namespace adasfm
