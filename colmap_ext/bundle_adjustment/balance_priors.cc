@@ -18,10 +18,9 @@ constexpr double kTornNumSigmas = 10.0;
 constexpr int kMinNumTerms = 10;
 // Made-up keypoints have no noise, and weights need an end.
 constexpr double kMinKeypointSigmaPx = 0.02;
-// Steps of the search. A weight within a factor of two is good enough, and
-// smaller steps would only repeat the adjustment.
-constexpr double kMinStep = 2.0;
-constexpr double kMaxStep = 4.0;
+// Steps of the search: small ones would only repeat the adjustment.
+constexpr double kMinStep = 1.25;
+constexpr double kMaxStep = 2.0;
 
 // Mean of the squared whitened errors of one kind of term.
 struct TermMean {
