@@ -18,6 +18,8 @@ constexpr double kTornNumSigmas = 10.0;
 constexpr int kMinNumTerms = 10;
 // Made-up keypoints have no noise, and weights need an end.
 constexpr double kMinKeypointSigmaPx = 0.02;
+// Relative change of the cost at which an adjustment of the search ends.
+constexpr double kSearchFunctionTolerance = 1e-3;
 // Steps of the search: small ones would only repeat the adjustment.
 constexpr double kMinStep = 1.25;
 constexpr double kMaxStep = 2.0;
@@ -120,34 +122,40 @@ PriorBundleAdjustmentSummary AdjustBundleInBalance(
     keypoint_sigma_px = std::max(
         kMinKeypointSigmaPx,
         EstimateKeypointSigma(*reconstruction).value_or(keypoint_sigma_px));
-    // What was found before was found with the other sigma.
-    if (*keypoint_sigma_factor > 1.0) {
-      *keypoint_sigma_factor =
-          std::max(1.0, *keypoint_sigma_factor * options.keypoint_sigma_px /
-                            keypoint_sigma_px);
-    }
   }
   int num_iterations = 0;
-  while (true) {
+  const auto adjust = [&] {
     adjusted.keypoint_sigma_px = keypoint_sigma_px * *keypoint_sigma_factor;
     summary = AdjustBundle(adjusted, problem, reconstruction);
     num_iterations += summary.num_iterations;
     summary.num_iterations = num_iterations;
-    if (!balance.enabled || !summary.success ||
-        *keypoint_sigma_factor >= balance.max_sigma_factor) {
-      return summary;
-    }
+  };
+  // The search needs no last digits.
+  adjusted.function_tolerance =
+      std::max(options.function_tolerance, kSearchFunctionTolerance);
+  while (balance.enabled && !problem.priors.empty() &&
+         *keypoint_sigma_factor < balance.max_sigma_factor) {
+    adjust();
+    if (!summary.success) return summary;
     const double chi2 = ComputePriorChi2PerDof(
         CorrectSharedErrors(options.shared_errors, summary.shared_errors,
                             problem.priors),
         *reconstruction);
-    if (chi2 <= balance.max_chi2_per_dof) return summary;
+    if (chi2 <= balance.max_chi2_per_dof) {
+      if (adjusted.function_tolerance <= options.function_tolerance) {
+        return summary;
+      }
+      break;
+    }
     *keypoint_sigma_factor =
         std::min(balance.max_sigma_factor,
                  *keypoint_sigma_factor *
                      std::clamp(std::sqrt(chi2 / balance.max_chi2_per_dof),
                                 kMinStep, kMaxStep));
   }
+  adjusted.function_tolerance = options.function_tolerance;
+  adjust();
+  return summary;
 }
 
 }  // namespace adasfm

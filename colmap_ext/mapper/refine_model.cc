@@ -59,6 +59,7 @@ class ModelRefiner {
 
   void AdjustFinely() {
     triangulator_.CompleteAndMergeTracks(options_.filter_max_reproj_error_px);
+    summary_.keypoint_sigma_factor = 1.0;
     Adjust(25, 1e-6, FindPriors(), &summary_.keypoint_sigma_factor);
     Filter(options_.filter_max_reproj_error_px);
     LeaveOutUnsupportedImages();

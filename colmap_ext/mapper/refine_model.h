@@ -34,8 +34,7 @@ struct RefineModelOptions {
 struct RefineModelSummary {
   int num_iterations = 0;
   // By which the keypoints' sigma is multiplied in balance with the priors.
-  // Every round begins with what the parts had; what the last one finds is
-  // kept.
+  // The first rounds begin with what the parts had, the last one with 1.
   double keypoint_sigma_factor = 1.0;
   // 1 sigma of keypoints that agrees with the priors (balance_priors.h).
   double keypoint_sigma_px = 0.0;
