@@ -52,7 +52,8 @@ class LoopClosureFilter {
     }
     for (const auto& [key, edges] : edges_of) {
       const std::vector<LoopGroup> groups =
-          GroupLoops(options_, graph_, parts_, pairs_, is_excluded, edges);
+          GroupLoops(options_, odometry_.chain, graph_, parts_, pairs_,
+                     is_excluded, edges, UnitLogSigma({key[0], key[1]}));
       if (key[0] == key[1]) {
         FilterLoops(groups);
       } else {
@@ -136,7 +137,9 @@ class LoopClosureFilter {
 
   // The unit of parts without metres is not known.
   double UnitLogSigma(const std::pair<int, int>& parts) const {
-    return parts_.is_metric[parts.first] && parts_.is_metric[parts.second]
+    const auto [first, second] = parts;
+    return first == second ||
+                   (parts_.is_metric[first] && parts_.is_metric[second])
                ? 0.0
                : options_.unit_log_sigma;
   }

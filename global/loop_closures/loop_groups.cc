@@ -31,29 +31,31 @@ Crossing MakeCrossing(const ViewGraph& graph, const DriveParts& parts, int e) {
   return crossing;
 }
 
-// The groups so far, to find that of a crossing.
+// The groups so far, to find those that lie around a crossing.
 class GroupGrid {
  public:
   GroupGrid(const DriveParts& parts, int max_gap)
       : parts_(parts), max_gap_(max_gap) {}
 
-  // The first group that the crossing belongs to; -1: none.
-  int Find(const std::vector<LoopGroup>& groups, const Crossing& crossing) {
+  // In the order of their indices.
+  std::vector<int> FindNear(const std::vector<LoopGroup>& groups,
+                            const Crossing& crossing) const {
     const auto [part1, part2, row, col] = Cell(crossing.i, crossing.j);
-    int first = -1;
+    std::vector<int> near;
     for (int64_t r = row - 1; r <= row + 1; ++r) {
       for (int64_t c = col - 1; c <= col + 1; ++c) {
         const auto it = cells_.find({part1, part2, r, c});
         if (it == cells_.end()) continue;
         for (const int g : it->second) {
-          if ((first < 0 || g < first) && IsNear(groups[g].i, crossing.i) &&
+          if (IsNear(groups[g].i, crossing.i) &&
               IsNear(groups[g].j, crossing.j)) {
-            first = g;
+            near.push_back(g);
           }
         }
       }
     }
-    return first;
+    std::sort(near.begin(), near.end());
+    return near;
   }
   void Add(int group, const Crossing& crossing) {
     cells_[Cell(crossing.i, crossing.j)].push_back(group);
@@ -78,12 +80,11 @@ class GroupGrid {
 
 }  // namespace
 
-std::vector<LoopGroup> GroupLoops(const LoopClosureOptions& options,
-                                  const ViewGraph& graph,
-                                  const DriveParts& parts,
-                                  const std::vector<PairMotion>& pairs,
-                                  const std::vector<bool>& is_excluded,
-                                  const std::vector<int>& edges) {
+std::vector<LoopGroup> GroupLoops(
+    const LoopClosureOptions& options, const OdometryChain& chain,
+    const ViewGraph& graph, const DriveParts& parts,
+    const std::vector<PairMotion>& pairs, const std::vector<bool>& is_excluded,
+    const std::vector<int>& edges, double unit_log_sigma) {
   std::vector<int> order = edges;
   std::stable_sort(order.begin(), order.end(), [&](int a, int b) {
     const auto quality = [&](int e) {
@@ -98,16 +99,22 @@ std::vector<LoopGroup> GroupLoops(const LoopClosureOptions& options,
   GroupGrid grid(parts, options.max_sequence_gap);
   for (const int e : order) {
     const Crossing crossing = MakeCrossing(graph, parts, e);
-    int g = grid.Find(groups, crossing);
-    if (g < 0) {
-      g = groups.size();
-      grid.Add(g, crossing);
-      groups.push_back({{},
-                        crossing.i,
-                        crossing.j,
-                        crossing.is_inverse ? pairs[e].Inverse() : pairs[e]});
+    const LoopGroup alone{{e},
+                          crossing.i,
+                          crossing.j,
+                          crossing.is_inverse ? pairs[e].Inverse() : pairs[e]};
+    const std::vector<int> near = grid.FindNear(groups, crossing);
+    const auto host = std::find_if(near.begin(), near.end(), [&](int g) {
+      return is_excluded[e] || AreConsistent(options, chain, graph, groups[g],
+                                             alone, unit_log_sigma)
+                                   .value_or(true);
+    });
+    if (host != near.end()) {
+      groups[*host].edges.push_back(e);
+    } else {
+      grid.Add(groups.size(), crossing);
+      groups.push_back(alone);
     }
-    groups[g].edges.push_back(e);
   }
   return groups;
 }

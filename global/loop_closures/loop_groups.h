@@ -24,17 +24,6 @@ struct LoopGroup {
   PairMotion j_from_i;
 };
 
-// Groups the edges: those whose ends both lie within max_sequence_gap of the
-// ends of the pair with most inliers, in the same streets, and so on with those
-// that are left. pairs, is_excluded (by the odometry): by edge; excluded ones
-// come last.
-std::vector<LoopGroup> GroupLoops(const LoopClosureOptions& options,
-                                  const ViewGraph& graph,
-                                  const DriveParts& parts,
-                                  const std::vector<PairMotion>& pairs,
-                                  const std::vector<bool>& is_excluded,
-                                  const std::vector<int>& edges);
-
 // Whether two groups between the same parts agree: the cycle through both pairs
 // and the odometry at both of their ends, by its chi-square. none: the odometry
 // does not lead from one to the other. unit_log_sigma: of the unit of the
@@ -43,5 +32,15 @@ std::optional<bool> AreConsistent(const LoopClosureOptions& options,
                                   const OdometryChain& chain,
                                   const ViewGraph& graph, const LoopGroup& a,
                                   const LoopGroup& b, double unit_log_sigma);
+
+// Groups the edges: the pair with most inliers and those that are consistent
+// with it, with both ends within max_sequence_gap of its ends and in the same
+// streets; and so on with those that are left. pairs, is_excluded (by the
+// odometry): by edge. Excluded ones come last, and join any group around them.
+std::vector<LoopGroup> GroupLoops(
+    const LoopClosureOptions& options, const OdometryChain& chain,
+    const ViewGraph& graph, const DriveParts& parts,
+    const std::vector<PairMotion>& pairs, const std::vector<bool>& is_excluded,
+    const std::vector<int>& edges, double unit_log_sigma);
 
 }  // namespace adasfm

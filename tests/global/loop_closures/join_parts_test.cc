@@ -229,6 +229,8 @@ TEST(FilterLoopClosures, SensorsAndNeighboursMakeOnePart) {
   joined.priors.push_back(joined.priors.front());
   joined.priors.back().image_id1 = kNumImages;
   joined.priors.back().image_id2 = kSecond + 1;
+  joined.priors.back().cam2_from_cam1 =
+      ComputeCam2FromCam1(PoseOf(kNumImages), PoseOf(kSecond + 1));
   EXPECT_EQ(Filter(&joined).num_parts, 1);
   EXPECT_EQ(CountKeptJoins(joined.graph), 14);
   // A rotation alone leaves the places open.
@@ -247,32 +249,38 @@ TEST(FilterLoopClosures, SensorsAndNeighboursMakeOnePart) {
 
 // Every field decides something.
 TEST(FilterLoopClosures, JoinOptionsDecide) {
-  Drives places = BuildDrives(1.0);
-  AddTruePlace(3, 10, &places);
-  // The second place is off by two metres in 42, and by two degrees.
-  for (int k = 45; k < 52; ++k) {
-    Rigid3d second = PoseAt(k, true);
-    second.translation.x() += 2.0;
-    second.rotation = ExpSo3(Eigen::Vector3d(0, 0, 0.035)) * second.rotation;
-    AddPair(k + 1, kSecond + k + 1,
-            ComputeCam2FromCam1(PoseAt(k, false), second), &places);
-  }
-  const auto confirms =
-      [&places](std::function<void(LoopClosureOptions*)> change) {
-        Drives copy = places;
-        LoopClosureOptions options;
-        change(&options);
-        return Filter(&copy, options).num_confirmed_joins == 1;
-      };
-  EXPECT_TRUE(confirms([](LoopClosureOptions*) {}));
-  EXPECT_FALSE(confirms([](auto* o) { o->significance = 0.5; }));
-  EXPECT_FALSE(confirms([](auto* o) { o->pair_angle_sigma_deg = 0.05; }));
-  EXPECT_FALSE(confirms([](auto* o) {
-    o->pair_length_log_sigma = 1e-3;
-    o->unit_log_sigma = 1e-3;
-  }));
-  EXPECT_FALSE(confirms([](auto* o) { o->min_turn_deg = 181.0; }));
-  EXPECT_FALSE(confirms([](auto* o) { o->min_num_pairs = 9; }));
+  // The second place is turned by 8 degrees.
+  const auto build = [](double angle_rad, double scale) {
+    Drives places = BuildDrives(scale);
+    AddTruePlace(3, 10, &places);
+    for (int k = 45; k < 52; ++k) {
+      Rigid3d second = PoseAt(k, true);
+      second.rotation =
+          ExpSo3(Eigen::Vector3d(0, 0, angle_rad)) * second.rotation;
+      AddPair(k + 1, kSecond + k + 1,
+              ComputeCam2FromCam1(PoseAt(k, false), second), &places);
+    }
+    return places;
+  };
+  const auto confirms = [](const Drives& drives,
+                           std::function<void(LoopClosureOptions*)> change) {
+    Drives copy = drives;
+    LoopClosureOptions options;
+    change(&options);
+    return Filter(&copy, options).num_confirmed_joins == 1;
+  };
+  const auto as_it_is = [](LoopClosureOptions*) {};
+  const Drives turned = build(0.14, 1.0);
+  EXPECT_FALSE(confirms(turned, as_it_is));
+  EXPECT_TRUE(confirms(turned, [](auto* o) { o->significance = 1e-30; }));
+  EXPECT_TRUE(confirms(turned, [](auto* o) { o->pair_angle_sigma_deg = 4; }));
+  const Drives scaled = build(0.0, 1.7);
+  EXPECT_TRUE(confirms(scaled, as_it_is));
+  EXPECT_FALSE(confirms(scaled, [](auto* o) { o->unit_log_sigma = 0.01; }));
+  const Drives places = build(0.0, 1.0);
+  EXPECT_TRUE(confirms(places, as_it_is));
+  EXPECT_FALSE(confirms(places, [](auto* o) { o->min_turn_deg = 181.0; }));
+  EXPECT_FALSE(confirms(places, [](auto* o) { o->min_num_pairs = 9; }));
   Drives joined = places;
   LoopClosureOptions keep;
   keep.min_turn_deg = 181.0;
@@ -294,7 +302,7 @@ TEST(FilterLoopClosures, JoinOptionsDecide) {
     if (i == 6) options.pair_length_log_sigma = -1.0;
     if (i == 7) options.unit_log_sigma = -1.0;
     EXPECT_FALSE(options.IsValid(&error)) << i;
-    EXPECT_THROW(Filter(&places, options), std::invalid_argument) << i;
+    EXPECT_THROW(Filter(&joined, options), std::invalid_argument) << i;
   }
 }
 
