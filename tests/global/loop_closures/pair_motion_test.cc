@@ -141,7 +141,7 @@ TEST(TestByOdometry, EachSharedErrorIsInTheCovariance) {
     drawn.scale_sigma *= 8.0;
     drawn.gyro_bias_sigma_rad_s *= 8.0;
     drawn.gyro_bias_walk_rad_s_sqrt_s *= 8.0;
-    drawn.extrinsic_rotation_sigma_rad *= 4.0;  // second order from there on
+    drawn.extrinsic_rotation_sigma_rad *= 2.0;  // it has second-order terms
     drawn.driving_direction_sigma_rad *= 8.0;
     OdometryChainOptions without = drawn;
     leave_out[k](&without);
