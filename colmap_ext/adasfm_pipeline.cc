@@ -129,7 +129,7 @@ Status WriteGlobalResult(const GlobalStageOptions& options,
   Status status = WriteModelFolder(output_path, models, frames.frames);
   if (status.ok()) {
     status = WriteTextFile(output_path + "/removed_pairs.txt",
-                           FormatRemovedPairs(scene, result.removed_pairs));
+                           FormatRemovedPairs(scene, result));
   }
   if (status.ok() && ChangesDatabase(options)) {
     status = RewriteTwoViewGeometries(database_path, result.geometries,

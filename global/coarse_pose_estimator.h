@@ -34,8 +34,7 @@ class CoarsePoseEstimator {
   void FilterLoops();
   VisualSteps CompleteSteps() const;
   bool IsSequence(const OdometryChain& chain) const;
-  void SplitJoins(const OdometryChain& chain,
-                  const std::vector<std::optional<EdgeLength>>& lengths);
+  DriveOdometry BuildDriveOdometry(std::string* summary) const;
   int AddSensors();
   void EstimateRotations();
   void FilterByRotation();
@@ -43,6 +42,7 @@ class CoarsePoseEstimator {
   std::vector<std::optional<RotationPrediction>> PredictFromRotations() const;
   void EstimateTranslations();
   void EstimatePositions();
+  int ReportUnverifiedJoins();
   int EstimateComponent(const std::vector<image_t>& images);
   void MeasureDirectionAgreement(const GlobalPositions& positions,
                                  CoarseComponent* component) const;

@@ -82,18 +82,7 @@ void CoarsePoseEstimator::EstimatePositions() {
     num_images += component.cams_from_world.size();
   }
   const int num_removed = RemoveEdgesOffPositions();
-  int num_joins = 0;
-  for (CoarseComponent& component : result_.components) {
-    // Those that stand after the filter are confirmed.
-    if (result_.join_filter.num_parts > 0) break;
-    std::vector<image_t> images;
-    for (const auto& [image_id, pose] : component.cams_from_world) {
-      images.push_back(image_id);
-    }
-    component.unverified_joins =
-        FindUnverifiedJoins(options_.joins, ExtractSubgraph(graph_, images));
-    num_joins += component.unverified_joins.size();
-  }
+  const int num_joins = ReportUnverifiedJoins();
   EndStep(
       "translation averaging",
       std::to_string(num_images) + " images in " +
@@ -102,6 +91,25 @@ void CoarsePoseEstimator::EstimatePositions() {
           std::to_string(num_iterations) + " iterations, " +
           std::to_string(num_removed) + " edges removed, " +
           std::to_string(num_joins) + " joins at one place only");
+}
+
+// Those that were made all the same, with the component that hangs on them.
+int CoarsePoseEstimator::ReportUnverifiedJoins() {
+  // Fewer images are no part of a drive.
+  constexpr int kMinNumImages = 10;
+  int num_joins = 0;
+  if (result_.loop_closures.joins_were_split) return num_joins;
+  for (const UnverifiedJoin& join : result_.loop_closures.unverified_joins) {
+    if (join.num_images < kMinNumImages) continue;
+    for (CoarseComponent& component : result_.components) {
+      if (component.cams_from_world.count(join.image_id1) &&
+          component.cams_from_world.count(join.image_id2)) {
+        component.unverified_joins.push_back(join);
+        ++num_joins;
+      }
+    }
+  }
+  return num_joins;
 }
 
 // Returns the number of iterations.

@@ -104,51 +104,68 @@ CoarsePoseEstimator::PredictRotations() const {
 
 void CoarsePoseEstimator::FilterLoops() {
   if (!options_.loops.enabled) {
-    EndStep("loop gating", "switched off");
+    EndStep("loop closures", "switched off");
     return;
   }
   lengths_ = EstimateLengths();
+  std::string steps_summary;
+  const DriveOdometry odometry = BuildDriveOdometry(&steps_summary);
+  LoopClosureOptions options = options_.loops;
+  // Photos in any order have no parts that could stay apart.
+  options.split_unverified_joins &=
+      !priors_.empty() || IsSequence(odometry.chain);
+  result_.loop_closures = FilterLoopClosures(options, odometry, &graph_);
+  const LoopClosureReport& report = result_.loop_closures;
+  // What came through removed pairs is forgotten.
+  if (report.joins_were_split && report.num_pairs_of_unverified_joins > 0) {
+    lengths_ = EdgeLengths();
+  }
+  std::string summary = std::to_string(report.num_tested) + " pairs tested, " +
+                        std::to_string(report.num_contradicting) +
+                        " contradict the odometry; " +
+                        std::to_string(report.num_loops) + " loops, " +
+                        std::to_string(report.num_false_loops) + " false (" +
+                        std::to_string(report.num_pairs_of_false_loops) +
+                        " more pairs)" + steps_summary;
+  if (report.num_confirmed_joins + report.unverified_joins.size() > 0) {
+    summary += "; " + std::to_string(report.num_parts) + " parts, " +
+               std::to_string(report.num_confirmed_joins) +
+               " joins confirmed, " +
+               std::to_string(report.unverified_joins.size()) +
+               (report.joins_were_split ? " not made" : " not confirmed");
+  }
+  EndStep("loop closures", summary);
+}
+
+// The priors, completed by vision where the sensors did not see every step.
+DriveOdometry CoarsePoseEstimator::BuildDriveOdometry(
+    std::string* summary) const {
+  DriveOdometry odometry;
+  odometry.priors = priors_;
+  odometry.chain = chain_;
+  EdgeLengths lengths = lengths_;
   VisualSteps steps = CompleteSteps();
-  OdometryChainOptions chain_options = options_.chain;
-  if (priors_.empty()) {
-    chain_options.scale_drift_ratio = options_.visual_steps.scale_drift_ratio;
-  }
-  const int num_dropped =
-      steps.priors.empty() ? 0
-                           : DropContradictedSteps(
-                                 options_.visual_steps, options_.loops,
-                                 chain_options, graph_, priors_.size(), &steps);
-  const OdometryChain chain = steps.priors.empty()
-                                  ? chain_
-                                  : OdometryChain(steps.priors, chain_options);
-  if (chain.empty()) {
-    EndStep("loop gating", "skipped: no odometry, and no sequence of images");
-    return;
-  }
-  LoopFilterOptions options = options_.loops;
-  options.min_position_error_m *= steps.unit_m;
-  const LoopFilterReport report = FilterLoopsByOdometry(
-      options, chain, steps.priors.empty() ? lengths_ : steps.lengths, &graph_);
-  SplitJoins(chain,
-             steps.priors.empty() ? lengths_.lengths : steps.lengths.lengths);
-  std::string summary =
-      std::to_string(report.num_tested) + " pairs tested, " +
-      std::to_string(report.num_contradicting) + " contradict the odometry, " +
-      std::to_string(report.num_in_false_runs) + " more lie in its " +
-      std::to_string(report.num_false_runs) + " false runs";
   if (!steps.priors.empty()) {
-    summary += "; vision added " + std::to_string(steps.num_by_vision) +
+    OdometryChainOptions options = options_.chain;
+    if (priors_.empty()) {
+      options.scale_drift_ratio = options_.visual_steps.scale_drift_ratio;
+      options.extrinsic_rotation_sigma_rad = 0.0;
+      options.driving_direction_sigma_rad = 0.0;
+    }
+    const int num_dropped =
+        DropContradictedSteps(options_.visual_steps, options_.loops, options,
+                              graph_, priors_.size(), &steps);
+    odometry.chain = OdometryChain(steps.priors, options);
+    odometry.unit = steps.unit_m;
+    lengths = steps.lengths;
+    *summary = "; vision added " + std::to_string(steps.num_by_vision) +
                " steps, gave " + std::to_string(num_dropped) + " of them up, " +
                std::to_string(steps.num_coasting) +
                " are taken to go on as before";
   }
-  const JoinFilterReport& joins = result_.join_filter;
-  if (joins.num_parts > 1) {
-    summary += "; " + std::to_string(joins.num_parts) + " parts, " +
-               std::to_string(joins.num_confirmed) + " joins confirmed, " +
-               std::to_string(joins.split.size()) + " not made";
-  }
-  EndStep("loop gating", summary);
+  odometry.lengths.resize(graph_.edges.size());
+  if (lengths.metric) odometry.lengths = lengths.lengths;
+  return odometry;
 }
 
 // Whether the chain holds nearly all of the images that share a pair.
@@ -163,20 +180,6 @@ bool CoarsePoseEstimator::IsSequence(const OdometryChain& chain) const {
       images.begin(), images.end(),
       [&chain](image_t image_id) { return chain.Index(image_id) >= 0; });
   return num_in_chain >= options_.min_sequence_ratio * images.size();
-}
-
-// Without priors only in a drive: photos in any order have no parts.
-void CoarsePoseEstimator::SplitJoins(
-    const OdometryChain& chain,
-    const std::vector<std::optional<EdgeLength>>& lengths) {
-  if (!options_.join_filter.enabled ||
-      (priors_.empty() && !IsSequence(chain))) {
-    return;
-  }
-  result_.join_filter =
-      FilterUnverifiedJoins(options_.join_filter, priors_, lengths, &graph_);
-  // What came through removed pairs is forgotten.
-  if (result_.join_filter.num_removed_pairs > 0) lengths_ = EdgeLengths();
 }
 
 // Empty where the sensors saw every step.

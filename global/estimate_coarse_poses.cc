@@ -68,10 +68,9 @@ bool CoarsePoseOptions::IsValid(std::string* error) const {
   return chain.IsValid(error) && camera_mount.IsValid(error) &&
          rotation_rates.IsValid(error) && relative_poses.IsValid(error) &&
          lengths.IsValid(error) && visual_steps.IsValid(error) &&
-         loops.IsValid(error) && join_filter.IsValid(error) &&
-         rotations.IsValid(error) && translations.IsValid(error) &&
-         augmentation.IsValid(error) && positions.IsValid(error) &&
-         position_filter.IsValid(error) && joins.IsValid(error);
+         loops.IsValid(error) && rotations.IsValid(error) &&
+         translations.IsValid(error) && augmentation.IsValid(error) &&
+         positions.IsValid(error) && position_filter.IsValid(error);
 }
 
 CoarsePoses EstimateCoarsePoses(const CoarsePoseOptions& options,
@@ -88,7 +87,6 @@ CoarsePoses EstimateCoarsePoses(const CoarsePoseOptions& options,
   step_options.relative_poses.num_threads = options.num_threads;
   step_options.lengths.num_threads = options.num_threads;
   step_options.translations.num_threads = options.num_threads;
-  step_options.join_filter.max_sequence_gap = options.joins.max_sequence_gap;
   return CoarsePoseEstimator(step_options, initial_graph, correspondences,
                              priors)
       .Run();

@@ -9,9 +9,8 @@
 #include "core/rigid3d.h"
 #include "global/calibration/correct_camera_mount.h"
 #include "global/calibration/correct_rotation_rates.h"
-#include "global/loop_closures/filter_loops_by_odometry.h"
-#include "global/loop_closures/filter_unverified_joins.h"
-#include "global/loop_closures/find_unverified_joins.h"
+#include "global/loop_closures/filter_loop_closures.h"
+#include "global/loop_closures/loop_closure_options.h"
 #include "global/odometry/augment_view_graph.h"
 #include "global/odometry/edge_lengths.h"
 #include "global/odometry/odometry_chain.h"
@@ -34,11 +33,9 @@ struct CoarsePoseOptions {
   RelativePoseRefinementOptions relative_poses;
   EdgeLengthOptions lengths;
   VisualStepOptions visual_steps;
-  LoopFilterOptions loops;
-  // Its max_sequence_gap is that of joins.
-  JoinFilterOptions join_filter;
-  // Without priors it takes part only where the visual chain holds this share
-  // of the images that share a pair.
+  LoopClosureOptions loops;
+  // Without priors, parts of a drive are kept apart only where the visual chain
+  // holds this share of the images that share a pair.
   double min_sequence_ratio = 0.8;
   RotationAveragingOptions rotations;
   // eps_R.
@@ -65,7 +62,6 @@ struct CoarsePoseOptions {
   int min_num_inliers = 15;
   // Priors shorter than this (standstill) say nothing about depths.
   double min_known_length_m = 0.05;
-  UnverifiedJoinOptions joins;
   // Of all steps; -1: all of the machine's.
   int num_threads = -1;
 
@@ -108,7 +104,7 @@ struct CoarsePoses {
   std::vector<RelativePosePrior> priors;
   CameraMountReport camera_mount;
   RotationRateReport rotation_rates;
-  JoinFilterReport join_filter;
+  LoopClosureReport loop_closures;
   std::vector<CoarseStep> steps;
 };
 
@@ -119,9 +115,8 @@ struct CoarsePoses {
 //   1 least-squares relative poses            RefineRelativePoses
 //     the camera's mount                      CorrectCameraMount
 //     odometry's rotation rates               CorrectRotationRates
-//   2 odometry chain, lengths, loop gating    AddVisualSteps
-//                                             FilterLoopsByOdometry
-//     joins that nothing confirms           FilterUnverifiedJoins
+//   2 odometry chain, lengths, loop closures  AddVisualSteps
+//                                             FilterLoopClosures
 //   3 sensor edges, rotation averaging        EstimateGlobalRotations
 //   4 edges off the rotations                 FilterEdgesByRotation
 //   5 directions, sensor translations         EstimateRelativeTranslations

@@ -28,21 +28,25 @@ Json JoinsJson(const SceneData& scene,
   return json;
 }
 
-Json JoinFilterJson(const SceneData& scene, const JoinFilterReport& joins) {
-  Json split = Json::array();
-  for (const SplitJoin& join : joins.split) {
-    split.push_back({{"name1", scene.images.at(join.image_id1).name},
-                     {"name2", scene.images.at(join.image_id2).name},
-                     {"pairs", join.num_pairs},
-                     {"images", join.num_images}});
-  }
-  return {{"parts", joins.num_parts},
-          {"confirmed", joins.num_confirmed},
-          {"pairs_removed", joins.num_removed_pairs},
-          {"not_made", split}};
+Json LoopClosuresJson(const LoopClosureReport& report) {
+  return {{"pairs_tested", report.num_tested},
+          {"pairs_contradicting", report.num_contradicting},
+          {"loops", report.num_loops},
+          {"false_loops", report.num_false_loops},
+          {"pairs_of_false_loops", report.num_pairs_of_false_loops}};
 }
 
-std::string DescribeSplitJoin(const SceneData& scene, const SplitJoin& join) {
+Json PartJoinsJson(const SceneData& scene, const LoopClosureReport& report) {
+  return {{"parts", report.num_parts},
+          {"confirmed", report.num_confirmed_joins},
+          {"pairs_removed", report.num_pairs_of_unverified_joins},
+          {"not_made", report.joins_were_split
+                           ? JoinsJson(scene, report.unverified_joins)
+                           : Json::array()}};
+}
+
+std::string DescribeSplitJoin(const SceneData& scene,
+                              const UnverifiedJoin& join) {
   std::ostringstream text;
   text << "a part of " << join.num_images << " images may join another where "
        << join.num_pairs << " pairs like "
@@ -204,7 +208,8 @@ std::string FormatGlobalReportJson(const SceneData& scene,
   report["rotation_rates"] = {{"corrected", rates.corrected},
                               {"pairs", rates.num_pairs},
                               {"max_rate_rad_s", rates.max_rate_rad_s}};
-  report["joins"] = JoinFilterJson(scene, result.poses.join_filter);
+  report["loop_closures"] = LoopClosuresJson(result.poses.loop_closures);
+  report["joins"] = PartJoinsJson(scene, result.poses.loop_closures);
   for (size_t i = 0; i < result.models.size(); ++i) {
     report["models"].push_back(
         ModelJson(scene, result.poses.components[i], result.models[i]));
@@ -260,8 +265,9 @@ std::vector<std::string> ListGlobalWarnings(const SceneData& scene,
   for (const CoarseModel& model : result.models) {
     AppendPriorWarnings(model, &warnings);
   }
-  for (const SplitJoin& join : result.poses.join_filter.split) {
-    if (join.num_pairs >= kMinNumReportedPairs) {
+  const LoopClosureReport& loops = result.poses.loop_closures;
+  for (const UnverifiedJoin& join : loops.unverified_joins) {
+    if (loops.joins_were_split && join.num_pairs >= kMinNumReportedPairs) {
       warnings.push_back(DescribeSplitJoin(scene, join));
     }
   }
@@ -293,11 +299,17 @@ std::vector<std::string> ListGlobalWarnings(const SceneData& scene,
 }
 
 std::string FormatRemovedPairs(const SceneData& scene,
-                               const std::vector<ImagePair>& pairs) {
+                               const GlobalStageResult& result) {
   std::ostringstream text;
-  for (const ImagePair& pair : pairs) {
+  const ViewGraph& graph = result.poses.graph;
+  for (const ImagePair& pair : result.removed_pairs) {
+    const int e = FindEdge(graph, pair);
+    const bool was_kept = e >= 0 && graph.edges[e].IsKept();
     text << scene.images.at(pair.image_id1).name << " "
-         << scene.images.at(pair.image_id2).name << "\n";
+         << scene.images.at(pair.image_id2).name << "\t"
+         << (e < 0 || was_kept ? "too few matches fit the poses"
+                               : EdgeRemovalName(graph.edges[e].removal))
+         << "\n";
   }
   return text.str();
 }

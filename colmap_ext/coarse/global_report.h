@@ -22,8 +22,9 @@ std::string FormatGlobalReportText(const GlobalStageResult& result,
 std::vector<std::string> ListGlobalWarnings(const SceneData& scene,
                                             const GlobalStageResult& result);
 
-// One line `name1 name2` per removed pair.
+// One line per removed pair: `name1 name2`, a tab, and why (EdgeRemovalName, or
+// that too few of its matches fit the poses).
 std::string FormatRemovedPairs(const SceneData& scene,
-                               const std::vector<ImagePair>& pairs);
+                               const GlobalStageResult& result);
 
 }  // namespace adasfm

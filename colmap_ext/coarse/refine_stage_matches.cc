@@ -19,8 +19,7 @@ std::set<ImagePair> FindRefutedPairs(const ViewGraph& graph) {
   std::set<ImagePair> refuted;
   for (const ViewGraphEdge& edge : graph.edges) {
     switch (edge.removal) {
-      case EdgeRemoval::kOdometryRotation:
-      case EdgeRemoval::kOdometryPosition:
+      case EdgeRemoval::kOdometry:
       case EdgeRemoval::kFalseLoop:
       case EdgeRemoval::kUnverifiedJoin:
       case EdgeRemoval::kRotation:
@@ -30,6 +29,7 @@ std::set<ImagePair> FindRefutedPairs(const ViewGraph& graph) {
       case EdgeRemoval::kKept:
       case EdgeRemoval::kFewInliers:
       case EdgeRemoval::kRelativePose:
+      case EdgeRemoval::kOdometryPose:
       case EdgeRemoval::kDisconnected:
         break;
     }

@@ -13,7 +13,6 @@ class GlobalOptionAdder {
   void AddRotations();
   void AddMount();
   void AddLoops();
-  void AddJoins();
   void AddPositions();
   void AddStructure();
   void AddMatches();
@@ -88,30 +87,25 @@ void GlobalOptionAdder::AddLoops() {
   Add("max_coasting_s", &stage_->poses.visual_steps.max_coasting_s,
       "motion that nothing sees is taken to go on for so long, to gate loops "
       "[s]");
-  Add("max_loop_sigmas", &stage_->poses.loops.max_num_sigmas,
-      "pairs contradict the odometry beyond this many sigmas");
-  Add("max_contradicting_ratio", &stage_->poses.loops.max_contradicting_ratio,
-      "an undecided pair goes when more of its neighbours contradict the "
-      "odometry, as a ratio");
-}
-
-void GlobalOptionAdder::AddJoins() {
-  JoinFilterOptions* filter = &stage_->poses.join_filter;
-  Add("max_sequence_gap", &stage_->poses.joins.max_sequence_gap,
-      "image ids at most this far apart follow each other; parts of a drive "
-      "that hang together at one place only are not joined (without priors: "
-      "reported)");
-  Add("min_num_join_images", &stage_->poses.joins.min_num_images,
-      "smaller parts are not reported");
-  Add("join_min_turn_deg", &filter->min_turn_deg,
-      "places that confirm each other lie before and behind a turn [deg]");
-  Add("join_max_place_images", &filter->max_place_images,
+  LoopClosureOptions* loops = &stage_->poses.loops;
+  Add("loop_significance", &loops->significance,
+      "a true pair contradicts the odometry, or another loop, with this "
+      "probability");
+  Add("loop_pair_angle_sigma_deg", &loops->pair_angle_sigma_deg,
+      "least error of a pair's rotation and direction, 1 sigma [deg]");
+  Add("loop_pair_length_log_sigma", &loops->pair_length_log_sigma,
+      "least error of a pair's length, 1 sigma of its logarithm");
+  Add("loop_unit_log_sigma", &loops->unit_log_sigma,
+      "error of the unit of a part without metres, 1 sigma of its logarithm");
+  Add("max_sequence_gap", &loops->max_sequence_gap,
+      "images at most this far apart in the order of capture follow each "
+      "other; pairs of others are loops, and join parts of a drive");
+  Add("join_min_num_pairs", &loops->min_num_pairs,
+      "pairs that each of the two places needs that join two parts");
+  Add("join_min_turn_deg", &loops->min_turn_deg,
+      "these places lie before and behind a turn [deg]");
+  Add("join_max_place_images", &loops->max_place_images,
       "or so many images apart");
-  Add("join_min_num_pairs", &filter->min_num_pairs, "pairs that a place needs");
-  Add("join_max_rotation_error_deg", &filter->max_rotation_error_deg,
-      "the ways between them agree within this turn [deg]");
-  Add("join_max_position_error", &filter->max_position_error_ratio,
-      "and within this share of the way, as a ratio");
 }
 
 void GlobalOptionAdder::AddPositions() {
@@ -174,8 +168,8 @@ void GlobalOptionAdder::AddAblations() {
   Add("use_sdp_start", &stage_->poses.rotations.use_sdp_start,
       "start the rotations from the SDP");
   Add("use_loop_gating", &stage_->poses.loops.enabled,
-      "remove loops that the odometry excludes");
-  Add("split_unverified_joins", &stage_->poses.join_filter.enabled,
+      "remove false loop closures");
+  Add("split_unverified_joins", &stage_->poses.loops.split_unverified_joins,
       "parts of a drive (with sensor priors, or images in order) that only "
       "pairs at one place join "
       "become models of their own");
@@ -210,7 +204,6 @@ void AddGlobalOptions(GlobalStageOptions* stage, CommandOptions* command) {
   adder.AddRotations();
   adder.AddMount();
   adder.AddLoops();
-  adder.AddJoins();
   adder.AddPositions();
   adder.AddStructure();
   adder.AddMatches();

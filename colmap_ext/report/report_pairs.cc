@@ -134,6 +134,7 @@ RemovedPairs ReadRemovedPairs(const std::string& path,
   std::ifstream file(path);
   std::string line;
   while (std::getline(file, line)) {
+    line = line.substr(0, line.find('\t'));  // what follows says why
     bool found = false;
     for (size_t space = line.find(' '); space != std::string::npos && !found;
          space = line.find(' ', space + 1)) {

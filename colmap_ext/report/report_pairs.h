@@ -60,8 +60,9 @@ ReportPairs ReadReportPairs(const ReportScene& scene,
 nlohmann::json PairsToJson(const ReportPairs& pairs, size_t num_images,
                            size_t max_size);
 
-// The pairs of removed_pairs.txt (`name1 name2` a line; names may have spaces)
-// as indices; lines with unknown names are counted only.
+// The pairs of removed_pairs.txt (`name1 name2` a line, names may have spaces,
+// then a tab and the reason) as indices; lines with unknown names are counted
+// only.
 struct RemovedPairs {
   std::vector<std::pair<size_t, size_t>> pairs;
   int num_unknown = 0;

@@ -2,44 +2,41 @@
 #pragma once
 
 #include <cstdint>
-#include <optional>
 #include <vector>
 
 #include "core/relative_pose_prior.h"
-#include "core/rigid3d.h"
-#include "global/odometry/edge_lengths.h"
+#include "global/loop_closures/loop_closure_options.h"
+#include "global/odometry/odometry_chain.h"
 #include "global/view_graph/view_graph.h"
 
 namespace adasfm {
 
-// The parts of a drive within which priors with a position, or pairs of
-// neighbouring images, lead from image to image; and where its images lie.
-// All vectors are in the order of ViewGraph::images.
+// Smaller parts belong to that with which they share most pairs.
+inline constexpr int kMinNumPartImages = 3;
+
+// The parts of a drive: images between which priors with a position, or pairs
+// of images that follow each other, lead from one to the next. All vectors are
+// in the order of ViewGraph::images.
 struct DriveParts {
   // The index of one image of the part, the same for all of them.
   std::vector<int> part_of;
   // By the same index; 0 for all others.
   std::vector<int> num_images;
+  // By the same index: a prior with a position gives metres.
+  std::vector<bool> is_metric;
   // ViewGraph::CaptureRank.
   std::vector<int64_t> rank_of;
-  // Whether a prior with a position lies in the part.
-  std::vector<bool> is_metric;
-
-  // Images with equal values have poses in one frame; -1: none.
-  std::vector<int> frame_of;
-  std::vector<Rigid3d> cams_from_part;
-  // Along the images of the part in the order of capture.
-  std::vector<double> way;
-  // Counts the turns so far: a new street begins where the camera looks
-  // min_turn_deg away from where it looked at the beginning of the last.
+  // Counts the turns of the odometry: a new street begins where the camera
+  // looks min_turn_deg away from where it looked at the beginning of the last.
   std::vector<int> street_of;
+
+  // Whether what is seen at one image is evidence beside what is seen at the
+  // other: a turn or max_place_images lie between them.
+  bool AreApart(const LoopClosureOptions& options, int i, int j) const;
 };
 
-// max_gap: pairs of images at most this far apart in the order of capture lead
-// from one to the other.
-DriveParts FindDriveParts(const ViewGraph& graph,
+DriveParts FindDriveParts(const LoopClosureOptions& options,
                           const std::vector<RelativePosePrior>& priors,
-                          const std::vector<std::optional<EdgeLength>>& lengths,
-                          int max_gap, double min_turn_deg);
+                          const OdometryChain& chain, const ViewGraph& graph);
 
 }  // namespace adasfm

@@ -2,27 +2,59 @@
 #include "global/loop_closures/drop_contradicted_steps.h"
 
 #include <algorithm>
-#include <map>
 #include <optional>
 #include <set>
 #include <tuple>
+#include <utility>
 #include <vector>
 
-#include "global/loop_closures/test_by_odometry.h"
+#include "global/loop_closures/pair_motion.h"
 
 namespace adasfm {
 namespace {
 
-// The short pairs and, of every step, those across it. A step is named by the
-// chain's index of its later image.
+// A pair of images that follow each other closely. A step is named by the
+// chain's index of its later image; begin < step <= end lie across.
+struct ShortPair {
+  int begin = 0;
+  int end = 0;
+  bool contradicts = false;
+  bool is_settled = false;
+};
+
+std::vector<ShortPair> TestShortPairs(const VisualStepOptions& options,
+                                      const LoopClosureOptions& loop_options,
+                                      const ViewGraph& graph,
+                                      const OdometryChain& chain,
+                                      const VisualSteps& steps) {
+  std::vector<ShortPair> pairs;
+  for (size_t e = 0; e < graph.edges.size(); ++e) {
+    const ViewGraphEdge& edge = graph.edges[e];
+    if (!edge.IsKept() || !edge.has_rotation ||
+        edge.source == EdgeSource::kSensor ||
+        !chain.IsConnected(edge.image_id1, edge.image_id2)) {
+      continue;
+    }
+    const auto [begin, end] =
+        std::minmax({chain.Index(edge.image_id1), chain.Index(edge.image_id2)});
+    if (end - begin < 2 || end - begin > options.max_num_steps) continue;
+    const ChiSquare pose =
+        TestByOdometry(chain, edge,
+                       MeasurePair(loop_options, edge, steps.lengths.lengths[e],
+                                   steps.unit_m));
+    if (pose.dof == 0) continue;
+    pairs.push_back(
+        {begin, end, pose.Probability() < loop_options.significance, false});
+  }
+  return pairs;
+}
+
+// The pairs across each step, and how many of them contradict.
 class StepVotes {
  public:
-  void Add(const OdometryTest& test) {
-    for (int step = test.begin + 1; step <= test.end; ++step) {
-      pairs_across_[step].push_back(pairs_.size());
-    }
-    pairs_.push_back(
-        {test.begin, test.end, test.verdict == OdometryVerdict::kContradicts});
+  StepVotes(int num_steps, std::vector<ShortPair>* pairs)
+      : pairs_(*pairs), votes_(num_steps) {
+    for (const ShortPair& pair : pairs_) Count(pair, 1);
   }
 
   // Of the steps, the one with the largest share of contradicting pairs, the
@@ -32,14 +64,9 @@ class StepVotes {
     std::optional<int> worst;
     std::tuple<double, int> most(max_ratio, 0);
     for (const int step : steps) {
-      const auto across = pairs_across_.find(step);
-      if (across == pairs_across_.end()) continue;
-      int num_contradicting = 0;
-      for (const int pair : across->second) {
-        num_contradicting += pairs_[pair].contradicts;
-      }
-      const double ratio =
-          static_cast<double>(num_contradicting) / across->second.size();
+      const auto& [num_pairs, num_contradicting] = votes_[step];
+      if (num_contradicting == 0) continue;
+      const double ratio = static_cast<double>(num_contradicting) / num_pairs;
       if (ratio > max_ratio && std::tie(ratio, num_contradicting) > most) {
         most = {ratio, num_contradicting};
         worst = step;
@@ -48,99 +75,75 @@ class StepVotes {
     return worst;
   }
 
-  // Drops the pairs across a step.
   void Settle(int step) {
-    const std::vector<int> settled = pairs_across_.at(step);
-    for (const int pair : settled) {
-      pairs_[pair].is_settled = true;
-      for (int s = pairs_[pair].begin + 1; s <= pairs_[pair].end; ++s) {
-        std::vector<int>& across = pairs_across_.at(s);
-        across.erase(std::find(across.begin(), across.end(), pair));
-        if (across.empty()) pairs_across_.erase(s);
-      }
+    for (ShortPair& pair : pairs_) {
+      if (pair.is_settled || pair.begin >= step || pair.end < step) continue;
+      pair.is_settled = true;
+      Count(pair, -1);
     }
-  }
-
-  // The share of contradicting pairs among those that are left between two
-  // indices; 0 without any.
-  double ContradictingRatio(int begin, int end) const {
-    int num_pairs = 0;
-    int num_contradicting = 0;
-    for (const ShortPair& pair : pairs_) {
-      if (pair.is_settled || pair.begin < begin || pair.end > end) continue;
-      ++num_pairs;
-      num_contradicting += pair.contradicts;
-    }
-    return num_pairs == 0 ? 0.0
-                          : static_cast<double>(num_contradicting) / num_pairs;
   }
 
  private:
-  struct ShortPair {
-    int begin = 0;
-    int end = 0;
-    bool contradicts = false;
-    bool is_settled = false;
-  };
-  std::vector<ShortPair> pairs_;
-  std::map<int, std::vector<int>> pairs_across_;
-};
-
-StepVotes CollectVotes(const VisualStepOptions& options,
-                       const LoopFilterOptions& loop_options,
-                       const ViewGraph& graph, const OdometryChain& chain,
-                       const EdgeLengths& lengths) {
-  StepVotes votes;
-  for (size_t e = 0; e < graph.edges.size(); ++e) {
-    const OdometryTest test = TestByOdometry(
-        loop_options, chain,
-        lengths.metric ? lengths.lengths.at(e) : std::optional<EdgeLength>(),
-        graph.edges[e]);
-    const int num_steps = test.end - test.begin;
-    if (test.verdict != OdometryVerdict::kUntested && num_steps >= 2 &&
-        num_steps <= options.max_num_steps) {
-      votes.Add(test);
+  void Count(const ShortPair& pair, int sign) {
+    for (int step = pair.begin + 1; step <= pair.end; ++step) {
+      votes_[step].first += sign;
+      votes_[step].second += pair.contradicts ? sign : 0;
     }
   }
-  return votes;
-}
 
-// The runs of steps that follow each other.
-std::vector<std::vector<int>> FindRuns(const std::set<int>& steps) {
-  std::vector<std::vector<int>> runs;
-  for (const int step : steps) {
-    if (runs.empty() || step != runs.back().back() + 1) runs.emplace_back();
-    runs.back().push_back(step);
+  std::vector<ShortPair>& pairs_;
+  std::vector<std::pair<int, int>> votes_;
+};
+
+// The share of contradicting pairs among those that are left between two
+// indices; 0 without any.
+double ContradictingRatio(const std::vector<ShortPair>& pairs, int begin,
+                          int end) {
+  int num_pairs = 0;
+  int num_contradicting = 0;
+  for (const ShortPair& pair : pairs) {
+    if (pair.is_settled || pair.begin < begin || pair.end > end) continue;
+    ++num_pairs;
+    num_contradicting += pair.contradicts;
   }
-  return runs;
+  return num_pairs == 0 ? 0.0
+                        : static_cast<double>(num_contradicting) / num_pairs;
 }
 
 }  // namespace
 
 int DropContradictedSteps(const VisualStepOptions& options,
-                          const LoopFilterOptions& loop_options,
+                          const LoopClosureOptions& loop_options,
                           const OdometryChainOptions& chain_options,
                           const ViewGraph& graph, size_t num_sensor_priors,
                           VisualSteps* steps) {
   const OdometryChain chain(steps->priors, chain_options);
-  StepVotes votes =
-      CollectVotes(options, loop_options, graph, chain, steps->lengths);
+  std::vector<ShortPair> pairs =
+      TestShortPairs(options, loop_options, graph, chain, *steps);
   std::set<int> candidates;
-  for (size_t k = num_sensor_priors; k < steps->priors.size(); ++k) {
-    candidates.insert(chain.Index(steps->priors[k].image_id2));
+  int num_indices = 0;
+  for (size_t k = 0; k < steps->priors.size(); ++k) {
+    const int step = chain.Index(steps->priors[k].image_id2);
+    num_indices = std::max(num_indices, step + 1);
+    if (k >= num_sensor_priors && step >= 0) candidates.insert(step);
   }
   std::set<int> dropped;
+  StepVotes votes(num_indices, &pairs);
   while (const auto worst =
              votes.FindWorst(candidates, options.max_contradicting_ratio)) {
     votes.Settle(*worst);
     candidates.erase(*worst);
     dropped.insert(*worst);
   }
-  for (const std::vector<int>& run : FindRuns(candidates)) {
-    if (votes.ContradictingRatio(run.front() - 1, run.back()) >
+  // Runs of steps that follow each other.
+  for (auto begin = candidates.begin(); begin != candidates.end();) {
+    auto end = std::next(begin);
+    while (end != candidates.end() && *end == *std::prev(end) + 1) ++end;
+    if (ContradictingRatio(pairs, *begin - 1, *std::prev(end)) >
         options.max_run_contradicting_ratio) {
-      dropped.insert(run.begin(), run.end());
+      dropped.insert(begin, end);
     }
+    begin = end;
   }
   const auto begin = steps->priors.begin() + num_sensor_priors;
   steps->priors.erase(

@@ -4,36 +4,18 @@
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
+#include <initializer_list>
 #include <set>
 #include <stdexcept>
+#include <utility>
 
 #include "core/so3.h"
+#include "global/odometry/uncertain_motion.h"
 
 namespace adasfm {
 namespace {
 
 using Matrix6d = Eigen::Matrix<double, 6, 6>;
-
-// A small error (dtheta, dt) in the frame of a camera, as RelativePosePrior
-// states it (R_true = Exp(dtheta) R, t_true = t + dt), is the twist
-// xi = (dtheta, dt - dtheta x t) of P_true = exp(xi) P.
-Matrix6d TwistFromError(const Eigen::Vector3d& translation) {
-  Matrix6d matrix = Matrix6d::Identity();
-  matrix.bottomLeftCorner<3, 3>() = Hat(translation);
-  return matrix;
-}
-
-// The same twist seen from another frame: (R omega, R v + t x R omega).
-Matrix6d Adjoint(const Rigid3d& target_from_source) {
-  const Eigen::Matrix3d rotation =
-      target_from_source.rotation.toRotationMatrix();
-  Matrix6d adjoint = Matrix6d::Zero();
-  adjoint.topLeftCorner<3, 3>() = rotation;
-  adjoint.bottomRightCorner<3, 3>() = rotation;
-  adjoint.bottomLeftCorner<3, 3>() =
-      Hat(target_from_source.translation) * rotation;
-  return adjoint;
-}
 
 bool HasPosition(const RelativePosePrior& prior) {
   return prior.HasRotation() && prior.HasDirection() && prior.HasLength();
@@ -61,6 +43,23 @@ Eigen::Matrix3d SquareRoot(const Eigen::Matrix3d& covariance) {
          eigen.eigenvectors().transpose();
 }
 
+// d(error) of a step by the errors that all steps share (columns as in
+// OdometryChain::Systematic).
+Eigen::Matrix<double, 6, 13> SharedJacobian(const RelativePosePrior& prior,
+                                            const Rigid3d& motion) {
+  Eigen::Matrix<double, 6, 13> jacobian = Eigen::Matrix<double, 6, 13>::Zero();
+  const Eigen::Matrix3d camera_from_middle =
+      ExpSo3(0.5 * LogSo3(motion.rotation)).toRotationMatrix();
+  jacobian.block<3, 1>(3, 0) = motion.translation;
+  jacobian.block<3, 3>(0, 1) = SecondsFromNs(prior.dt_ns) * camera_from_middle;
+  jacobian.block<3, 3>(0, 4) =
+      Eigen::Matrix3d::Identity() - motion.rotation.toRotationMatrix();
+  jacobian.block<3, 3>(3, 7) = -Hat(motion.translation) * camera_from_middle;
+  jacobian.block<3, 3>(3, 10) =
+      SquareRoot(ObservedCovariance(prior).bottomRightCorner<3, 3>());
+  return jacobian;
+}
+
 // The part of the motion that was observed.
 Rigid3d ObservedMotion(const RelativePosePrior& prior) {
   Rigid3d motion;
@@ -72,25 +71,20 @@ Rigid3d ObservedMotion(const RelativePosePrior& prior) {
 }  // namespace
 
 bool OdometryChainOptions::IsValid(std::string* error) const {
-  if (!(scale_sigma >= 0.0)) {
-    *error = "scale_sigma = " + std::to_string(scale_sigma) + " must be >= 0";
-    return false;
-  }
-  if (!(gyro_bias_sigma_rad_s >= 0.0)) {
-    *error =
-        "gyro_bias_sigma_rad_s = " + std::to_string(gyro_bias_sigma_rad_s) +
-        " must be >= 0";
-    return false;
-  }
-  if (!(persistent_translation_ratio >= 0.0)) {
-    *error = "persistent_translation_ratio = " +
-             std::to_string(persistent_translation_ratio) + " must be >= 0";
-    return false;
-  }
-  if (!(scale_drift_ratio >= 0.0)) {
-    *error = "scale_drift_ratio = " + std::to_string(scale_drift_ratio) +
-             " must be >= 0";
-    return false;
+  for (const auto& [name, value] :
+       std::initializer_list<std::pair<const char*, double>>{
+           {"scale_sigma", scale_sigma},
+           {"gyro_bias_sigma_rad_s", gyro_bias_sigma_rad_s},
+           {"gyro_bias_walk_rad_s_sqrt_s", gyro_bias_walk_rad_s_sqrt_s},
+           {"extrinsic_rotation_sigma_rad", extrinsic_rotation_sigma_rad},
+           {"driving_direction_sigma_rad", driving_direction_sigma_rad},
+           {"persistent_translation_ratio", persistent_translation_ratio},
+           {"scale_drift_ratio", scale_drift_ratio}}) {
+    if (!(value >= 0.0)) {
+      *error =
+          std::string(name) + " = " + std::to_string(value) + " must be >= 0";
+      return false;
+    }
   }
   return true;
 }
@@ -146,15 +140,14 @@ void OdometryChain::AppendPiece(image_t first,
                                       TwistFromError(motion.translation);
     node.covariance += start_from_error * ObservedCovariance(prior) *
                        start_from_error.transpose();
-    // d(error) / d(scale, gyro bias, persistent translation error) of this
-    // step.
-    Systematic systematic = Systematic::Zero();
-    systematic.block<3, 1>(3, 0) = motion.translation;
-    systematic.block<3, 3>(0, 1) =
-        SecondsFromNs(prior.dt_ns) * Eigen::Matrix3d::Identity();
-    systematic.block<3, 3>(3, 4) =
-        SquareRoot(ObservedCovariance(prior).bottomRightCorner<3, 3>());
-    node.systematic += start_from_error * systematic;
+    const double dt_s = SecondsFromNs(prior.dt_ns);
+    // A later bias differs from that of the piece's start by its walk up to
+    // here.
+    node.walk.seconds += dt_s;
+    const auto gyro_sum = node.systematic.middleCols<3>(kGyro);
+    node.walk.sum += dt_s * gyro_sum;
+    node.walk.square_sum += dt_s * gyro_sum * gyro_sum.transpose();
+    node.systematic += start_from_error * SharedJacobian(prior, motion);
     index_[node.image_id] = nodes_.size();
     nodes_.push_back(node);
   }
@@ -198,6 +191,17 @@ Eigen::Matrix3d OdometryChain::SumOfScaleChanges(const Node& earlier,
          earlier.place_square_sum;
 }
 
+// The bias changes by an increment at each step, which turns all later ones:
+// the sum over the steps of the outer products of what lies behind them.
+OdometryChain::Matrix6d OdometryChain::SumOfWalks(const Node& earlier,
+                                                  const Node& later) {
+  const Eigen::Matrix<double, 6, 3> end = later.systematic.middleCols<3>(kGyro);
+  const Matrix6d mixed = end * (later.walk.sum - earlier.walk.sum).transpose();
+  return (later.walk.seconds - earlier.walk.seconds) * end * end.transpose() -
+         mixed - mixed.transpose() + later.walk.square_sum -
+         earlier.walk.square_sum;
+}
+
 ChainMotion OdometryChain::Motion(image_t image_id1, image_t image_id2) const {
   const int num_steps = NumSteps(image_id1, image_id2);
   const Node& node1 = nodes_[Index(image_id1)];
@@ -214,15 +218,18 @@ ChainMotion OdometryChain::Motion(image_t image_id1, image_t image_id2) const {
 
   // In the start's frame the errors of the steps add up; the error's sign does
   // not matter to a covariance, so both directions of travel are one formula.
-  Eigen::Matrix<double, 7, 1> variances;
-  variances << std::pow(options_.scale_sigma, 2),
-      Eigen::Vector3d::Constant(std::pow(options_.gyro_bias_sigma_rad_s, 2)),
-      Eigen::Vector3d::Constant(
-          std::pow(options_.persistent_translation_ratio, 2));
+  Eigen::Matrix<double, 13, 1> sigmas;
+  sigmas << options_.scale_sigma,
+      Eigen::Vector3d::Constant(options_.gyro_bias_sigma_rad_s),
+      Eigen::Vector3d::Constant(options_.extrinsic_rotation_sigma_rad),
+      Eigen::Vector3d::Constant(options_.driving_direction_sigma_rad),
+      Eigen::Vector3d::Constant(options_.persistent_translation_ratio);
   const Systematic systematic = later.systematic - earlier.systematic;
   const Matrix6d covariance_in_start =
       later.covariance - earlier.covariance +
-      systematic * variances.asDiagonal() * systematic.transpose();
+      systematic * sigmas.cwiseAbs2().asDiagonal() * systematic.transpose() +
+      std::pow(options_.gyro_bias_walk_rad_s_sqrt_s, 2) *
+          SumOfWalks(earlier, later);
   const Matrix6d error_from_start =
       TwistFromError(motion.cam2_from_cam1.translation).inverse() *
       Adjoint(node2.cam_from_start);

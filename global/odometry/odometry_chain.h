@@ -16,8 +16,14 @@ namespace adasfm {
 struct OdometryChainOptions {
   // 1 sigma of the wheels' common scale error.
   double scale_sigma = 0.01;
-  // 1 sigma of the gyro bias that is left, rad/s, per axis.
+  // 1 sigma of the gyro bias that is left, rad/s, per axis, and of its random
+  // walk, rad/s/sqrt(s).
   double gyro_bias_sigma_rad_s = 2e-4;
+  double gyro_bias_walk_rad_s_sqrt_s = 2e-5;
+  // 1 sigma, per axis, of the rotation of T_cam_imu and of the direction of
+  // driving in the camera, rad.
+  double extrinsic_rotation_sigma_rad = 5e-3;
+  double driving_direction_sigma_rad = 0.01;
   // The steps of a smoothed drive share the errors of its tilt and velocity:
   // this many sigmas of their translations persist from step to step, besides
   // the part that changes.
@@ -70,8 +76,17 @@ class OdometryChain {
 
  private:
   using Matrix6d = Eigen::Matrix<double, 6, 6>;
-  // By the scale, the gyro bias and the persistent translation error.
-  using Systematic = Eigen::Matrix<double, 6, 7>;
+  // By the scale, the gyro bias, the rotation of T_cam_imu, the direction of
+  // driving and the persistent translation error.
+  using Systematic = Eigen::Matrix<double, 6, 13>;
+  static constexpr int kGyro = 1;  // its columns
+  // Prefix sums, weighted by time, of what the gyro bias has done before each
+  // step.
+  struct Walk {
+    double seconds = 0.0;
+    Eigen::Matrix<double, 6, 3> sum = Eigen::Matrix<double, 6, 3>::Zero();
+    Matrix6d square_sum = Matrix6d::Zero();
+  };
   struct Node {
     image_t image_id = kInvalidImageId;
     int piece = -1;
@@ -79,6 +94,7 @@ class OdometryChain {
     // Prefix sums over the piece's steps up to this node.
     Matrix6d covariance = Matrix6d::Zero();
     Systematic systematic = Systematic::Zero();
+    Walk walk;
     // Of the places where the scale may change: their number, sum and sum of
     // outer products.
     double num_places = 0.0;
@@ -89,6 +105,7 @@ class OdometryChain {
   };
   static Eigen::Matrix3d SumOfScaleChanges(const Node& earlier,
                                            const Node& later);
+  static Matrix6d SumOfWalks(const Node& earlier, const Node& later);
   void AppendPiece(image_t first, const std::map<image_t, int>& next,
                    const std::vector<RelativePosePrior>& priors);
 

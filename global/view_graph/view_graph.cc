@@ -16,12 +16,12 @@ const char* EdgeRemovalName(EdgeRemoval removal) {
       return "few inliers";
     case EdgeRemoval::kRelativePose:
       return "no relative pose";
-    case EdgeRemoval::kOdometryRotation:
-      return "rotation contradicts odometry";
-    case EdgeRemoval::kOdometryPosition:
-      return "position contradicts odometry";
+    case EdgeRemoval::kOdometryPose:
+      return "pose contradicts odometry";
+    case EdgeRemoval::kOdometry:
+      return "contradicts odometry";
     case EdgeRemoval::kFalseLoop:
-      return "part of a false loop";
+      return "inconsistent with other loops";
     case EdgeRemoval::kUnverifiedJoin:
       return "alone joins two parts";
     case EdgeRemoval::kRotation:

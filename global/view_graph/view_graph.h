@@ -23,14 +23,14 @@ enum class EdgeSource {
 enum class EdgeRemoval {
   kKept,
   kFewInliers,
-  kRelativePose,      // its own matches do not support one relative pose
-  kOdometryRotation,  // turns farther from the odometry chain than it can err
-  kOdometryPosition,  // its places are farther apart than it says
-  kFalseLoop,         // belongs to a run of pairs that contradicts the chain
-  kUnverifiedJoin,    // alone joins two parts of a drive, and may be wrong
-  kRotation,          // off the global rotations
-  kTranslation,       // off the global positions
-  kDisconnected,      // one of its images has no pose
+  kRelativePose,    // its own matches do not support one relative pose
+  kOdometryPose,    // contradicts the odometry, but others at its place do not
+  kOdometry,        // contradicts the odometry
+  kFalseLoop,       // is inconsistent with other loops
+  kUnverifiedJoin,  // alone joins two parts of a drive, and may be wrong
+  kRotation,        // off the global rotations
+  kTranslation,     // off the global positions
+  kDisconnected,    // one of its images has no pose
 };
 const char* EdgeRemovalName(EdgeRemoval removal);
 

@@ -4,6 +4,8 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <sstream>
+#include <string>
 
 #include "colmap_ext/coarse/global_report.h"
 #include "tests/testing/colmap_ext/synthetic_scene.h"
@@ -93,6 +95,16 @@ TEST(RunGlobalStageTest, RefinedMatchesAreTrueOnes) {
   EXPECT_EQ(result.geometries.size() + result.removed_pairs.size() +
                 result.refinement.num_skipped_pairs,
             scene.pairs.size());
+  // Pairs that the odometry refutes are named as such.
+  std::istringstream lines(FormatRemovedPairs(scene, result));
+  std::string line;
+  size_t num_lines = 0, num_refuted = 0;
+  while (std::getline(lines, line)) {
+    ++num_lines;
+    num_refuted += line.find("\tcontradicts odometry") != std::string::npos;
+  }
+  EXPECT_EQ(num_lines, result.removed_pairs.size());
+  EXPECT_GT(num_refuted, 0);
 }
 
 TEST(RunGlobalStageTest, SameResultOnAnyNumberOfThreads) {

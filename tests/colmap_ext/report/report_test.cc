@@ -104,6 +104,7 @@ class ReportTest : public CommandLineTest {
     EXPECT_TRUE(RewriteTwoViewGeometries(database_, {}, {removed_}).ok());
     folder_.Write("global/removed_pairs.txt", world_.images[3].name + " " +
                                                   world_.images[9].name +
+                                                  "\tcontradicts odometry"
                                                   "\nno such images\n");
   }
 

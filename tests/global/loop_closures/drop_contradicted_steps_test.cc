@@ -29,7 +29,7 @@ VisualSteps AddSteps(const TestScene& scene,
 
 int Drop(const TestScene& scene, VisualSteps* steps,
          size_t num_sensor_priors = 0) {
-  return DropContradictedSteps(VisualStepOptions(), LoopFilterOptions(),
+  return DropContradictedSteps(VisualStepOptions(), LoopClosureOptions(),
                                OdometryChainOptions(), scene.graph,
                                num_sensor_priors, steps);
 }

@@ -65,39 +65,50 @@ TEST(OdometryChain, CovarianceAgreesWithMonteCarlo) {
   OdometryChainOptions options;
   options.scale_sigma = 0.004;
   options.gyro_bias_sigma_rad_s = 5e-4;
+  options.gyro_bias_walk_rad_s_sqrt_s = 3e-4;
+  options.extrinsic_rotation_sigma_rad = 0.004;
+  options.driving_direction_sigma_rad = 0.003;
   options.persistent_translation_ratio = 0.3;
   Random random(7);
-  const auto draw = [&](double rotation_sigma, double translation_sigma,
-                        double scale, const Eigen::Vector3d& bias,
-                        const Eigen::Vector3d& persistent) {
+  // noise: 0 for the truth. The bias is that of the stated sigma at the earlier
+  // image, and walks from there on.
+  const auto draw = [&](double noise, int earlier) {
+    const double scale = 1.0 + noise * random.Gaussian(options.scale_sigma);
+    Eigen::Vector3d bias =
+        noise * random.GaussianVector(options.gyro_bias_sigma_rad_s);
+    const Eigen::Vector3d extrinsic =
+        noise * random.GaussianVector(options.extrinsic_rotation_sigma_rad);
+    const Eigen::Quaterniond driving = ExpSo3(
+        noise * random.GaussianVector(options.driving_direction_sigma_rad));
+    const Eigen::Vector3d persistent =
+        noise * random.GaussianVector(options.persistent_translation_ratio *
+                                      kTranslationSigma);
     std::vector<RelativePosePrior> priors;
     for (int k = 1; k <= kNumSteps; ++k) {
       Rigid3d step = TrueStep(k);
-      step.rotation = ExpSo3(0.1 * bias) * step.rotation;
-      step.translation = scale * step.translation + persistent;
-      priors.push_back(BuildPrior(k, k + 1, step, rotation_sigma,
-                                  translation_sigma, &random));
+      step.rotation =
+          ExpSo3(0.1 * bias + extrinsic - step.rotation * extrinsic) *
+          step.rotation;
+      step.translation = scale * (driving * step.translation) + persistent;
+      priors.push_back(BuildPrior(k, k + 1, step, noise * kRotationSigma,
+                                  noise * kTranslationSigma, &random));
       priors.back().covariance.diagonal()
           << Eigen::Vector3d::Constant(kRotationSigma * kRotationSigma),
           Eigen::Vector3d::Constant(kTranslationSigma * kTranslationSigma);
+      if (k < earlier) continue;
+      bias += noise * random.GaussianVector(
+                          options.gyro_bias_walk_rad_s_sqrt_s * std::sqrt(0.1));
     }
     return OdometryChain(priors, options);
   };
-  const OdometryChain truth =
-      draw(0, 0, 1.0, Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero());
+  const OdometryChain truth = draw(0.0, 0);
   for (const auto& [from, to] :
        std::vector<std::pair<image_t, image_t>>{{11, 111}, {111, 31}}) {
     Matrix6d sampled = Matrix6d::Zero();
     const ChainMotion expected = truth.Motion(from, to);
     for (int k = 0; k < kNumDraws; ++k) {
       const Rigid3d drawn =
-          draw(kRotationSigma, kTranslationSigma,
-               1.0 + random.Gaussian(options.scale_sigma),
-               random.GaussianVector(options.gyro_bias_sigma_rad_s),
-               random.GaussianVector(options.persistent_translation_ratio *
-                                     kTranslationSigma))
-              .Motion(from, to)
-              .cam2_from_cam1;
+          draw(1.0, std::min(from, to)).Motion(from, to).cam2_from_cam1;
       Eigen::Matrix<double, 6, 1> error;
       error << LogSo3(drawn.rotation *
                       expected.cam2_from_cam1.rotation.conjugate()),
@@ -123,6 +134,9 @@ TEST(OdometryChain, ScaleDriftAgreesWithMonteCarlo) {
   OdometryChainOptions options;
   options.scale_sigma = 0.0;
   options.gyro_bias_sigma_rad_s = 0.0;
+  options.gyro_bias_walk_rad_s_sqrt_s = 0.0;
+  options.extrinsic_rotation_sigma_rad = 0.0;
+  options.driving_direction_sigma_rad = 0.0;
   options.scale_drift_ratio = 0.01;
   Random random(7);
   const auto draw = [&](double drift_ratio) {

@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "global/loop_closures/filter_unverified_joins.h"
-
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -10,6 +8,7 @@
 
 #include "core/random.h"
 #include "core/so3.h"
+#include "global/loop_closures/filter_loop_closures.h"
 #include "tests/testing/global/test_scene.h"
 
 namespace adasfm {
@@ -104,9 +103,29 @@ void AddTruePlace(int begin, int end, Drives* drives) {
   AddPlace(begin, end, 0, 0, drives);
 }
 
-JoinFilterReport Filter(Drives* drives, const JoinFilterOptions& options = {}) {
-  return FilterUnverifiedJoins(options, drives->priors, drives->lengths,
-                               &drives->graph);
+// The chain of the sensors, and of the second drive's neighbours.
+LoopClosureReport Filter(Drives* drives,
+                         const LoopClosureOptions& options = {}) {
+  std::vector<RelativePosePrior> steps = drives->priors;
+  for (size_t e = 0; e < drives->graph.edges.size(); ++e) {
+    const ViewGraphEdge& edge = drives->graph.edges[e];
+    if (edge.image_id1 <= kSecond || edge.image_id2 != edge.image_id1 + 1) {
+      continue;
+    }
+    RelativePosePrior step;
+    step.image_id1 = edge.image_id1;
+    step.image_id2 = edge.image_id2;
+    step.cam2_from_cam1 = edge.cam2_from_cam1;
+    step.cam2_from_cam1.translation *= drives->lengths[e]->length;
+    step.covariance = 1e-5 * Eigen::Matrix<double, 6, 6>::Identity();
+    step.flags = kPriorRotation | kPriorDirection | kPriorLength;
+    steps.push_back(step);
+  }
+  DriveOdometry odometry;
+  odometry.chain = OdometryChain(steps, OdometryChainOptions());
+  odometry.lengths = drives->lengths;
+  odometry.priors = drives->priors;
+  return FilterLoopClosures(options, odometry, &drives->graph);
 }
 
 int CountKeptJoins(const ViewGraph& graph) {
@@ -121,64 +140,64 @@ int CountKeptJoins(const ViewGraph& graph) {
   return num_kept;
 }
 
-TEST(FilterUnverifiedJoins, OnePlaceJoinsNothing) {
+TEST(FilterLoopClosures, OnePlaceJoinsNothing) {
   Drives drives = BuildDrives();
   AddTruePlace(3, 18, &drives);
-  const JoinFilterReport report = Filter(&drives);
+  const LoopClosureReport report = Filter(&drives);
   EXPECT_EQ(report.num_parts, 2);
-  EXPECT_EQ(report.num_confirmed, 0);
-  EXPECT_EQ(report.num_removed_pairs, 30);
-  ASSERT_EQ(report.split.size(), 1);
-  EXPECT_EQ(report.split[0].num_pairs, 30);
-  EXPECT_EQ(report.split[0].num_images, kNumImages);
-  EXPECT_LE(report.split[0].image_id1, kSecond);
-  EXPECT_GT(report.split[0].image_id2, kSecond);
+  EXPECT_EQ(report.num_confirmed_joins, 0);
+  EXPECT_EQ(report.num_pairs_of_unverified_joins, 30);
+  ASSERT_EQ(report.unverified_joins.size(), 1);
+  EXPECT_EQ(report.unverified_joins[0].num_pairs, 30);
+  EXPECT_EQ(report.unverified_joins[0].num_images, kNumImages);
+  EXPECT_LE(report.unverified_joins[0].image_id1, kSecond);
+  EXPECT_GT(report.unverified_joins[0].image_id2, kSecond);
   EXPECT_EQ(CountKeptJoins(drives.graph), 0);
   EXPECT_EQ(FindConnectedComponents(drives.graph).size(), 2);
 }
 
-TEST(FilterUnverifiedJoins, ASecondPlaceBehindATurnConfirms) {
+TEST(FilterLoopClosures, ASecondPlaceBehindATurnConfirms) {
   // The unit of the part without sensors is free within a factor of two.
   for (const double scale : {1.0, 0.7, 1.5}) {
     Drives drives = BuildDrives(scale);
     AddTruePlace(3, 10, &drives);
     AddTruePlace(45, 52, &drives);
-    const JoinFilterReport report = Filter(&drives);
-    EXPECT_EQ(report.num_confirmed, 1) << scale;
-    EXPECT_TRUE(report.split.empty());
+    const LoopClosureReport report = Filter(&drives);
+    EXPECT_EQ(report.num_confirmed_joins, 1) << scale;
+    EXPECT_TRUE(report.unverified_joins.empty());
     EXPECT_EQ(CountKeptJoins(drives.graph), 28) << scale;
   }
   // In one street both may look alike; farther apart they would count.
   Drives drives = BuildDrives();
   AddTruePlace(0, 3, &drives);
   AddTruePlace(15, 18, &drives);
-  JoinFilterOptions options;
+  LoopClosureOptions options;
   options.max_place_images = 12;
   Drives same = drives;
-  EXPECT_EQ(Filter(&same).num_confirmed, 0);
-  EXPECT_EQ(Filter(&drives, options).num_confirmed, 1);
+  EXPECT_EQ(Filter(&same).num_confirmed_joins, 0);
+  EXPECT_EQ(Filter(&drives, options).num_confirmed_joins, 1);
 }
 
-TEST(FilterUnverifiedJoins, LongRunsAroundCornersConfirmThemselves) {
+TEST(FilterLoopClosures, LongRunsAroundCornersConfirmThemselves) {
   Drives drives = BuildDrives();
   AddTruePlace(5, 50, &drives);
-  EXPECT_EQ(Filter(&drives).num_confirmed, 1);
+  EXPECT_EQ(Filter(&drives).num_confirmed_joins, 1);
   EXPECT_EQ(CountKeptJoins(drives.graph), 90);
 }
 
 // Places that look alike agree neither with true ones nor with each other.
-TEST(FilterUnverifiedJoins, FalsePlacesGo) {
+TEST(FilterLoopClosures, FalsePlacesGo) {
   // The second image stands a street further than the pair says.
   Drives drives = BuildDrives();
   AddPlace(4, 12, 22, 2, &drives);
   AddPlace(64, 72, -21, -1, &drives);
   Drives with_truth = drives;
-  EXPECT_EQ(Filter(&drives).num_confirmed, 0);
+  EXPECT_EQ(Filter(&drives).num_confirmed_joins, 0);
   EXPECT_EQ(CountKeptJoins(drives.graph), 0);
 
   AddTruePlace(3, 10, &with_truth);
   AddTruePlace(45, 52, &with_truth);
-  EXPECT_EQ(Filter(&with_truth).num_confirmed, 1);
+  EXPECT_EQ(Filter(&with_truth).num_confirmed_joins, 1);
   for (const ViewGraphEdge& edge : with_truth.graph.edges) {
     if (edge.image_id1 > kSecond || edge.image_id2 <= kSecond) continue;
     const int shift = edge.image_id2 - kSecond - edge.image_id1;
@@ -187,7 +206,7 @@ TEST(FilterUnverifiedJoins, FalsePlacesGo) {
   }
 }
 
-TEST(FilterUnverifiedJoins, SmallPartsFollowOneOther) {
+TEST(FilterLoopClosures, SmallPartsFollowOneOther) {
   Drives drives = BuildDrives();
   // One image that sees a little of one drive and more of the other.
   drives.graph.images.push_back(300);
@@ -202,7 +221,7 @@ TEST(FilterUnverifiedJoins, SmallPartsFollowOneOther) {
   EXPECT_EQ(FindConnectedComponents(drives.graph).size(), 2);
 }
 
-TEST(FilterUnverifiedJoins, SensorsAndNeighboursMakeOnePart) {
+TEST(FilterLoopClosures, SensorsAndNeighboursMakeOnePart) {
   Drives drives = BuildDrives();
   AddTruePlace(3, 10, &drives);
   // A prior over the gap.
@@ -210,6 +229,8 @@ TEST(FilterUnverifiedJoins, SensorsAndNeighboursMakeOnePart) {
   joined.priors.push_back(joined.priors.front());
   joined.priors.back().image_id1 = kNumImages;
   joined.priors.back().image_id2 = kSecond + 1;
+  joined.priors.back().cam2_from_cam1 =
+      ComputeCam2FromCam1(PoseOf(kNumImages), PoseOf(kSecond + 1));
   EXPECT_EQ(Filter(&joined).num_parts, 1);
   EXPECT_EQ(CountKeptJoins(joined.graph), 14);
   // A rotation alone leaves the places open.
@@ -218,7 +239,7 @@ TEST(FilterUnverifiedJoins, SensorsAndNeighboursMakeOnePart) {
   turned.priors.back().flags = kPriorRotation;
   EXPECT_EQ(Filter(&turned).num_parts, 2);
   // Ids that follow each other.
-  JoinFilterOptions options;
+  LoopClosureOptions options;
   options.max_sequence_gap = 30;
   AddPair(kNumImages, kSecond + 1,
           ComputeCam2FromCam1(PoseOf(kNumImages), PoseOf(kSecond + 1)),
@@ -227,46 +248,61 @@ TEST(FilterUnverifiedJoins, SensorsAndNeighboursMakeOnePart) {
 }
 
 // Every field decides something.
-TEST(FilterUnverifiedJoins, OptionsDecide) {
-  Drives places = BuildDrives(1.0);
-  AddTruePlace(3, 10, &places);
-  // The second place is off by two metres in 42, and by two degrees.
-  for (int k = 45; k < 52; ++k) {
-    Rigid3d second = PoseAt(k, true);
-    second.translation.x() += 2.0;
-    second.rotation = ExpSo3(Eigen::Vector3d(0, 0, 0.035)) * second.rotation;
-    AddPair(k + 1, kSecond + k + 1,
-            ComputeCam2FromCam1(PoseAt(k, false), second), &places);
-  }
-  const auto confirms =
-      [&places](std::function<void(JoinFilterOptions*)> change) {
-        Drives copy = places;
-        JoinFilterOptions options;
-        change(&options);
-        return Filter(&copy, options).num_confirmed == 1;
-      };
-  EXPECT_TRUE(confirms([](JoinFilterOptions*) {}));
-  EXPECT_FALSE(confirms([](auto* o) { o->max_position_error_ratio = 0.01; }));
-  EXPECT_FALSE(confirms([](auto* o) { o->max_rotation_error_deg = 1.0; }));
-  EXPECT_FALSE(confirms([](auto* o) { o->min_turn_deg = 181.0; }));
-  EXPECT_FALSE(confirms([](auto* o) { o->min_num_pairs = 9; }));
-  // Too small to be judged.
-  EXPECT_TRUE(confirms([](auto* o) {
-    o->min_turn_deg = 181.0;
-    o->min_num_images = kNumImages + 1;
-  }));
-  for (int i = 0; i < 7; ++i) {
-    JoinFilterOptions options;
+TEST(FilterLoopClosures, JoinOptionsDecide) {
+  // The second place is turned by 8 degrees.
+  const auto build = [](double angle_rad, double scale) {
+    Drives places = BuildDrives(scale);
+    AddTruePlace(3, 10, &places);
+    for (int k = 45; k < 52; ++k) {
+      Rigid3d second = PoseAt(k, true);
+      second.rotation =
+          ExpSo3(Eigen::Vector3d(0, 0, angle_rad)) * second.rotation;
+      AddPair(k + 1, kSecond + k + 1,
+              ComputeCam2FromCam1(PoseAt(k, false), second), &places);
+    }
+    return places;
+  };
+  const auto confirms = [](const Drives& drives,
+                           std::function<void(LoopClosureOptions*)> change) {
+    Drives copy = drives;
+    LoopClosureOptions options;
+    change(&options);
+    return Filter(&copy, options).num_confirmed_joins == 1;
+  };
+  const auto as_it_is = [](LoopClosureOptions*) {};
+  const Drives turned = build(0.14, 1.0);
+  EXPECT_FALSE(confirms(turned, as_it_is));
+  EXPECT_TRUE(confirms(turned, [](auto* o) { o->significance = 1e-30; }));
+  EXPECT_TRUE(confirms(turned, [](auto* o) { o->pair_angle_sigma_deg = 4; }));
+  const Drives scaled = build(0.0, 1.7);
+  EXPECT_TRUE(confirms(scaled, as_it_is));
+  EXPECT_FALSE(confirms(scaled, [](auto* o) { o->unit_log_sigma = 0.01; }));
+  const Drives places = build(0.0, 1.0);
+  EXPECT_TRUE(confirms(places, as_it_is));
+  EXPECT_FALSE(confirms(places, [](auto* o) { o->min_turn_deg = 181.0; }));
+  EXPECT_FALSE(confirms(places, [](auto* o) { o->min_num_pairs = 9; }));
+  Drives joined = places;
+  LoopClosureOptions keep;
+  keep.min_turn_deg = 181.0;
+  keep.split_unverified_joins = false;
+  const LoopClosureReport report = Filter(&joined, keep);
+  EXPECT_EQ(report.num_pairs_of_unverified_joins, 0);
+  ASSERT_EQ(report.unverified_joins.size(), 1);
+  EXPECT_EQ(report.unverified_joins[0].num_pairs, 21);
+  EXPECT_EQ(CountKeptJoins(joined.graph), 21);
+  for (int i = 0; i < 8; ++i) {
+    LoopClosureOptions options;
     std::string error;
     if (i == 0) options.max_sequence_gap = 0;
-    if (i == 1) options.min_num_images = 0;
+    if (i == 1) options.significance = 1.0;
     if (i == 2) options.min_turn_deg = 0.0;
     if (i == 3) options.max_place_images = 0;
     if (i == 4) options.min_num_pairs = 0;
-    if (i == 5) options.max_rotation_error_deg = std::nan("");
-    if (i == 6) options.max_position_error_ratio = -1.0;
+    if (i == 5) options.pair_angle_sigma_deg = std::nan("");
+    if (i == 6) options.pair_length_log_sigma = -1.0;
+    if (i == 7) options.unit_log_sigma = -1.0;
     EXPECT_FALSE(options.IsValid(&error)) << i;
-    EXPECT_THROW(Filter(&places, options), std::invalid_argument) << i;
+    EXPECT_THROW(Filter(&joined, options), std::invalid_argument) << i;
   }
 }
 

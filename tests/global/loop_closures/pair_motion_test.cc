@@ -1,0 +1,206 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "global/loop_closures/pair_motion.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <functional>
+#include <vector>
+
+#include "core/so3.h"
+#include "global/odometry/odometry_chain.h"
+#include "tests/testing/global/test_scene.h"
+
+namespace adasfm {
+namespace {
+
+TEST(ChiSquare, ProbabilityOfTables) {
+  EXPECT_NEAR((ChiSquare{7.815, 3}.Probability()), 0.05, 1e-4);
+  EXPECT_NEAR((ChiSquare{11.070, 5}.Probability()), 0.05, 1e-4);
+  EXPECT_NEAR((ChiSquare{12.592, 6}.Probability()), 0.05, 1e-4);
+  EXPECT_NEAR((ChiSquare{34.0, 6}.Probability()), 6.7e-6, 1e-6);
+  EXPECT_NEAR((ChiSquare{0.0, 5}.Probability()), 1.0, 1e-9);
+  EXPECT_EQ((ChiSquare{50.0, 0}.Probability()), 1.0);
+}
+
+// A drive round a block: 1 m and 0.1 s a step.
+Rigid3d TrueStep(int k) {
+  const double turn = k % 40 < 8 ? kPi / 16 : 0.0;
+  return Rigid3d(ExpSo3(Eigen::Vector3d(0.0, turn, 0.0)),
+                 Eigen::Vector3d(0.0, 0.0, -1.0));
+}
+
+constexpr int kNumSteps = 150;
+
+// The logs of that drive with all shared errors drawn from the options.
+std::vector<RelativePosePrior> DrawLogs(const OdometryChainOptions& options,
+                                        Random* random) {
+  constexpr double kStepSeconds = 0.1;
+  const double scale = 1.0 + random->Gaussian(options.scale_sigma);
+  Eigen::Vector3d bias = random->GaussianVector(options.gyro_bias_sigma_rad_s);
+  const Eigen::Quaterniond extrinsic =
+      ExpSo3(random->GaussianVector(options.extrinsic_rotation_sigma_rad));
+  const Eigen::Quaterniond driving =
+      ExpSo3(random->GaussianVector(options.driving_direction_sigma_rad));
+  std::vector<RelativePosePrior> priors;
+  for (int k = 1; k <= kNumSteps; ++k) {
+    Rigid3d step = TrueStep(k);
+    step.rotation = ExpSo3(kStepSeconds * bias) * extrinsic * step.rotation *
+                    extrinsic.conjugate();
+    step.translation = scale * (driving * step.translation);
+    priors.push_back(BuildPrior(k, k + 1, step, 3e-4, 0.005, random));
+    bias += random->GaussianVector(options.gyro_bias_walk_rad_s_sqrt_s *
+                                   std::sqrt(kStepSeconds));
+  }
+  return priors;
+}
+
+// What two images see of each other, with an edge's own noise.
+ViewGraphEdge DrawPair(int i, int j, const LoopClosureOptions& options,
+                       double* length, Random* random) {
+  Rigid3d motion;
+  for (int k = i; k < j; ++k) motion = TrueStep(k) * motion;
+  const double angle = DegToRad(options.pair_angle_sigma_deg);
+  *length = motion.translation.norm();
+  const Eigen::Vector3d direction = motion.translation / *length;
+  motion.rotation = ExpSo3(random->GaussianVector(angle)) * motion.rotation;
+  motion.translation =
+      (direction + random->GaussianVector(angle).cross(direction)).normalized();
+  *length *= 1.0 + random->Gaussian(options.pair_length_log_sigma);
+  ViewGraphEdge edge = BuildEdge(ImagePair(i, j), motion);
+  edge.rotation_sigma_rad = 0.0;
+  edge.direction_sigma_rad = 0.0;
+  return edge;
+}
+
+OdometryChainOptions ErrorsOfEqualWeight() {
+  OdometryChainOptions options;
+  options.scale_sigma = 0.01;
+  options.gyro_bias_sigma_rad_s = 1e-3;
+  options.gyro_bias_walk_rad_s_sqrt_s = 5e-4;
+  options.extrinsic_rotation_sigma_rad = 0.01;
+  options.driving_direction_sigma_rad = 0.01;
+  options.persistent_translation_ratio = 0.0;
+  return options;
+}
+
+// The share of true pairs below the probability, one pair a drive.
+double RefusedShare(double probability, bool has_length,
+                    const OdometryChainOptions& drawn,
+                    const OdometryChainOptions& believed, uint64_t seed) {
+  constexpr int kNumDrives = 400;
+  Random random(seed);
+  const LoopClosureOptions options;
+  int num_refused = 0;
+  for (int k = 0; k < kNumDrives; ++k) {
+    const OdometryChain chain(DrawLogs(drawn, &random), believed);
+    double length = 0.0;
+    const ViewGraphEdge edge = DrawPair(5, 125, options, &length, &random);
+    const PairMotion pair = MeasurePair(
+        options, edge,
+        has_length ? std::optional<EdgeLength>(EdgeLength{length, 0.0})
+                   : std::nullopt,
+        0.0);
+    num_refused +=
+        TestByOdometry(chain, edge, pair).Probability() < probability;
+  }
+  return static_cast<double>(num_refused) / kNumDrives;
+}
+
+// True pairs are refused at the stated level. The standard error of a share of
+// 0.05 of 400 is 0.011, of 0.2 it is 0.02: four of them.
+TEST(TestByOdometry, RefusesTruePairsAtTheStatedLevel) {
+  const OdometryChainOptions errors = ErrorsOfEqualWeight();
+  for (uint64_t seed = 1; seed <= 4; ++seed) {
+    for (const bool has_length : {true, false}) {
+      const double at_5 = RefusedShare(0.05, has_length, errors, errors, seed);
+      EXPECT_GT(at_5, 0.05 - 0.04) << seed << has_length;
+      EXPECT_LT(at_5, 0.05 + 0.04) << seed << has_length;
+      const double at_20 = RefusedShare(0.2, has_length, errors, errors, seed);
+      EXPECT_GT(at_20, 0.2 - 0.08) << seed << has_length;
+      EXPECT_LT(at_20, 0.2 + 0.08) << seed << has_length;
+    }
+  }
+}
+
+// Each shared error counts: without it far more true pairs are refused.
+TEST(TestByOdometry, EachSharedErrorIsInTheCovariance) {
+  using Change = std::function<void(OdometryChainOptions*)>;
+  const std::vector<Change> leave_out = {
+      [](auto* o) { o->scale_sigma = 0.0; },
+      [](auto* o) { o->gyro_bias_sigma_rad_s = 0.0; },
+      [](auto* o) { o->gyro_bias_walk_rad_s_sqrt_s = 0.0; },
+      [](auto* o) { o->extrinsic_rotation_sigma_rad = 0.0; },
+      [](auto* o) { o->driving_direction_sigma_rad = 0.0; }};
+  for (size_t k = 0; k < leave_out.size(); ++k) {
+    OdometryChainOptions drawn = ErrorsOfEqualWeight();
+    // This one alone, and larger than what a pair's own noise covers.
+    for (size_t other = 0; other < leave_out.size(); ++other) {
+      if (other != k) leave_out[other](&drawn);
+    }
+    drawn.scale_sigma *= 8.0;
+    drawn.gyro_bias_sigma_rad_s *= 8.0;
+    drawn.gyro_bias_walk_rad_s_sqrt_s *= 8.0;
+    drawn.extrinsic_rotation_sigma_rad *= 2.0;  // it has second-order terms
+    drawn.driving_direction_sigma_rad *= 8.0;
+    OdometryChainOptions without = drawn;
+    leave_out[k](&without);
+    EXPECT_LT(RefusedShare(0.01, true, drawn, drawn, 1), 0.04) << k;
+    EXPECT_GT(RefusedShare(0.01, true, drawn, without, 1), 0.15) << k;
+  }
+}
+
+// Without a length a pair that leads elsewhere is refused by its direction, one
+// that leads there is not, however far.
+TEST(TestPair, UnknownLengthTestsTheDirection) {
+  UncertainMotion predicted;
+  predicted.cam2_from_cam1.translation = Eigen::Vector3d(0.0, 0.0, 30.0);
+  predicted.covariance.diagonal().setConstant(1e-4);
+  const auto test = [&predicted](const Eigen::Vector3d& direction) {
+    ViewGraphEdge edge = BuildEdge(
+        ImagePair(1, 2), Rigid3d(Eigen::Quaterniond::Identity(), direction));
+    edge.direction_sigma_rad = 0.005;
+    return TestPair(MeasurePair(LoopClosureOptions(), edge, std::nullopt, 1.0),
+                    predicted, true);
+  };
+  EXPECT_EQ(test(Eigen::Vector3d::UnitZ()).dof, 5);
+  EXPECT_GT(test(Eigen::Vector3d::UnitZ()).Probability(), 0.9);
+  EXPECT_LT(test(Eigen::Vector3d(0.1, 0.0, 1.0).normalized()).Probability(),
+            1e-9);
+  EXPECT_LT(test(-Eigen::Vector3d::UnitZ()).Probability(), 1e-9);
+}
+
+TEST(MeasurePair, GrantsTheLeastErrors) {
+  ViewGraphEdge edge = BuildEdge(
+      ImagePair(1, 2),
+      Rigid3d(Eigen::Quaterniond::Identity(), Eigen::Vector3d::UnitZ()));
+  edge.rotation_sigma_rad = 0.0;
+  edge.direction_sigma_rad = 0.0;
+  LoopClosureOptions options;
+  options.pair_angle_sigma_deg = RadToDeg(0.02);
+  options.pair_length_log_sigma = 0.05;
+  const PairMotion pair =
+      MeasurePair(options, edge, EdgeLength{10.0, 0.12}, 0.0);
+  const Eigen::Matrix<double, 6, 1> sigmas =
+      pair.motion.covariance.diagonal().cwiseSqrt();
+  EXPECT_NEAR(sigmas(0), 0.02, 1e-9);
+  EXPECT_NEAR(sigmas(3), 0.2, 1e-9);
+  EXPECT_NEAR(sigmas(5), 1.3, 1e-9);
+}
+
+// Centres that are one contradict a drive of metres.
+TEST(TestPair, NoBaselineMeansOnePlace) {
+  ViewGraphEdge edge = BuildEdge(ImagePair(1, 2), Rigid3d());
+  edge.has_baseline = false;
+  const PairMotion pair =
+      MeasurePair(LoopClosureOptions(), edge, std::nullopt, 1.0);
+  UncertainMotion predicted;
+  predicted.covariance.diagonal().setConstant(1e-4);
+  EXPECT_GT(TestPair(pair, predicted, true).Probability(), 0.5);
+  predicted.cam2_from_cam1.translation.x() = 2.0;
+  EXPECT_LT(TestPair(pair, predicted, true).Probability(), 1e-9);
+  EXPECT_GT(TestPair(pair, predicted, false).Probability(), 0.5);
+}
+
+}  // namespace
+}  // namespace adasfm
