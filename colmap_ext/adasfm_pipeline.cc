@@ -313,8 +313,11 @@ Status RunMapperSteps(const MapRequest& request, const SceneData& scene,
                       const DatabaseFrames& frames, MapperStage* stage,
                       MapReport* report) {
   switch (request.steps) {
-    case MapperSteps::kPlan:
-      return stage->Plan();
+    case MapperSteps::kPlan: {
+      const Status planned = stage->Plan();
+      if (planned.ok()) stage->FindNumParallelParts();
+      return planned;
+    }
     case MapperSteps::kPart:
       return stage->RunPart(request.part_index);
     case MapperSteps::kMerge:

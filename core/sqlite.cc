@@ -137,6 +137,20 @@ void SqliteStatement::BindBlob(int parameter, const void* data,
                                    SQLITE_TRANSIENT));
 }
 
+void SqliteStatement::BindValue(int parameter, const SqliteValue& value) {
+  if (const auto* integer = std::get_if<int64_t>(&value)) {
+    BindInt(parameter, *integer);
+  } else if (const auto* real = std::get_if<double>(&value)) {
+    CheckBinding(sqlite3_bind_double(handle_, parameter, *real));
+  } else if (const auto* text = std::get_if<std::string>(&value)) {
+    BindText(parameter, *text);
+  } else if (const auto* blob = std::get_if<std::vector<char>>(&value)) {
+    BindBlob(parameter, blob->data(), blob->size());
+  } else {
+    CheckBinding(sqlite3_bind_null(handle_, parameter));
+  }
+}
+
 bool SqliteStatement::IsNull(int column) const {
   return sqlite3_column_type(handle_, column) == SQLITE_NULL;
 }
@@ -162,6 +176,23 @@ const void* SqliteStatement::Blob(int column) const {
 
 size_t SqliteStatement::NumBytes(int column) const {
   return sqlite3_column_bytes(handle_, column);
+}
+
+SqliteValue SqliteStatement::Value(int column) const {
+  switch (sqlite3_column_type(handle_, column)) {
+    case SQLITE_INTEGER:
+      return Int(column);
+    case SQLITE_FLOAT:
+      return Double(column);
+    case SQLITE_TEXT:
+      return Text(column);
+    case SQLITE_BLOB: {
+      const char* data = static_cast<const char*>(Blob(column));
+      return std::vector<char>(data, data + NumBytes(column));
+    }
+    default:
+      return std::monostate();
+  }
 }
 
 SqliteTransaction::SqliteTransaction(SqliteConnection* connection)

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <stdexcept>
 #include <string>
+#include <variant>
 #include <vector>
 
 struct sqlite3;
@@ -44,6 +45,10 @@ class SqliteConnection {
   sqlite3* handle_ = nullptr;
 };
 
+// A value of a row as it stands there: NULL, integer, real, text or blob.
+using SqliteValue = std::variant<std::monostate, int64_t, double, std::string,
+                                 std::vector<char>>;
+
 // A prepared statement; columns count from 0, parameters from 1.
 class SqliteStatement {
  public:
@@ -60,6 +65,7 @@ class SqliteStatement {
   void BindInt(int parameter, int64_t value);
   void BindText(int parameter, const std::string& value);
   void BindBlob(int parameter, const void* data, size_t num_bytes);
+  void BindValue(int parameter, const SqliteValue& value);
 
   bool IsNull(int column) const;
   int64_t Int(int column) const;
@@ -68,6 +74,7 @@ class SqliteStatement {
   // Valid until the next step.
   const void* Blob(int column) const;
   size_t NumBytes(int column) const;
+  SqliteValue Value(int column) const;
 
  private:
   void CheckBinding(int code) const;

@@ -7,8 +7,9 @@
 #   scripts/setup.sh [--host-only] [--for-tests] [--configure-only] [CMake arguments...]
 #
 # --host-only stops after the host, --for-tests also installs the browser that
-# the report's test and the screenshots need, and what the packages and the
-# documentation are checked with; --configure-only leaves the project unbuilt.
+# the report's test and the screenshots need, a Slurm for the cluster's test,
+# and what the packages and the documentation are checked with;
+# --configure-only leaves the project unbuilt.
 # Environment: ADASFM_CACHE (default: the user's cache folder) holds the host;
 # ADASFM_BUILD_DIR (default: build/); ADASFM_BUILD_TYPE (default: Release).
 # With -DCOLMAP_DIR=PREFIX/share/colmap that COLMAP is used instead.
@@ -39,7 +40,8 @@ packages=(
   # For the scripts that draw tables and compare models.
   python3 python3-numpy python3-matplotlib sqlite3)
 test_packages=(chromium chromium-driver python3-selenium file lintian
-  python3-h5py clang libclang-rt-14-dev linux-perf)
+  python3-h5py clang libclang-rt-14-dev linux-perf
+  slurmctld slurmd slurm-client munge)
 
 say() { printf '\n== %s\n' "$*"; }
 die() { printf 'setup: %s\n' "$*" >&2; exit 1; }

@@ -10,6 +10,7 @@ namespace adasfm {
 
 // The commands, each in commands/<its name>.cc.
 Status RunAdasfmAutomaticReconstructor(int argc, char** argv);
+Status RunAdasfmDatabaseMerger(int argc, char** argv);
 Status RunAdasfmEvaluator(int argc, char** argv);
 Status RunAdasfmGlobal(int argc, char** argv);
 Status RunAdasfmMapper(int argc, char** argv);

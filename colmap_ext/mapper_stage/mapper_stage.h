@@ -92,6 +92,9 @@ class MapperStage {
   // Reconstructs one part of the plan. A part that throws is tried once more
   // with stricter settings; its report then says why.
   Status RunPart(int part_index);
+  // How many parts of the plan may run at the same time, as threads and memory
+  // allow; reports it with the memory that the largest part may need.
+  int FindNumParallelParts();
   // All parts of the plan, the biggest first.
   Status RunAllParts();
   // Merges the parts that are there and refines the model. With
@@ -106,7 +109,6 @@ class MapperStage {
   Status RunPartWithThreads(int part_index, int num_threads);
   PartReport MapPart(int part_index, int num_threads,
                      LocalMapResult* result) const;
-  int FindNumParallelParts();
   void Report(const std::string& line, double share_done = 0.0) const;
 
   Status ReadPartReports(bool require_all_parts);

@@ -1,0 +1,56 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What tasks are expected to need. Measured (docs/guide/cluster.md) and rounded
+up; once the plan is there, its own estimate counts."""
+
+PAIRS_PER_IMAGE = 40
+MATCHES_PER_PAIR = 250
+IMAGES_PER_PART = 200
+
+# A core may be this much slower than the one that was measured on.
+SLOWNESS = 4.0
+MIN_MINUTES = 10.0
+
+
+def memory_mb(stage, settings, facts):
+    """Bytes of a keypoint, a raw match and an inlier, times 1.5 of what was
+    measured."""
+    images = facts['num_images']
+    keypoints = facts['num_keypoints'] / 1e6
+    raw, inliers = (facts[name] / 1e6 for name in
+                    ('num_raw_matches', 'num_inlier_matches'))
+    scene = 120 + 100 * keypoints + 35 * inliers
+    if stage.name == 'features':
+        # A photo of 3200 x 2400 pixels, twice as large for the detector.
+        return 500 + 2000 * settings.threads_per_task
+    if stage.name == 'matches':
+        return 500 + 0.5 * min(images, settings.pairs_per_block)
+    if stage.name == 'pairs':
+        return 500 + 0.1 * images
+    if stage.name in ('join_features', 'join_matches'):
+        return 300 + 0.01 * images
+    if stage.name == 'priors':
+        return 120 + 0.1 * images
+    if stage.name == 'global':
+        return 120 + 450 * keypoints + 80 * (raw + inliers)
+    if stage.name == 'merge':
+        return 120 + 800 * keypoints + 200 * inliers
+    if stage.name == 'parts' and 'part_memory_mb' in facts:
+        return 1.2 * facts['scene_memory_mb'] + facts['part_memory_mb']
+    return scene + (200 if stage.name == 'parts' else 0)
+
+
+# CPU seconds of an image (features: of 3200 x 2400 pixels) or a pair.
+IMAGE_SECONDS = {'features': 8.0, 'join_features': 0.02, 'pairs': 0.1,
+                 'join_matches': 0.05, 'priors': 0.01, 'global': 0.05,
+                 'plan': 0.01, 'parts': 0.2, 'merge': 0.1}
+PAIR_SECONDS = 0.25
+
+
+def minutes(stage, settings, facts, num_tasks):
+    """Of the longest task."""
+    if stage.name == 'matches':
+        seconds = PAIR_SECONDS * facts['num_pairs']
+    else:
+        seconds = IMAGE_SECONDS[stage.name] * facts['num_images']
+    return MIN_MINUTES + SLOWNESS * seconds / 60.0 / (
+        num_tasks if stage.is_wide else 1)
