@@ -68,6 +68,10 @@ void AddFeatureOptions(FeatureOptions* features, CommandOptions* command) {
   command->AddDefault("use_gpu", &features->use_gpu,
                       "SIFT on the GPU: 0, 1, or -1: when COLMAP was built "
                       "with CUDA and finds a device");
+  command->AddDefault("matcher", &features->matcher,
+                      "adasfm: compares all descriptors; host: COLMAP's "
+                      "matcher, as always on the GPU and with "
+                      "ADASFM_HOST_COLMAP");
 }
 
 void PrintResult(const AutomaticReconstructionResult& result) {

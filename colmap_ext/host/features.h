@@ -30,6 +30,10 @@ struct FeatureOptions {
   int max_num_features = 2048;
   // 1, 0, or -1: when the host was built with CUDA and a device is there.
   int use_gpu = -1;
+  // "adasfm": all descriptors are compared (match_sift_pairs.h), or "host":
+  // COLMAP's matcher, which also is what a GPU and the program of
+  // ADASFM_HOST_COLMAP match with.
+  std::string matcher = "adasfm";
   int num_threads = -1;
 
   bool IsValid(std::string* error) const;
@@ -46,6 +50,8 @@ struct ImageRegistration {
 
 // Whether SIFT runs on the GPU with these options.
 bool UsesGpu(const FeatureOptions& options);
+// An error when they demand a GPU that the host cannot use.
+Status CheckGpu(const FeatureOptions& options);
 
 // Creates the database when needed and writes cameras and images, the ids in
 // the order of `names` (relative to image_path). Reading the photos is most of
@@ -64,7 +70,8 @@ Status ExtractFeatures(const FeatureOptions& options,
                        const std::string& log_path,
                        const ProgressCallback& progress);
 
-// Matches the pairs and verifies them (two-view geometries).
+// Matches the pairs and verifies them (two-view geometries), by
+// options.matcher. An error for descriptors that this matcher cannot compare.
 Status MatchPairs(const FeatureOptions& options,
                   const std::vector<ImagePair>& pairs,
                   const std::string& database_path, const std::string& log_path,

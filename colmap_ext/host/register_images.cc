@@ -167,6 +167,8 @@ bool FeatureOptions::IsValid(std::string* error) const {
              " must be -1, 0 or 1";
   } else if (use_gpu < -1 || use_gpu > 1) {
     *error = "use_gpu = " + std::to_string(use_gpu) + " must be -1, 0 or 1";
+  } else if (matcher != "adasfm" && matcher != "host") {
+    *error = "matcher = " + matcher + " must be adasfm or host";
   } else if (max_image_size < 1) {
     *error = "max_image_size = " + std::to_string(max_image_size) +
              " must be positive";

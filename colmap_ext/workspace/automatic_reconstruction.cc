@@ -283,6 +283,7 @@ Status Reconstructor::Matching() {
       std::to_string(pairs.num_temporal_neighbors);
   inputs.value()["num_similar_images"] =
       std::to_string(pairs.num_similar_images);
+  inputs.value()["matcher"] = options_.features.matcher;
   const auto reset = [this] { return ResetMatches(database_path_); };
   const auto work = [&]() -> Status {
     const ProgressCallback progress = ProgressIn(kMatching, "matching");

@@ -35,7 +35,8 @@ global/translation_averaging   core global/view_graph global/odometry
 global                         core global/...
 
 colmap_ext/io                  core
-colmap_ext/host                core colmap_ext/io
+colmap_ext/matching            core
+colmap_ext/host                core colmap_ext/io colmap_ext/matching
 colmap_ext/database            core colmap_ext/io colmap_ext/host global/calibration
 colmap_ext/bundle_adjustment   core colmap_ext/host
 colmap_ext/scene               core colmap_ext/io colmap_ext/host colmap_ext/database global/view_graph
