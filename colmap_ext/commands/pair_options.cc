@@ -15,6 +15,12 @@ void AddPairOptions(PairSelectionOptions* options, CommandOptions* command) {
       "every image is matched with so many of the next ones in time");
   add("num_similar_images", &options->num_similar_images,
       "and with so many of the most similar ones beyond them");
+  add("use_odometry", &options->odometry.enabled,
+      "of the similar ones only those that the priors in the database do not "
+      "exclude: too far apart, or looking elsewhere");
+  add("max_distance_m", &options->odometry.max_distance_m,
+      "images further apart by the odometry, its uncertainty granted, are "
+      "excluded [m]");
   add("descriptors_path", &options->descriptors_path,
       "global descriptors from elsewhere, lines `image_name v1 v2 ... vn`; "
       "when "

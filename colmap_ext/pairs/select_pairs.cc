@@ -81,24 +81,29 @@ Status AddSimilarPairs(const PairSelectionOptions& options,
   selection->warnings.insert(selection->warnings.end(),
                              descriptors->warnings.begin(),
                              descriptors->warnings.end());
+  const StatusOr<OdometryGate> gate =
+      OdometryGate::Read(options.odometry, database_path);
+  if (!gate.ok()) return gate.status();
+  selection->has_odometry = gate->HasOdometry();
   // In a drive the next images are the most similar ones, and are chosen
   // already: a place seen before must not lose its room to them.
   const std::set<ImagePair> neighbors = *pairs;
-  const std::vector<std::vector<int>> nearest = FindNearestRows(
-      descriptors->vectors,
-      options.num_similar_images + 2 * options.num_temporal_neighbors,
-      options.descriptors.num_threads,
-      [&progress](const std::string& what, double share_done) {
-        if (progress) progress(what, 0.7 + 0.3 * share_done);
-      });
+  const std::vector<image_t>& ids = descriptors->image_ids;
+  const auto may_be_chosen = [&](int i, int k) {
+    return neighbors.count(ImagePair(ids[i], ids[k])) == 0 &&
+           gate->MayOverlap(ids[i], ids[k]);
+  };
+  const std::vector<std::vector<int>> nearest =
+      FindNearestRows(descriptors->vectors, options.num_similar_images,
+                      options.descriptors.num_threads, may_be_chosen,
+                      [&progress](const std::string& what, double share_done) {
+                        if (progress) progress(what, 0.7 + 0.3 * share_done);
+                      });
   for (size_t i = 0; i < nearest.size(); ++i) {
-    int num_chosen = 0;
     for (const int k : nearest[i]) {
-      const ImagePair pair(descriptors->image_ids[i],
-                           descriptors->image_ids[k]);
-      if (neighbors.count(pair) > 0) continue;
-      if (num_chosen++ == options.num_similar_images) break;
-      if (pairs->insert(pair).second) ++selection->num_similar;
+      if (pairs->insert(ImagePair(ids[i], ids[k])).second) {
+        ++selection->num_similar;
+      }
     }
   }
   return Status::Ok();
@@ -122,7 +127,7 @@ bool PairSelectionOptions::IsValid(std::string* error) const {
         "0; one of them must be positive";
     return false;
   }
-  return descriptors.IsValid(error);
+  return descriptors.IsValid(error) && odometry.IsValid(error);
 }
 
 StatusOr<std::vector<image_t>> OrderImages(const std::string& database_path,
