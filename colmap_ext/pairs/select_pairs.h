@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "colmap_ext/pairs/global_descriptors.h"
-#include "colmap_ext/pairs/odometry_gate.h"
+#include "colmap_ext/pairs/overlap_predictor.h"
 #include "core/progress.h"
 #include "core/status.h"
 #include "core/types.h"
@@ -15,10 +15,11 @@ namespace adasfm {
 struct PairSelectionOptions {
   // Every image is matched with so many of the next ones in time.
   int num_temporal_neighbors = 10;
-  // ... and with so many of the most similar ones beyond them (the paper's 30),
-  // among those that the odometry does not exclude.
+  // ... and with so many beyond them (the paper's 30): where the priors in the
+  // database predict what images share, those that share most of their views;
+  // where they cannot tell, the most similar ones.
   int num_similar_images = 30;
-  OdometryGateOptions odometry;
+  OverlapPredictionOptions odometry;
   // Times of the images (sensors/io/read_image_times.h); empty: those that
   // adasfm_prior_importer left in the database.
   std::string image_times_path;
@@ -34,10 +35,10 @@ struct PairSelection {
   std::vector<ImagePair> pairs;
   int num_images = 0;
   int num_temporal = 0;
+  // Beyond these, those that the odometry predicts.
+  int num_predicted = 0;
   // Those that only similarity found.
   int num_similar = 0;
-  // Whether priors told which ones of these are possible.
-  bool has_odometry = false;
   // Otherwise by name.
   bool ordered_by_time = false;
   std::vector<std::string> warnings;

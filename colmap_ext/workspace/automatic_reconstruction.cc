@@ -313,9 +313,9 @@ Status Reconstructor::Matching() {
     Warn(selection->warnings);
     message_("matching: " + std::to_string(selection->num_temporal) +
              " pairs of neighbours in time, " +
+             std::to_string(selection->num_predicted) + " by the odometry, " +
              std::to_string(selection->num_similar) +
-             " more of similar images" +
-             (selection->has_odometry ? " that the odometry allows" : ""));
+             " more of similar images");
     const Status matched =
         MatchPairs(options_.features, selection->pairs, database_path_,
                    InWorkspace("logs/matching.log"),
