@@ -275,7 +275,8 @@ Status Reconstructor::Features() {
       {"camera_params", features.camera_params},
       {"single_camera", std::to_string(features.single_camera)},
       {"max_image_size", std::to_string(features.max_image_size)},
-      {"max_num_features", std::to_string(features.max_num_features)}};
+      {"max_num_features", std::to_string(features.max_num_features)},
+      {"first_octave", std::to_string(features.first_octave)}};
   return RunStep("features", inputs,
                  {[this] { return ResetFeatures(paths_.workspace_path); },
                   [&] { return ExtractAll(*names); },
