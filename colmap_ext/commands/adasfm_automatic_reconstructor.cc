@@ -67,8 +67,7 @@ void AddFeatureOptions(FeatureOptions* features, CommandOptions* command) {
                       "features of a photo at most");
   command->AddDefault("first_octave", &features->first_octave,
                       "SIFT begins with the photo at twice its size (-1), or "
-                      "as it is (0), which is four times as fast; -2: 0 when "
-                      "all photos have 2 megapixels");
+                      "as it is (0): four times as fast, with fewer features");
   command->AddDefault("use_gpu", &features->use_gpu,
                       "SIFT on the GPU: 0, 1, or -1: when COLMAP was built "
                       "with CUDA and finds a device");

@@ -8,7 +8,6 @@
 #include <chrono>
 #include <cstdlib>
 #include <functional>
-#include <map>
 #include <thread>
 #include <utility>
 
@@ -25,8 +24,6 @@ namespace adasfm {
 namespace {
 
 constexpr std::chrono::milliseconds kPollInterval(100);
-// From here on photos need not be doubled.
-constexpr double kMinNumLargePixels = 2e6;
 
 // Images of the database that have no descriptors yet, and how many have.
 std::vector<std::string> ImagesWithoutFeatures(const std::string& path,
@@ -89,24 +86,6 @@ bool UsesGpu(const FeatureOptions& options) {
 #endif
 }
 
-int FirstOctave(const FeatureOptions& options,
-                const std::string& database_path) {
-  if (options.first_octave != FeatureOptions::kOctaveBySize) {
-    return options.first_octave;
-  }
-  SqliteConnection database(database_path, SqliteConnection::Mode::kRead);
-  const std::map<camera_t, colmap::Camera> cameras = ReadCameras(&database);
-  const bool all_large = std::all_of(
-      cameras.begin(), cameras.end(), [&options](const auto& entry) {
-        const double width = entry.second.Width();
-        const double height = entry.second.Height();
-        const double scale =
-            std::min(1.0, options.max_image_size / std::max(width, height));
-        return scale * width * scale * height >= kMinNumLargePixels;
-      });
-  return all_large ? 0 : -1;
-}
-
 Status CheckGpu(const FeatureOptions& options) {
   if (options.use_gpu != 1 || CanUseGpu()) return Status::Ok();
   return Status::Error(
@@ -134,11 +113,7 @@ Status ExtractFeatures(const FeatureOptions& options,
   colmap::SiftExtractionOptions sift;
   sift.max_image_size = options.max_image_size;
   sift.max_num_features = options.max_num_features;
-  try {
-    sift.first_octave = FirstOctave(options, database_path);
-  } catch (const SqliteError& error) {
-    return Status::Error(database_path + ": " + error.what());
-  }
+  sift.first_octave = options.first_octave;
   sift.num_threads = options.num_threads;
   sift.use_gpu = UsesGpu(options);
 

@@ -30,11 +30,8 @@ struct FeatureOptions {
   // with it; poses need few hundred (docs/results/matching.md).
   int max_num_features = 2048;
   // -1: SIFT begins with the photo at twice its size, as COLMAP does; 0: as it
-  // is, which takes a quarter of the time and finds a third of the features;
-  // kOctaveBySize: 0 where every photo has 2 megapixels, -1 otherwise. Photos
-  // as large have enough features without the small ones.
-  static constexpr int kOctaveBySize = -2;
-  int first_octave = kOctaveBySize;
+  // is, which takes a quarter of the time and finds fewer and larger features.
+  int first_octave = -1;
   // 1, 0, or -1: when the host was built with CUDA and a device is there.
   int use_gpu = -1;
   // "adasfm": all descriptors are compared (match_sift_pairs.h), or "host":
@@ -59,11 +56,6 @@ struct ImageRegistration {
 bool UsesGpu(const FeatureOptions& options);
 // An error when they demand a GPU that the host cannot use.
 Status CheckGpu(const FeatureOptions& options);
-
-// What SIFT begins with for the cameras of the database: 0 or -1. Throws
-// SqliteError.
-int FirstOctave(const FeatureOptions& options,
-                const std::string& database_path);
 
 // Creates the database when needed and writes cameras and images, the ids in
 // the order of `names` (relative to image_path). Reading the photos is most of

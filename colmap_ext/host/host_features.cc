@@ -128,12 +128,10 @@ Status ExtractFeaturesByHost(const FeatureOptions& options,
                              const ProgressCallback& progress) {
   std::vector<std::string> names;
   int num_images = 0;
-  int first_octave = -1;
   try {
     SqliteConnection database(database_path, SqliteConnection::Mode::kRead);
     names = ImagesWithoutFeatures(&database);
     num_images = Count(&database, "images");
-    first_octave = FirstOctave(options, database_path);
   } catch (const SqliteError& error) {
     return Status::Error(database_path + ": " + error.what());
   }
@@ -155,7 +153,7 @@ Status ExtractFeaturesByHost(const FeatureOptions& options,
        std::to_string(options.max_image_size),
        "--SiftExtraction.max_num_features",
        std::to_string(options.max_num_features),
-       "--SiftExtraction.first_octave", std::to_string(first_octave)});
+       "--SiftExtraction.first_octave", std::to_string(options.first_octave)});
   std::error_code none;
   const bool has_log = std::filesystem::exists(log_path, none);
   const std::streamoff begin =

@@ -175,9 +175,9 @@ bool FeatureOptions::IsValid(std::string* error) const {
   } else if (max_num_features < 1) {
     *error = "max_num_features = " + std::to_string(max_num_features) +
              " must be positive";
-  } else if (first_octave < kOctaveBySize || first_octave > 0) {
-    *error = "first_octave = " + std::to_string(first_octave) +
-             " must be -2, -1 or 0";
+  } else if (first_octave < -1 || first_octave > 0) {
+    *error =
+        "first_octave = " + std::to_string(first_octave) + " must be -1 or 0";
   } else {
     return true;
   }

@@ -61,31 +61,17 @@ TEST(Features, CameraParamsMustBeUsable) {
   EXPECT_TRUE(options.IsValid(&error)) << error;
 }
 
-TEST(Features, SmallPhotosAreDoubled) {
-  const TemporaryFolder folder;
-  const std::string path = folder.File("database.db");
-  SyntheticWorldOptions world;
-  world.num_images = 12;
-  ASSERT_TRUE(WriteSyntheticDatabase(BuildSyntheticWorld(world), path).ok());
-  const auto resize = [&path](int width, int height) {
-    SqliteConnection(path, SqliteConnection::Mode::kWrite)
-        .Execute("UPDATE cameras SET width = " + std::to_string(width) +
-                 ", height = " + std::to_string(height));
-  };
-  FeatureOptions options;
-  resize(1226, 370);
-  EXPECT_EQ(FirstOctave(options, path), -1);
-  resize(4000, 3000);
-  EXPECT_EQ(FirstOctave(options, path), 0);
-  // Those that the detector sees count.
-  options.max_image_size = 1000;
-  EXPECT_EQ(FirstOctave(options, path), -1);
-  options.first_octave = 0;
-  EXPECT_EQ(FirstOctave(options, path), 0);
-  options.first_octave = 1;
+TEST(Features, OptionsAreChecked) {
   std::string error;
+  FeatureOptions options;
+  EXPECT_TRUE(options.IsValid(&error)) << error;
+  options.first_octave = 1;
   EXPECT_FALSE(options.IsValid(&error));
   EXPECT_THAT(error, HasSubstr("first_octave"));
+  options = FeatureOptions();
+  options.matcher = "other";
+  EXPECT_FALSE(options.IsValid(&error));
+  EXPECT_THAT(error, HasSubstr("matcher"));
 }
 
 }  // namespace
