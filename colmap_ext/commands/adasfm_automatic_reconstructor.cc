@@ -65,9 +65,16 @@ void AddFeatureOptions(FeatureOptions* features, CommandOptions* command) {
                       "larger photos are scaled down for the detector [px]");
   command->AddDefault("max_num_features", &features->max_num_features,
                       "features of a photo at most");
+  command->AddDefault("first_octave", &features->first_octave,
+                      "SIFT begins with the photo at twice its size (-1), or "
+                      "as it is (0): four times as fast, with fewer features");
   command->AddDefault("use_gpu", &features->use_gpu,
                       "SIFT on the GPU: 0, 1, or -1: when COLMAP was built "
                       "with CUDA and finds a device");
+  command->AddDefault("matcher", &features->matcher,
+                      "adasfm: compares all descriptors; host: COLMAP's "
+                      "matcher, as always on the GPU and with "
+                      "ADASFM_HOST_COLMAP");
 }
 
 void PrintResult(const AutomaticReconstructionResult& result) {

@@ -65,6 +65,7 @@ Status RunAdasfmPairGenerator(int argc, char** argv) {
   std::cout << selection->num_images << " images, in the order of their "
             << (selection->ordered_by_time ? "times" : "names") << ": "
             << selection->num_temporal << " pairs of neighbours, "
+            << selection->num_predicted << " by the odometry, "
             << selection->num_similar << " more of similar images\n"
             << "Pairs written to " << output_path << std::endl;
   return Status::Ok();

@@ -15,6 +15,13 @@ void AddPairOptions(PairSelectionOptions* options, CommandOptions* command) {
       "every image is matched with so many of the next ones in time");
   add("num_similar_images", &options->num_similar_images,
       "and with so many of the most similar ones beyond them");
+  add("use_odometry", &options->odometry.enabled,
+      "these are chosen by the overlap of views that the priors in the "
+      "database predict, and by similarity only where they cannot tell");
+  add("scene_depth_m", &options->odometry.scene_depth_m,
+      "how far away what the photos show typically is [m]");
+  add("min_overlap", &options->odometry.min_overlap,
+      "share of the views, below which predicted pairs are left out");
   add("descriptors_path", &options->descriptors_path,
       "global descriptors from elsewhere, lines `image_name v1 v2 ... vn`; "
       "when "

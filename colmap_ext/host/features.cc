@@ -3,7 +3,6 @@
 
 #include <base/database.h>
 #include <feature/extraction.h>
-#include <feature/matching.h>
 
 #include <algorithm>
 #include <chrono>
@@ -16,7 +15,6 @@
 #include "colmap_ext/host/database_schema.h"
 #include "colmap_ext/host/host_features.h"
 #include "colmap_ext/io/capture_output.h"
-#include "core/parallel.h"
 
 #ifdef ADASFM_HOST_HAS_CUDA
 #include <util/cuda.h>
@@ -25,11 +23,6 @@
 namespace adasfm {
 namespace {
 
-// Pairs that are matched in one transaction, for each thread: lost by a kill,
-// and the time that an interruption takes.
-constexpr size_t kNumPairsPerThread = 8;
-// Whose features are kept in memory; an image's pairs are next to each other.
-constexpr size_t kNumCachedImages = 200;
 constexpr std::chrono::milliseconds kPollInterval(100);
 
 // Images of the database that have no descriptors yet, and how many have.
@@ -82,11 +75,6 @@ bool CanUseGpu() {
 #endif
 }
 
-Status NoGpu() {
-  return Status::Error(
-      "there is no GPU that the host can use; use --use_gpu 0");
-}
-
 }  // namespace
 
 bool UsesGpu(const FeatureOptions& options) {
@@ -96,6 +84,12 @@ bool UsesGpu(const FeatureOptions& options) {
 #else
   return false;
 #endif
+}
+
+Status CheckGpu(const FeatureOptions& options) {
+  if (options.use_gpu != 1 || CanUseGpu()) return Status::Ok();
+  return Status::Error(
+      "there is no GPU that the host can use; use --use_gpu 0");
 }
 
 Status ExtractFeatures(const FeatureOptions& options,
@@ -119,11 +113,13 @@ Status ExtractFeatures(const FeatureOptions& options,
   colmap::SiftExtractionOptions sift;
   sift.max_image_size = options.max_image_size;
   sift.max_num_features = options.max_num_features;
+  sift.first_octave = options.first_octave;
   sift.num_threads = options.num_threads;
   sift.use_gpu = UsesGpu(options);
 
+  const Status gpu = CheckGpu(options);
+  if (!gpu.ok()) return gpu;
   // A line that the host prints for every photo.
-  if (options.use_gpu == 1 && !CanUseGpu()) return NoGpu();
   CaptureOutput capture(log_path, "Processed file");
   colmap::SiftFeatureExtractor extractor(reader, sift);
   extractor.Start();
@@ -133,47 +129,6 @@ Status ExtractFeatures(const FeatureOptions& options,
                  std::to_string(num_images),
              static_cast<double>(count) / num_images);
   });
-  return Status::Ok();
-}
-
-Status MatchPairs(const FeatureOptions& options,
-                  const std::vector<ImagePair>& pairs,
-                  const std::string& database_path, const std::string& log_path,
-                  const ProgressCallback& progress) {
-  if (UsesHostProgram()) {
-    return MatchPairsByHost(options, pairs, database_path, log_path, progress);
-  }
-  const Status opens = CheckLibraryOpens(database_path);
-  if (!opens.ok()) return opens;
-  colmap::SiftMatchingOptions sift;
-  sift.num_threads = options.num_threads;
-  sift.use_gpu = UsesGpu(options);
-  const size_t block_size =
-      kNumPairsPerThread * EffectiveNumThreads(options.num_threads);
-  if (options.use_gpu == 1 && !CanUseGpu()) return NoGpu();
-  const CaptureOutput capture(log_path, "");
-  colmap::Database database(database_path);
-  colmap::FeatureMatcherCache cache(kNumCachedImages, &database);
-  colmap::SiftFeatureMatcher matcher(sift, &database, &cache);
-  if (!matcher.Setup()) {
-    return Status::Error(
-        "the host cannot match features on the GPU; use --use_gpu 0");
-  }
-  cache.Setup();
-  for (size_t begin = 0; begin < pairs.size(); begin += block_size) {
-    const size_t end = std::min(pairs.size(), begin + block_size);
-    std::vector<std::pair<image_t, image_t>> block;
-    for (size_t i = begin; i < end; ++i) {
-      block.emplace_back(pairs[i].image_id1, pairs[i].image_id2);
-    }
-    {
-      colmap::DatabaseTransaction transaction(&database);
-      matcher.Match(block);
-    }
-    progress("matched " + std::to_string(end) + " of " +
-                 std::to_string(pairs.size()) + " pairs",
-             static_cast<double>(end) / pairs.size());
-  }
   return Status::Ok();
 }
 

@@ -26,10 +26,18 @@ struct FeatureOptions {
   int single_camera = -1;
   // Larger photos are scaled down for the detector.
   int max_image_size = 2000;
-  // Matching on the CPU takes most of the time, and grows with this.
+  // The largest ones. Matching grows with its square, the points of the model
+  // with it; poses need few hundred (docs/results/matching.md).
   int max_num_features = 2048;
+  // -1: SIFT begins with the photo at twice its size, as COLMAP does; 0: as it
+  // is, which takes a quarter of the time and finds fewer and larger features.
+  int first_octave = -1;
   // 1, 0, or -1: when the host was built with CUDA and a device is there.
   int use_gpu = -1;
+  // "adasfm": all descriptors are compared (match_sift_pairs.h), or "host":
+  // COLMAP's matcher, which also is what a GPU and the program of
+  // ADASFM_HOST_COLMAP match with.
+  std::string matcher = "adasfm";
   int num_threads = -1;
 
   bool IsValid(std::string* error) const;
@@ -46,6 +54,8 @@ struct ImageRegistration {
 
 // Whether SIFT runs on the GPU with these options.
 bool UsesGpu(const FeatureOptions& options);
+// An error when they demand a GPU that the host cannot use.
+Status CheckGpu(const FeatureOptions& options);
 
 // Creates the database when needed and writes cameras and images, the ids in
 // the order of `names` (relative to image_path). Reading the photos is most of
@@ -64,7 +74,8 @@ Status ExtractFeatures(const FeatureOptions& options,
                        const std::string& log_path,
                        const ProgressCallback& progress);
 
-// Matches the pairs and verifies them (two-view geometries).
+// Matches the pairs and verifies them (two-view geometries), by
+// options.matcher. An error for descriptors that this matcher cannot compare.
 Status MatchPairs(const FeatureOptions& options,
                   const std::vector<ImagePair>& pairs,
                   const std::string& database_path, const std::string& log_path,

@@ -152,7 +152,8 @@ Status ExtractFeaturesByHost(const FeatureOptions& options,
        group.substr(0, group.find('.')) + ".max_image_size",
        std::to_string(options.max_image_size),
        "--SiftExtraction.max_num_features",
-       std::to_string(options.max_num_features)});
+       std::to_string(options.max_num_features),
+       "--SiftExtraction.first_octave", std::to_string(options.first_octave)});
   std::error_code none;
   const bool has_log = std::filesystem::exists(log_path, none);
   const std::streamoff begin =

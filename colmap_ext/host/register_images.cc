@@ -167,12 +167,17 @@ bool FeatureOptions::IsValid(std::string* error) const {
              " must be -1, 0 or 1";
   } else if (use_gpu < -1 || use_gpu > 1) {
     *error = "use_gpu = " + std::to_string(use_gpu) + " must be -1, 0 or 1";
+  } else if (matcher != "adasfm" && matcher != "host") {
+    *error = "matcher = " + matcher + " must be adasfm or host";
   } else if (max_image_size < 1) {
     *error = "max_image_size = " + std::to_string(max_image_size) +
              " must be positive";
   } else if (max_num_features < 1) {
     *error = "max_num_features = " + std::to_string(max_num_features) +
              " must be positive";
+  } else if (first_octave < -1 || first_octave > 0) {
+    *error =
+        "first_octave = " + std::to_string(first_octave) + " must be -1 or 0";
   } else {
     return true;
   }

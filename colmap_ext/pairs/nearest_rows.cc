@@ -2,51 +2,50 @@
 #include "colmap_ext/pairs/nearest_rows.h"
 
 #include <algorithm>
-#include <flann/flann.hpp>
+#include <utility>
 
 #include "core/parallel.h"
 
 namespace adasfm {
 namespace {
 
-// Rows that are searched for at a time.
+// Rows that are searched for between two reports of progress.
 constexpr int kSearchBlockSize = 256;
+
+std::vector<int> FindNearest(
+    const RowMatrixXf& vectors, int row, int num_neighbors,
+    const std::function<bool(int, int)>& may_be_chosen) {
+  std::vector<std::pair<float, int>> others;
+  others.reserve(vectors.rows());
+  for (int other = 0; other < vectors.rows(); ++other) {
+    if (other == row) continue;
+    others.emplace_back((vectors.row(other) - vectors.row(row)).squaredNorm(),
+                        other);
+  }
+  std::sort(others.begin(), others.end());
+  std::vector<int> nearest;
+  for (const auto& [distance, other] : others) {
+    if (static_cast<int>(nearest.size()) >= num_neighbors) break;
+    if (!may_be_chosen || may_be_chosen(row, other)) nearest.push_back(other);
+  }
+  return nearest;
+}
 
 }  // namespace
 
 std::vector<std::vector<int>> FindNearestRows(
     const RowMatrixXf& vectors, int num_neighbors, int num_threads,
+    const std::function<bool(int, int)>& may_be_chosen,
     const ProgressCallback& progress) {
   const int num_rows = vectors.rows();
   std::vector<std::vector<int>> nearest(num_rows);
-  // One more than asked for: the row itself is among them.
-  const int num_found = std::min(num_neighbors + 1, num_rows);
-  if (num_neighbors < 1 || num_rows < 2 || vectors.cols() == 0) return nearest;
-  float* data = const_cast<float*>(vectors.data());
-  flann::Index<flann::L2<float>> index(
-      flann::Matrix<float>(data, num_rows, vectors.cols()),
-      flann::LinearIndexParams());
-  index.buildIndex();
-  flann::SearchParams search(flann::FLANN_CHECKS_UNLIMITED);
-  search.cores = EffectiveNumThreads(num_threads);
-  std::vector<int> rows(kSearchBlockSize * num_found);
-  std::vector<float> distances(rows.size());
+  if (num_neighbors < 1 || vectors.cols() == 0) return nearest;
   for (int begin = 0; begin < num_rows; begin += kSearchBlockSize) {
     const int count = std::min(kSearchBlockSize, num_rows - begin);
-    const flann::Matrix<float> queries(data + begin * vectors.cols(), count,
-                                       vectors.cols());
-    flann::Matrix<int> found(rows.data(), count, num_found);
-    flann::Matrix<float> found_distances(distances.data(), count, num_found);
-    index.knnSearch(queries, found, found_distances, num_found, search);
-    for (int i = 0; i < count; ++i) {
-      for (int k = 0; k < num_found; ++k) {
-        const int row = found[i][k];
-        if (row != begin + i) nearest[begin + i].push_back(row);
-      }
-      if (static_cast<int>(nearest[begin + i].size()) > num_neighbors) {
-        nearest[begin + i].pop_back();
-      }
-    }
+    ParallelFor(num_threads, count, [&](size_t i) {
+      nearest[begin + i] =
+          FindNearest(vectors, begin + i, num_neighbors, may_be_chosen);
+    });
     if (!progress) continue;
     progress("searching similar images",
              static_cast<double>(begin + count) / num_rows);

@@ -2,15 +2,19 @@
 #include "colmap_ext/pairs/select_pairs.h"
 
 #include <algorithm>
+#include <functional>
 #include <map>
+#include <optional>
 #include <set>
 #include <stdexcept>
+#include <utility>
 
 #include "colmap_ext/database/prior_tables.h"
 #include "colmap_ext/host/database.h"
 #include "colmap_ext/pairs/nearest_rows.h"
 #include "colmap_ext/scene/capture_order.h"
 #include "colmap_ext/scene/image_finder.h"
+#include "core/parallel.h"
 #include "sensors/io/read_image_times.h"
 
 namespace adasfm {
@@ -70,38 +74,103 @@ StatusOr<GlobalDescriptors> GetDescriptors(const PairSelectionOptions& options,
       });
 }
 
-// Pairs of the most similar images.
-Status AddSimilarPairs(const PairSelectionOptions& options,
-                       const std::string& database_path,
-                       const ProgressCallback& progress,
-                       std::set<ImagePair>* pairs, PairSelection* selection) {
+// What the odometry says of all pairs but the neighbours in time.
+struct OdometryPairs {
+  // With an overlap worth matching, at most num_similar_images an image.
+  std::set<ImagePair> chosen;
+  // Whether there are others of which it is not sure.
+  bool has_unsure = false;
+};
+
+OdometryPairs PredictPairs(const PairSelectionOptions& options,
+                           const std::vector<image_t>& image_ids,
+                           const std::set<ImagePair>& neighbors,
+                           const OverlapPredictor& predictor) {
+  const size_t num_images = image_ids.size();
+  std::vector<std::vector<std::pair<double, image_t>>> partners(num_images);
+  std::vector<char> has_unsure(num_images, false);
+  ParallelFor(options.descriptors.num_threads, num_images, [&](size_t i) {
+    for (const image_t image_id : image_ids) {
+      const ImagePair pair(image_ids[i], image_id);
+      if (image_id == image_ids[i] || neighbors.count(pair) > 0) continue;
+      const std::optional<double> overlap = predictor.Predict(pair);
+      if (!overlap) {
+        has_unsure[i] = true;
+      } else if (*overlap >= options.odometry.min_overlap) {
+        partners[i].emplace_back(-*overlap, image_id);
+      }
+    }
+    std::sort(partners[i].begin(), partners[i].end());
+    if (partners[i].size() > options.num_similar_images) {
+      partners[i].resize(options.num_similar_images);
+    }
+  });
+  OdometryPairs pairs;
+  for (size_t i = 0; i < num_images; ++i) {
+    for (const auto& [order, image_id] : partners[i]) {
+      pairs.chosen.insert(ImagePair(image_ids[i], image_id));
+    }
+    pairs.has_unsure |= has_unsure[i];
+  }
+  return pairs;
+}
+
+// Pairs of the most similar images among those that may_be_chosen allows.
+Status AddSimilarPairs(
+    const PairSelectionOptions& options, const std::string& database_path,
+    const std::function<bool(const ImagePair&)>& may_be_chosen,
+    const ProgressCallback& progress, std::set<ImagePair>* pairs,
+    PairSelection* selection) {
   const StatusOr<GlobalDescriptors> descriptors =
       GetDescriptors(options, database_path, progress);
   if (!descriptors.ok()) return descriptors.status();
   selection->warnings.insert(selection->warnings.end(),
                              descriptors->warnings.begin(),
                              descriptors->warnings.end());
-  // In a drive the next images are the most similar ones, and are chosen
-  // already: a place seen before must not lose its room to them.
-  const std::set<ImagePair> neighbors = *pairs;
+  const std::vector<image_t>& ids = descriptors->image_ids;
   const std::vector<std::vector<int>> nearest = FindNearestRows(
-      descriptors->vectors,
-      options.num_similar_images + 2 * options.num_temporal_neighbors,
+      descriptors->vectors, options.num_similar_images,
       options.descriptors.num_threads,
+      [&](int i, int k) { return may_be_chosen(ImagePair(ids[i], ids[k])); },
       [&progress](const std::string& what, double share_done) {
         if (progress) progress(what, 0.7 + 0.3 * share_done);
       });
   for (size_t i = 0; i < nearest.size(); ++i) {
-    int num_chosen = 0;
     for (const int k : nearest[i]) {
-      const ImagePair pair(descriptors->image_ids[i],
-                           descriptors->image_ids[k]);
-      if (neighbors.count(pair) > 0) continue;
-      if (num_chosen++ == options.num_similar_images) break;
-      if (pairs->insert(pair).second) ++selection->num_similar;
+      if (pairs->insert(ImagePair(ids[i], ids[k])).second) {
+        ++selection->num_similar;
+      }
     }
   }
   return Status::Ok();
+}
+
+// Beyond the neighbours in time: by the odometry where it is sure, else by
+// similarity.
+Status AddDistantPairs(const PairSelectionOptions& options,
+                       const std::string& database_path,
+                       const std::vector<image_t>& image_ids,
+                       const ProgressCallback& progress,
+                       std::set<ImagePair>* pairs, PairSelection* selection) {
+  const StatusOr<OverlapPredictor> predictor =
+      OverlapPredictor::Read(options.odometry, database_path);
+  if (!predictor.ok()) return predictor.status();
+  // In a drive the next images are the most similar ones, and are chosen
+  // already: a place seen before must not lose its room to them.
+  const std::set<ImagePair> neighbors = *pairs;
+  if (predictor->HasOdometry()) {
+    const OdometryPairs predicted =
+        PredictPairs(options, image_ids, neighbors, *predictor);
+    pairs->insert(predicted.chosen.begin(), predicted.chosen.end());
+    selection->num_predicted = predicted.chosen.size();
+    if (!predicted.has_unsure) return Status::Ok();
+  }
+  return AddSimilarPairs(
+      options, database_path,
+      [&](const ImagePair& pair) {
+        return neighbors.count(pair) == 0 && !predictor->Predict(pair);
+      },
+      progress, pairs, selection);
 }
 
 }  // namespace
@@ -122,7 +191,7 @@ bool PairSelectionOptions::IsValid(std::string* error) const {
         "0; one of them must be positive";
     return false;
   }
-  return descriptors.IsValid(error);
+  return descriptors.IsValid(error) && odometry.IsValid(error);
 }
 
 StatusOr<std::vector<image_t>> OrderImages(const std::string& database_path,
@@ -179,8 +248,8 @@ StatusOr<PairSelection> SelectPairs(const PairSelectionOptions& options,
   }
   selection.num_temporal = pairs.size();
   if (options.num_similar_images > 0) {
-    status =
-        AddSimilarPairs(options, database_path, progress, &pairs, &selection);
+    status = AddDistantPairs(options, database_path, *order, progress, &pairs,
+                             &selection);
     if (!status.ok()) return status;
   }
   selection.pairs.assign(pairs.begin(), pairs.end());

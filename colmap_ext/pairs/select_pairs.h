@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "colmap_ext/pairs/global_descriptors.h"
+#include "colmap_ext/pairs/overlap_predictor.h"
 #include "core/progress.h"
 #include "core/status.h"
 #include "core/types.h"
@@ -14,8 +15,11 @@ namespace adasfm {
 struct PairSelectionOptions {
   // Every image is matched with so many of the next ones in time.
   int num_temporal_neighbors = 10;
-  // ... and with so many of the most similar ones beyond them (the paper's 30).
+  // ... and with so many beyond them (the paper's 30): where the priors in the
+  // database predict what images share, those that share most of their views;
+  // where they cannot tell, the most similar ones.
   int num_similar_images = 30;
+  OverlapPredictionOptions odometry;
   // Times of the images (sensors/io/read_image_times.h); empty: those that
   // adasfm_prior_importer left in the database.
   std::string image_times_path;
@@ -31,6 +35,8 @@ struct PairSelection {
   std::vector<ImagePair> pairs;
   int num_images = 0;
   int num_temporal = 0;
+  // Beyond these, those that the odometry predicts.
+  int num_predicted = 0;
   // Those that only similarity found.
   int num_similar = 0;
   // Otherwise by name.

@@ -141,6 +141,15 @@ class Reconstructor {
   Status ExtractAll(const std::vector<std::string>& names);
   Status Matching();
   Status Priors();
+  bool HasSensors() const {
+    return !paths_.imu_path.empty() || !paths_.wheel_path.empty();
+  }
+  StatusOr<StepInputs> DigestSensors() const;
+  StatusOr<PriorImport> Import() const;
+  // Before the matching, without the photos' rotations: for the choice of
+  // pairs, and so that faults of the logs are known before the long work. A run
+  // that goes on takes what is there, so that it chooses the same pairs.
+  Status ImportForPairs(const ProgressCallback& progress) const;
   Status Coarse();
   Status Model();
   Status Report();
@@ -266,7 +275,8 @@ Status Reconstructor::Features() {
       {"camera_params", features.camera_params},
       {"single_camera", std::to_string(features.single_camera)},
       {"max_image_size", std::to_string(features.max_image_size)},
-      {"max_num_features", std::to_string(features.max_num_features)}};
+      {"max_num_features", std::to_string(features.max_num_features)},
+      {"first_octave", std::to_string(features.first_octave)}};
   return RunStep("features", inputs,
                  {[this] { return ResetFeatures(paths_.workspace_path); },
                   [&] { return ExtractAll(*names); },
@@ -275,17 +285,26 @@ Status Reconstructor::Features() {
 
 Status Reconstructor::Matching() {
   const PairSelectionOptions& pairs = options_.pairs;
-  StatusOr<StepInputs> inputs =
-      DigestPaths({{"image_times", paths_.image_times_path},
-                   {"descriptors", pairs.descriptors_path}});
+  // The odometry has a say in the pairs.
+  StatusOr<StepInputs> inputs = DigestSensors();
   if (!inputs.ok()) return inputs.status();
+  const StatusOr<StepInputs> descriptors =
+      DigestPaths({{"descriptors", pairs.descriptors_path}});
+  if (!descriptors.ok()) return descriptors.status();
+  inputs.value().insert(descriptors->begin(), descriptors->end());
   inputs.value()["num_temporal_neighbors"] =
       std::to_string(pairs.num_temporal_neighbors);
   inputs.value()["num_similar_images"] =
       std::to_string(pairs.num_similar_images);
-  const auto reset = [this] { return ResetMatches(database_path_); };
+  inputs.value()["matcher"] = options_.features.matcher;
+  const auto reset = [this] {
+    const Status status = ResetMatches(database_path_);
+    return status.ok() ? ResetPriors(database_path_) : status;
+  };
   const auto work = [&]() -> Status {
     const ProgressCallback progress = ProgressIn(kMatching, "matching");
+    const Status imported = ImportForPairs(progress);
+    if (!imported.ok()) return imported;
     const StatusOr<PairSelection> selection =
         SelectPairs(pairs, database_path_,
                     [&progress](const std::string& what, double share_done) {
@@ -295,6 +314,7 @@ Status Reconstructor::Matching() {
     Warn(selection->warnings);
     message_("matching: " + std::to_string(selection->num_temporal) +
              " pairs of neighbours in time, " +
+             std::to_string(selection->num_predicted) + " by the odometry, " +
              std::to_string(selection->num_similar) +
              " more of similar images");
     const Status matched =
@@ -309,27 +329,40 @@ Status Reconstructor::Matching() {
   return RunStep("matching", *inputs, {reset, work, &KeepAll});
 }
 
+Status Reconstructor::ImportForPairs(const ProgressCallback& progress) const {
+  if (!HasSensors()) return Status::Ok();
+  const StatusOr<LoadedPriorTables> tables = ReadPriorTables(database_path_);
+  if (!tables.ok() || !tables->tables.priors.empty()) return tables.status();
+  progress("reading the logs", 0.0);
+  return Import().status();
+}
+
+StatusOr<PriorImport> Reconstructor::Import() const {
+  PriorImportPaths paths;
+  paths.database_path = database_path_;
+  paths.image_times_path = paths_.image_times_path;
+  paths.imu_path = paths_.imu_path;
+  paths.wheel_path = paths_.wheel_path;
+  paths.sensors_path = paths_.sensors_path;
+  return ImportPriors(options_.priors, paths, database_path_ + ".priors.json");
+}
+
+StatusOr<StepInputs> Reconstructor::DigestSensors() const {
+  return DigestPaths({{"image_times", paths_.image_times_path},
+                      {"imu", paths_.imu_path},
+                      {"wheel", paths_.wheel_path},
+                      {"sensors", paths_.sensors_path}});
+}
+
 Status Reconstructor::Priors() {
-  const StatusOr<StepInputs> inputs =
-      DigestPaths({{"image_times", paths_.image_times_path},
-                   {"imu", paths_.imu_path},
-                   {"wheel", paths_.wheel_path},
-                   {"sensors", paths_.sensors_path}});
+  const StatusOr<StepInputs> inputs = DigestSensors();
   if (!inputs.ok()) return inputs.status();
   const auto reset = [this] { return ResetPriors(database_path_); };
-  const bool has_sensors =
-      !paths_.imu_path.empty() || !paths_.wheel_path.empty();
+  const bool has_sensors = HasSensors();
   const auto work = [&]() -> Status {
     if (!has_sensors) return Status::Ok();
     ProgressIn(kPriors, "priors")("reading the logs", 0.0);
-    PriorImportPaths paths;
-    paths.database_path = database_path_;
-    paths.image_times_path = paths_.image_times_path;
-    paths.imu_path = paths_.imu_path;
-    paths.wheel_path = paths_.wheel_path;
-    paths.sensors_path = paths_.sensors_path;
-    const StatusOr<PriorImport> import =
-        ImportPriors(options_.priors, paths, database_path_ + ".priors.json");
+    const StatusOr<PriorImport> import = Import();
     if (!import.ok()) return import.status();
     message_(FormatPriorImport(*import));
     return Status::Ok();

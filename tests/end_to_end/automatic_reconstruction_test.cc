@@ -115,11 +115,11 @@ TEST_F(AutomaticTest, PhotosAndSensorsThenAgainThenWithOtherOptions) {
   }
   EXPECT_EQ(fs::last_write_time(workspace_ + "/sparse/0/images.bin"),
             model_time);
-  // Without the wheels: features and matches stay.
+  // Without the wheels: features stay, and the pairs are chosen anew.
   run = ExpectSuccess(
       std::regex_replace(WithSensors(), std::regex("--wheel_path [^ ]*"), ""));
-  EXPECT_TRUE(Contains(run.out, "matching: done before")) << run.out;
-  EXPECT_TRUE(Contains(run.out, "priors: wheel is 'none', was ")) << run.out;
+  EXPECT_TRUE(Contains(run.out, "features: done before")) << run.out;
+  EXPECT_TRUE(Contains(run.out, "matching: wheel is 'none', was ")) << run.out;
   EXPECT_NE(fs::last_write_time(workspace_ + "/sparse/0/images.bin"),
             model_time);
   ExpectModel();

@@ -61,5 +61,18 @@ TEST(Features, CameraParamsMustBeUsable) {
   EXPECT_TRUE(options.IsValid(&error)) << error;
 }
 
+TEST(Features, OptionsAreChecked) {
+  std::string error;
+  FeatureOptions options;
+  EXPECT_TRUE(options.IsValid(&error)) << error;
+  options.first_octave = 1;
+  EXPECT_FALSE(options.IsValid(&error));
+  EXPECT_THAT(error, HasSubstr("first_octave"));
+  options = FeatureOptions();
+  options.matcher = "other";
+  EXPECT_FALSE(options.IsValid(&error));
+  EXPECT_THAT(error, HasSubstr("matcher"));
+}
+
 }  // namespace
 }  // namespace adasfm

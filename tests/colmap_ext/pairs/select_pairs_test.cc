@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <iomanip>
+#include <iostream>
 #include <map>
 #include <opencv2/imgcodecs.hpp>
 #include <set>
@@ -16,52 +17,11 @@
 #include "colmap_ext/host/database.h"
 #include "core/random.h"
 #include "tests/testing/colmap_ext/command_line_fixture.h"
+#include "tests/testing/colmap_ext/landmark_descriptors.h"
+#include "tests/testing/colmap_ext/synthetic_scene.h"
 
 namespace adasfm {
 namespace {
-
-constexpr int kNumDimensions = 128;
-
-// A descriptor as SIFT's: a unit vector of positive numbers times 512.
-Eigen::RowVectorXd RandomDescriptor(Random* random) {
-  Eigen::RowVectorXd descriptor(kNumDimensions);
-  for (int i = 0; i < kNumDimensions; ++i) {
-    descriptor(i) = std::abs(random->Gaussian(1.0));
-  }
-  return descriptor.normalized();
-}
-
-// The descriptor of every keypoint: its landmark's with noise, which turns it
-// by about 20 degrees (SIFT's nearest neighbours accept 30 to 40).
-class LandmarkDescriptors {
- public:
-  LandmarkDescriptors(const SyntheticWorld& world, uint64_t seed)
-      : random_(seed) {
-    for (size_t i = 0; i < world.landmarks.size(); ++i) {
-      descriptors_.push_back(RandomDescriptor(&random_));
-    }
-  }
-
-  std::vector<uint8_t> Draw(int landmark_id) {
-    Eigen::RowVectorXd descriptor = landmark_id < 0 ? RandomDescriptor(&random_)
-                                                    : descriptors_[landmark_id];
-    for (int i = 0; i < kNumDimensions; ++i) {
-      descriptor(i) = std::max(
-          0.0, descriptor(i) +
-                   random_.Gaussian(0.36 / std::sqrt(1.0 * kNumDimensions)));
-    }
-    descriptor.normalize();
-    std::vector<uint8_t> bytes(kNumDimensions);
-    for (int i = 0; i < kNumDimensions; ++i) {
-      bytes[i] = std::min(255.0, std::round(512.0 * descriptor(i)));
-    }
-    return bytes;
-  }
-
- private:
-  Random random_;
-  std::vector<Eigen::RowVectorXd> descriptors_;
-};
 
 class SelectPairsTest : public CommandLineTest {
  protected:
@@ -69,26 +29,7 @@ class SelectPairsTest : public CommandLineTest {
   void MakeDatabase(const SyntheticWorldOptions& options) {
     world_ = BuildSyntheticWorld(options);
     ASSERT_TRUE(WriteSyntheticDatabase(world_, database_).ok());
-    LandmarkDescriptors descriptors(world_, options.seed);
-    SqliteConnection database(database_, SqliteConnection::Mode::kWrite);
-    SqliteTransaction transaction(&database);
-    SqliteStatement insert(&database,
-                           "INSERT OR REPLACE INTO descriptors(image_id, rows, "
-                           "cols, data) VALUES(?, ?, ?, ?)");
-    for (const SyntheticImage& image : world_.images) {
-      std::vector<uint8_t> blob;
-      for (const int landmark_id : image.landmark_ids) {
-        const std::vector<uint8_t> bytes = descriptors.Draw(landmark_id);
-        blob.insert(blob.end(), bytes.begin(), bytes.end());
-      }
-      insert.Reset();
-      insert.BindInt(1, image.image_id);
-      insert.BindInt(2, image.landmark_ids.size());
-      insert.BindInt(3, kNumDimensions);
-      insert.BindBlob(4, blob.data(), blob.size());
-      insert.Step();
-    }
-    transaction.Commit();
+    WriteLandmarkDescriptors(world_, options.seed, database_);
   }
 
   PairSelection Select(const PairSelectionOptions& options) {
@@ -146,6 +87,45 @@ TEST_F(SelectPairsTest, FindsTruePairsOfRevisits) {
     EXPECT_LT(selection.pairs.size(), 180 * (10 + 30));
   }
   EXPECT_GT(num_true_of_all, 100);
+}
+
+// Each pair that is matched costs time, and each true one that is not costs
+// accuracy.
+TEST_F(SelectPairsTest, OdometryKeepsTruePairsAndSavesOthers) {
+  for (const uint64_t seed : {1, 2, 5}) {
+    SyntheticWorldOptions options = SmallWorld(180);
+    options.spacing_m = 4.0;
+    options.seed = seed;
+    MakeDatabase(options);
+    PairSelectionOptions pair_options;
+    const PairSelection without = Select(pair_options);
+    EXPECT_EQ(without.num_predicted, 0);
+    PriorTables tables;
+    tables.priors = BuildSyntheticScene(world_, {}).priors;
+    for (const SyntheticImage& image : world_.images) {
+      tables.image_times.push_back({image.image_id, image.timestamp_ns});
+    }
+    ASSERT_TRUE(WritePriorTables(database_, tables).ok());
+    const PairSelection with = Select(pair_options);
+    EXPECT_GT(with.num_predicted, 0);
+    int num_true = 0;
+    const double recall_without =
+        RecallOfTruePairs(world_, without.pairs, 10, &num_true);
+    const double recall_with =
+        RecallOfTruePairs(world_, with.pairs, 10, &num_true);
+    std::cout << "seed " << seed << ": " << without.pairs.size()
+              << " pairs, recall " << recall_without << "; with odometry "
+              << with.pairs.size() << " pairs (" << with.num_predicted
+              << " predicted, " << with.num_similar << " similar), recall "
+              << recall_with << " of " << num_true << std::endl;
+    EXPECT_GE(recall_with, recall_without - 0.01);
+    EXPECT_LT(with.pairs.size(), 0.8 * without.pairs.size());
+    if (seed != 1) continue;
+    pair_options.descriptors.num_threads = 3;
+    EXPECT_EQ(Select(pair_options).pairs, with.pairs);
+    pair_options.odometry.enabled = false;
+    EXPECT_EQ(Select(pair_options).pairs, without.pairs);
+  }
 }
 
 TEST_F(SelectPairsTest, NeighborsAndSimilarImagesCount) {

@@ -1,0 +1,114 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "colmap_ext/host/match_sift_pairs.h"
+
+#include <feature/utils.h>
+#include <util/random.h>
+
+#include <algorithm>
+#include <stdexcept>
+#include <string>
+
+#include "colmap_ext/matching/match_descriptors.h"
+#include "core/parallel.h"
+
+namespace adasfm {
+namespace {
+
+// COLMAP's defaults stand in the options of its matcher.
+colmap::TwoViewGeometry::Options VerificationOptions(size_t num_matches) {
+  const colmap::SiftMatchingOptions sift;
+  colmap::TwoViewGeometry::Options options;
+  options.min_num_inliers = sift.min_num_inliers;
+  colmap::RANSACOptions& ransac = options.ransac_options;
+  ransac.max_error = sift.max_error;
+  ransac.confidence = sift.confidence;
+  ransac.min_num_trials = sift.min_num_trials;
+  ransac.max_num_trials = sift.max_num_trials;
+  // A geometry with a smaller share of the matches has too few to be accepted:
+  // nothing is gained by looking for it, and most of the time of pairs that
+  // show different places is.
+  ransac.min_inlier_ratio =
+      std::max(sift.min_inlier_ratio,
+               static_cast<double>(sift.min_num_inliers) / num_matches);
+  return options;
+}
+
+DescriptorMatchingOptions MatchingOptions() {
+  const colmap::SiftMatchingOptions sift;
+  DescriptorMatchingOptions options;
+  options.max_ratio = sift.max_ratio;
+  options.max_distance_rad = sift.max_distance;
+  return options;
+}
+
+}  // namespace
+
+void SiftPairMatcher::Verify(const ImagePair& pair, Result* result) {
+  const auto& camera1 =
+      cache_->GetCamera(cache_->GetImage(pair.image_id1).CameraId());
+  const auto& camera2 =
+      cache_->GetCamera(cache_->GetImage(pair.image_id2).CameraId());
+  const auto points1 = colmap::FeatureKeypointsToPointsVector(
+      *cache_->GetKeypoints(pair.image_id1));
+  const auto points2 = colmap::FeatureKeypointsToPointsVector(
+      *cache_->GetKeypoints(pair.image_id2));
+  // Of this thread.
+  colmap::SetPRNGSeed();
+  result->geometry.Estimate(camera1, points1, camera2, points2, result->matches,
+                            VerificationOptions(result->matches.size()));
+}
+
+SiftPairMatcher::Result SiftPairMatcher::MatchPair(const ImagePair& pair) {
+  const auto descriptors1 = cache_->GetDescriptors(pair.image_id1);
+  const auto descriptors2 = cache_->GetDescriptors(pair.image_id2);
+  for (const auto& descriptors : {descriptors1, descriptors2}) {
+    if (descriptors->rows() > 0 && descriptors->cols() != kSiftDimensions) {
+      throw std::runtime_error("descriptors of " +
+                               std::to_string(descriptors->cols()) +
+                               " bytes are not SIFT's; use --matcher host");
+    }
+  }
+  const size_t min_num_matches = colmap::SiftMatchingOptions().min_num_inliers;
+  Result result;
+  for (const FeatureMatch& match : MatchDescriptors(
+           MatchingOptions(), descriptors1->data(), descriptors1->rows(),
+           descriptors2->data(), descriptors2->rows())) {
+    result.matches.emplace_back(match.point2D_idx1, match.point2D_idx2);
+  }
+  // COLMAP writes neither matches nor a geometry for fewer.
+  if (result.matches.size() < min_num_matches) return Result();
+  Verify(pair, &result);
+  if (result.geometry.inlier_matches.size() < min_num_matches) {
+    result.geometry = colmap::TwoViewGeometry();
+  }
+  return result;
+}
+
+void SiftPairMatcher::Match(const std::vector<ImagePair>& pairs) {
+  std::vector<ImagePair> missing;
+  for (const ImagePair& pair : pairs) {
+    const bool has_matches =
+        cache_->ExistsMatches(pair.image_id1, pair.image_id2);
+    const bool has_geometry =
+        cache_->ExistsInlierMatches(pair.image_id1, pair.image_id2);
+    if (has_matches && has_geometry) continue;
+    if (has_matches) cache_->DeleteMatches(pair.image_id1, pair.image_id2);
+    if (has_geometry) {
+      cache_->DeleteInlierMatches(pair.image_id1, pair.image_id2);
+    }
+    missing.push_back(pair);
+  }
+  std::vector<Result> results(missing.size());
+  ParallelFor(num_threads_, missing.size(),
+              [&](size_t i) { results[i] = MatchPair(missing[i]); });
+  // This thread did some of the pairs: what follows starts as it would have
+  // without.
+  colmap::SetPRNGSeed();
+  for (size_t i = 0; i < missing.size(); ++i) {
+    const auto& [image_id1, image_id2] = missing[i];
+    cache_->WriteMatches(image_id1, image_id2, results[i].matches);
+    cache_->WriteTwoViewGeometry(image_id1, image_id2, results[i].geometry);
+  }
+}
+
+}  // namespace adasfm

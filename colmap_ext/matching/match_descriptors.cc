@@ -1,0 +1,80 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "colmap_ext/matching/match_descriptors.h"
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+#include <utility>
+
+namespace adasfm {
+namespace {
+
+// In single precision, as COLMAP computes it.
+float Distance(int32_t product) {
+  constexpr float kSquaredLength = 512.0f * 512.0f;
+  return std::acos(
+      std::min(1.0f / kSquaredLength * static_cast<float>(product), 1.0f));
+}
+
+bool IsNear(const DescriptorMatchingOptions& options, int32_t best,
+            int32_t second) {
+  if (best <= 0) return false;
+  const float distance = Distance(best);
+  return distance <= static_cast<float>(options.max_distance_rad) &&
+         distance < static_cast<float>(options.max_ratio) * Distance(second);
+}
+
+int32_t Product(const uint8_t* a, const uint8_t* b) {
+  int32_t product = 0;
+  for (int k = 0; k < kSiftDimensions; ++k) product += a[k] * b[k];
+  return product;
+}
+
+// The greatest products of the descriptors whose nearest one is near enough,
+// with their indices; sorted.
+std::vector<std::pair<int32_t, int>> NearOnes(
+    const DescriptorMatchingOptions& options, const BestTwo& best_two) {
+  std::vector<std::pair<int32_t, int>> near;
+  for (size_t i = 0; i < best_two.best.size(); ++i) {
+    if (IsNear(options, best_two.best[i], best_two.second[i])) {
+      near.emplace_back(best_two.best[i], i);
+    }
+  }
+  std::sort(near.begin(), near.end());
+  return near;
+}
+
+}  // namespace
+
+std::vector<FeatureMatch> MatchDescriptors(
+    const DescriptorMatchingOptions& options, const uint8_t* descriptors1,
+    int count1, const uint8_t* descriptors2, int count2, ProductKernel kernel) {
+  if (!(options.max_ratio <= 1.0)) {
+    throw std::invalid_argument("MatchDescriptors: max_ratio is above 1");
+  }
+  BestTwo of1;
+  BestTwo of2;
+  FindBestTwo(descriptors1, count1, descriptors2, count2, kernel, &of1, &of2);
+  // Two descriptors are each other's nearest ones if their product is the
+  // greatest of both. As each is strictly nearer than the second one there is
+  // but one such partner.
+  const std::vector<std::pair<int32_t, int>> near2 = NearOnes(options, of2);
+  std::vector<FeatureMatch> matches;
+  for (const auto& [product, i1] : NearOnes(options, of1)) {
+    auto partner = std::lower_bound(near2.begin(), near2.end(),
+                                    std::make_pair(product, 0));
+    for (; partner != near2.end() && partner->first == product; ++partner) {
+      const int i2 = partner->second;
+      if (Product(descriptors1 + i1 * kSiftDimensions,
+                  descriptors2 + i2 * kSiftDimensions) == product) {
+        matches.push_back(
+            {static_cast<point2D_t>(i1), static_cast<point2D_t>(i2)});
+        break;
+      }
+    }
+  }
+  std::sort(matches.begin(), matches.end());
+  return matches;
+}
+
+}  // namespace adasfm
