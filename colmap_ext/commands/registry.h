@@ -11,6 +11,7 @@ namespace adasfm {
 // The commands, each in commands/<its name>.cc.
 Status RunAdasfmAutomaticReconstructor(int argc, char** argv);
 Status RunAdasfmEvaluator(int argc, char** argv);
+Status RunAdasfmGeoreferencer(int argc, char** argv);
 Status RunAdasfmGlobal(int argc, char** argv);
 Status RunAdasfmMapper(int argc, char** argv);
 Status RunAdasfmPairGenerator(int argc, char** argv);
