@@ -10,9 +10,15 @@
 #include <vector>
 
 #include "colmap_ext/bundle_adjustment/bundle_problem.h"
+#include "core/median.h"
 
 namespace adasfm {
 namespace {
+
+// Of the norm of three standard normal variables.
+constexpr double kNormalMedian = 1.538;
+// Beyond so many loss scales a position is left out.
+constexpr double kMaxDistance = 2.0;
 
 using PoseJacobian = Eigen::Matrix<double, 3, 6, Eigen::RowMajor>;
 
@@ -105,15 +111,53 @@ bool VerticalCost::Evaluate(double const* const* /*parameters*/,
   return true;
 }
 
+namespace {
+
+// The whitened distance of a position from where the poses have it now.
+double WhitenedDistance(const PositionPrior& prior,
+                        const BundleProblem& bundle) {
+  const AdjustedPose* pose1 = bundle.UsedPose(prior.image_id1);
+  const AdjustedPose* pose2 = bundle.UsedPose(prior.image_id2);
+  const double* parameters[] = {pose1->parameters, pose2->parameters};
+  Eigen::Vector3d residuals;
+  PositionCost(prior, pose1, pose2)
+      .Evaluate(parameters, residuals.data(), nullptr);
+  return residuals.norm();
+}
+
+// Those that take part and are no further off than kMaxDistance loss scales,
+// or as many times as much as half of the positions are more off than normal
+// ones: a model that is bent is drawn in, while what jumps alone in a model
+// that fits has no say at all.
+std::vector<PositionPrior> SelectPositions(
+    double loss_scale, const std::vector<PositionPrior>& positions,
+    const BundleProblem& bundle) {
+  std::vector<PositionPrior> selected;
+  std::vector<double> distances;
+  for (const PositionPrior& prior : positions) {
+    if (!TakesPart(prior, bundle)) continue;
+    selected.push_back(prior);
+    distances.push_back(WhitenedDistance(prior, bundle));
+  }
+  const double factor = std::max(1.0, Median(distances) / kNormalMedian);
+  const double max_distance = kMaxDistance * loss_scale * factor;
+  std::vector<PositionPrior> near;
+  for (size_t i = 0; i < selected.size(); ++i) {
+    if (distances[i] <= max_distance) near.push_back(selected[i]);
+  }
+  return near;
+}
+
+}  // namespace
+
 int AddPositionPriors(double loss_scale,
                       const PriorBundleAdjustmentProblem& problem,
                       BundleProblem* bundle) {
-  const int num_positions = static_cast<int>(std::count_if(
-      problem.positions.begin(), problem.positions.end(),
-      [bundle](const auto& prior) { return TakesPart(prior, *bundle); }));
+  const std::vector<PositionPrior> positions =
+      SelectPositions(loss_scale, problem.positions, *bundle);
+  const int num_positions = static_cast<int>(positions.size());
   if (num_positions < kMinNumPositionsForGauge) return num_positions;
-  for (const PositionPrior& prior : problem.positions) {
-    if (!TakesPart(prior, *bundle)) continue;
+  for (const PositionPrior& prior : positions) {
     std::vector<image_t> images = {prior.image_id1};
     if (prior.image_id2 != prior.image_id1) images.push_back(prior.image_id2);
     bundle->AddResidual(

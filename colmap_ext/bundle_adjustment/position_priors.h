@@ -55,8 +55,9 @@ class VerticalCost final : public ceres::CostFunction {
 inline constexpr int kMinNumPositionsForGauge = 3;
 
 // Adds the problem's positions, each with a Cauchy loss from loss_scale sigmas
-// on, and with them the verticals. Returns the number of positions; with fewer
-// than kMinNumPositionsForGauge nothing is added.
+// on, and with them the verticals. Positions that are far off where most are
+// near are left out. Returns the number of positions; with fewer than
+// kMinNumPositionsForGauge nothing is added.
 int AddPositionPriors(double loss_scale,
                       const PriorBundleAdjustmentProblem& problem,
                       BundleProblem* bundle);

@@ -27,6 +27,8 @@ constexpr double kUprightSigmaRad = DegToRad(20.0);
 constexpr double kMaxCostRatioOfAny = 0.7;
 constexpr double kMaxHeadingSigmaRad = DegToRad(5.0);
 constexpr double kMaxScaleSigma = 0.1;
+// Where the loss of the refinement ends, in thresholds.
+constexpr double kTukeyRatio = 1.5;
 constexpr int kNumIterations = 20;
 
 // p = s R c + t + R l, with the camera centre c in the world's unit and the
@@ -253,10 +255,11 @@ class Aligner {
         Eigen::Matrix<double, 3, 7> jacobian;
         jacobian << Hat(scaled + enu_from_world->rotation * o.lever),
             -Eigen::Matrix3d::Identity(), -scaled;
-        const double whitened =
-            residual.norm() / (Threshold(o) / kNormalSigmas);
+        // Tukey's biweight: what is off by more than that says nothing.
+        const double ratio =
+            std::min(1.0, residual.norm() / (kTukeyRatio * Threshold(o)));
         const double weight =
-            1.0 / (1.0 + whitened * whitened / 9.0) / (o.sigma * o.sigma);
+            std::pow(1.0 - ratio * ratio, 2) / (o.sigma * o.sigma);
         hessian += weight * jacobian.transpose() * jacobian;
         gradient += weight * jacobian.transpose() * residual;
       }

@@ -45,7 +45,7 @@ struct PositionAlignment {
 //      in for it.
 //   2. The hypothesis with the least truncated squared error, at the smallest
 //      of a few thresholds that 60 % of the positions fit.
-//   3. Gauss-Newton on all seven degrees of freedom with a Cauchy loss, where
+//   3. Gauss-Newton on all seven degrees of freedom with Tukey's loss, where
 //      the vertical is one more observation.
 // Fails with fewer than three positions, without a hypothesis that most of them
 // fit, and when the heading (5 deg) or the scale (10 %) stays uncertain.

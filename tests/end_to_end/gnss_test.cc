@@ -32,8 +32,10 @@ class GnssTest : public CommandLineTest {
                   .ExitCode(),
               0);
     truth_.clear();
-    for (const auto& [name, pose] :
-         ReadGroundTruth(folder_.File("gt.txt"), {}, {}).value()) {
+    const StatusOr<NamedPoses> truth =
+        ReadGroundTruth(folder_.File("gt.txt"), {}, {});
+    ASSERT_TRUE(truth.ok()) << truth.status().message();
+    for (const auto& [name, pose] : *truth) {
       truth_[name] = pose.TargetOriginInSource();
     }
     ASSERT_EQ(truth_.size(), 80u);
@@ -62,17 +64,17 @@ class GnssTest : public CommandLineTest {
   }
 
   void Reconstruct() {
-    EXPECT_EQ(Call("adasfm_global --database_path " +
-                   folder_.File("database.db") + " --output_path " +
-                   folder_.File("coarse"))
-                  .ExitCode(),
-              0);
-    EXPECT_EQ(Call("adasfm_mapper --database_path " +
-                   folder_.File("database.db") + " --input_path " +
-                   folder_.File("coarse/0") + " --output_path " +
-                   folder_.File("sparse"))
-                  .ExitCode(),
-              0);
+    EXPECT_EQ(
+        Call("adasfm_global --database_path " + folder_.File("database.db") +
+             " --output_path " + folder_.File("coarse"))
+            .ExitCode(),
+        0);
+    EXPECT_EQ(
+        Call("adasfm_mapper --database_path " + folder_.File("database.db") +
+             " --input_path " + folder_.File("coarse/0") + " --output_path " +
+             folder_.File("sparse"))
+            .ExitCode(),
+        0);
   }
 
   // Of the cameras, on the Earth, without any alignment.
@@ -126,14 +128,15 @@ TEST_F(GnssTest, PositionsAlone) {
     EXPECT_LT(RmsError(folder_.File("sparse")), 0.3) << seed;
   }
   // The same model in ECEF.
-  ASSERT_EQ(Call("adasfm_georeferencer --input_path " +
-                 folder_.File("sparse/0") + " --output_path " +
-                 folder_.File("ecef"))
-                .ExitCode(),
-            0);
+  ASSERT_EQ(
+      Call("adasfm_georeferencer --input_path " + folder_.File("sparse/0") +
+           " --output_path " + folder_.File("ecef"))
+          .ExitCode(),
+      0);
   const auto enu = ReadModel(folder_.File("sparse/0"));
   const auto ecef = ReadModel(folder_.File("ecef"));
-  const auto origin = ReadGeoreference(folder_.File("sparse/georeference.json"));
+  const auto origin =
+      ReadGeoreference(folder_.File("sparse/georeference.json"));
   ASSERT_TRUE(enu.ok() && ecef.ok() && origin.ok());
   for (const auto& [image_id, pose] : CamsFromWorld(*enu)) {
     EXPECT_LT((EnuFrame(*origin).EcefFromEnu(pose.TargetOriginInSource()) -
@@ -154,10 +157,9 @@ TEST_F(GnssTest, PositionsOfPhotos) {
                               "prior_tz = ? WHERE name = ?");
     Random random(5);
     for (const auto& [name, center] : truth_) {
-      const GeodeticPosition fix = EnuFrame(kWorldOrigin)
-                                       .GeodeticFromEnu(
-                                           center +
-                                           random.GaussianVector(kSigmaM));
+      const GeodeticPosition fix =
+          EnuFrame(kWorldOrigin)
+              .GeodeticFromEnu(center + random.GaussianVector(kSigmaM));
       statement.Reset();
       statement.BindDouble(1, fix.latitude_deg);
       statement.BindDouble(2, fix.longitude_deg);
@@ -190,11 +192,12 @@ TEST_F(GnssTest, SaysWhatIsWrong) {
   ExpectError("adasfm_georeferencer --input_path " + folder_.Path() +
                   " --output_path " + folder_.File("x"),
               "georeference.json");
-  ExpectError("adasfm_global --AdaSfmGlobal.write_pose_priors 1 "
-              "--database_path " +
-                  folder_.File("database.db") + " --output_path " +
-                  folder_.File("coarse"),
-              "no table pose_priors");
+  ExpectError(
+      "adasfm_global --AdaSfmGlobal.write_pose_priors 1 "
+      "--database_path " +
+          folder_.File("database.db") + " --output_path " +
+          folder_.File("coarse"),
+      "no table pose_priors");
 }
 
 }  // namespace

@@ -110,8 +110,10 @@ TEST(AlignToPositions, IsExactWithoutNoise) {
   }
 }
 
-// 60 positions of 1 m: the mean errs by 0.13 m in each direction, the ends of
-// 300 m by less than 4 times as much.
+// Of 60 positions of 1 m a third may be wrong at one end: the rest give the
+// heading to 1 m / (sqrt(39) * 57 m) = 0.16 deg, so the far end, 200 m from
+// their middle, errs by 0.6 m sideways, as much in height and along: four
+// sigmas of all together are 4 m.
 TEST(AlignToPositions, BridgesJumpsAndReflections) {
   for (const double share_wrong : {0.1, 0.35}) {
     for (uint64_t seed = 1; seed <= 20; ++seed) {
@@ -122,7 +124,7 @@ TEST(AlignToPositions, BridgesJumpsAndReflections) {
       const Drive drive = MakeDrive(options, seed);
       const PositionAlignment alignment = AlignToPositions(drive.input);
       ASSERT_TRUE(alignment.success) << alignment.failure;
-      EXPECT_LT(MaxError(drive, alignment), 2.0) << seed << " " << share_wrong;
+      EXPECT_LT(MaxError(drive, alignment), 4.0) << seed << " " << share_wrong;
     }
   }
 }

@@ -7,8 +7,6 @@
 #include <filesystem>
 #include <fstream>
 
-#include "testing/bag_writer.h"
-
 namespace adasfm {
 namespace {
 
