@@ -10,9 +10,8 @@ namespace {
 constexpr double kFitRadiusM = 100.0;
 
 Sim3d EcefFromEnu(const GeodeticPosition& origin) {
-  return Sim3d(
-      1.0, Eigen::Quaterniond(EnuFrame(origin).EcefFromEnuRotation()),
-      EcefFromGeodetic(origin));
+  return Sim3d(1.0, Eigen::Quaterniond(EnuFrame(origin).EcefFromEnuRotation()),
+               EcefFromGeodetic(origin));
 }
 
 StatusOr<Sim3d> UtmFromEnu(const UtmZone& zone,

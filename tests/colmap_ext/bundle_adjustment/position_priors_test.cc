@@ -26,7 +26,8 @@ double JacobianError(const ceres::CostFunction& cost,
   std::vector<std::vector<double>> storage(poses.size(),
                                            std::vector<double>(18));
   std::vector<double*> jacobians;
-  for (std::vector<double>& values : storage) jacobians.push_back(values.data());
+  for (std::vector<double>& values : storage)
+    jacobians.push_back(values.data());
   double residuals[3];
   cost.Evaluate(parameters.data(), residuals, jacobians.data());
   double max_error = 0.0;
@@ -44,9 +45,9 @@ double JacobianError(const ceres::CostFunction& cost,
       }
       for (int row = 0; row < 3; ++row) {
         const double numeric = (both[0][row] - both[1][row]) / (2.0 * kStep);
-        max_error = std::max(
-            max_error, std::abs(numeric - storage[block][6 * row + col]) /
-                           std::max(1.0, std::abs(numeric)));
+        max_error = std::max(max_error,
+                             std::abs(numeric - storage[block][6 * row + col]) /
+                                 std::max(1.0, std::abs(numeric)));
       }
     }
   }
@@ -70,9 +71,9 @@ TEST(PositionPriors, JacobiansMatchNumericDifferences) {
         1e-6);
     EXPECT_LT(JacobianError(PositionCost(prior, &pose1, &pose1), {&pose1}),
               1e-6);
-    EXPECT_LT(JacobianError(VerticalCost(random.UnitVector(), 0.1, &pose1),
-                            {&pose1}),
-              1e-6);
+    EXPECT_LT(
+        JacobianError(VerticalCost(random.UnitVector(), 0.1, &pose1), {&pose1}),
+        1e-6);
   }
 }
 
@@ -86,10 +87,9 @@ TEST(PositionPriors, WhitensWithTheCovariance) {
   double residuals[3];
   const double* parameters[] = {pose.parameters};
   PositionCost(prior, &pose, &pose).Evaluate(parameters, residuals, nullptr);
-  EXPECT_NEAR(Eigen::Vector3d(residuals[0], residuals[1], residuals[2])
-                  .squaredNorm(),
-              prior.position.dot(prior.covariance.inverse() * prior.position),
-              1e-9);
+  EXPECT_NEAR(
+      Eigen::Vector3d(residuals[0], residuals[1], residuals[2]).squaredNorm(),
+      prior.position.dot(prior.covariance.inverse() * prior.position), 1e-9);
 }
 
 // A model of a street, bent and moved, with positions at every image.

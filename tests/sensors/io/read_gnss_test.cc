@@ -59,7 +59,7 @@ TEST_F(ReadGnssTest, CsvColumnsGoByTheirNames) {
             "#lon [deg],lat [deg],note,time [ns],height [m],sigma_vertical "
             "[m],sigma_horizontal [m]\n"
             "11.5,48.1,x,1000000000,500,2,0.5\n"
-            "371.6,48.2,y,2000000000,501,0,nan\n"));
+            "348.4,48.2,y,2000000000,501,0,nan\n"));
   ASSERT_TRUE(log.ok()) << log.status().message();
   ASSERT_EQ(log->fixes.size(), 2u);
   const GnssFix& fix = log->fixes[0];
@@ -70,7 +70,7 @@ TEST_F(ReadGnssTest, CsvColumnsGoByTheirNames) {
   EXPECT_NEAR(fix.covariance(0, 0), 0.25, 1e-12);
   EXPECT_NEAR(fix.covariance(2, 2), 4.0, 1e-12);
   // What is not stated is the receiver's usual noise; longitudes wrap.
-  EXPECT_NEAR(log->fixes[1].position.longitude_deg, 11.6, 1e-9);
+  EXPECT_NEAR(log->fixes[1].position.longitude_deg, -11.6, 1e-9);
   EXPECT_NEAR(log->fixes[1].covariance(0, 0), 4.0, 1e-12);
   EXPECT_NEAR(log->fixes[1].covariance(2, 2), 16.0, 1e-12);
 }
