@@ -7,6 +7,8 @@
 #include <filesystem>
 #include <fstream>
 
+#include "tests/testing/bag_writer.h"
+
 namespace adasfm {
 namespace {
 
@@ -162,6 +164,26 @@ TEST_F(ReadGnssTest, ReadsKittiOxts) {
   EXPECT_EQ(log->fixes[1].timestamp_ns, 1317042145600000000);
   EXPECT_EQ(log->fixes[1].position.latitude_deg, 49.01);
   EXPECT_NEAR(log->fixes[0].covariance(1, 1), 0.0025, 1e-12);
+}
+
+TEST_F(ReadGnssTest, ReadsNavSatFixOfABag) {
+  const std::string path = folder_ + "/drive.mcap";
+  constexpr timestamp_t kStartNs = 1'600'000'000'000'000'000;
+  {
+    BagWriter bag(path, {});
+    for (const int i : {1, 0, 2}) {
+      bag.Write("/fix", "sensor_msgs/msg/NavSatFix", kStartNs,
+                NavSatFixMessage({kStartNs + 1000 * i, "gnss"}, 48.0 + i, 11.5,
+                                 500.0, 0.25));
+    }
+  }
+  const auto log = Read(path);
+  ASSERT_TRUE(log.ok()) << log.status().message();
+  ASSERT_EQ(log->fixes.size(), 3u);
+  EXPECT_EQ(log->fixes[2].timestamp_ns, kStartNs + 2000);
+  EXPECT_EQ(log->fixes[2].position.latitude_deg, 50.0);
+  EXPECT_NEAR(log->fixes[2].covariance(0, 0), 0.25, 1e-5);
+  EXPECT_FALSE(Read(path + ":/other").ok());
 }
 
 }  // namespace
