@@ -19,9 +19,12 @@
 #include "colmap_ext/host/model.h"
 #include "colmap_ext/host/model_folder.h"
 #include "colmap_ext/host/pose_conversion.h"
+#include "colmap_ext/host/pose_prior_table.h"
 #include "colmap_ext/io/folder_lock.h"
+#include "colmap_ext/io/georeference_file.h"
 #include "colmap_ext/io/output_files.h"
 #include "colmap_ext/mapper_stage/model_checkpoint.h"
+#include "colmap_ext/scene/georeference.h"
 #include "core/check_options.h"
 #include "core/so3.h"
 #include "core/sqlite.h"
@@ -35,7 +38,7 @@ constexpr char kNoPriorsWarning[] =
 
 bool ChangesDatabase(const GlobalStageOptions& options) {
   return options.refinement.enabled || options.poses.camera_mount.enabled ||
-         options.poses.rotation_rates.enabled;
+         options.poses.rotation_rates.enabled || options.write_pose_priors;
 }
 
 // Who forgot a matcher would get a model of the sensors alone.
@@ -70,6 +73,19 @@ int CountPoints(const GlobalStageResult& result) {
   return num_points;
 }
 
+Status CheckHasPosePriorTable(const std::string& database_path) {
+  try {
+    SqliteConnection database(database_path, SqliteConnection::Mode::kRead);
+    if (HasPosePriorTable(&database)) return Status::Ok();
+  } catch (const SqliteError& error) {
+    return Status::Error(database_path + ": " + error.what());
+  }
+  return Status::Error(
+      database_path +
+      " has no table pose_priors as COLMAP 4 writes it; open the database with "
+      "COLMAP 4 once, or leave --AdaSfmGlobal.write_pose_priors at 0");
+}
+
 // Before any work: nothing is lost when the result cannot be written.
 Status CheckGlobalPaths(const GlobalStageOptions& options,
                         const std::string& database_path,
@@ -83,7 +99,8 @@ Status CheckGlobalPaths(const GlobalStageOptions& options,
                          "--AdaSfmGlobal.correct_camera_mount 0 "
                          "--AdaSfmGlobal.correct_rotation_rates 0");
   }
-  status = PrepareOutputFolder(output_path);
+  if (options.write_pose_priors) status = CheckHasPosePriorTable(database_path);
+  if (status.ok()) status = PrepareOutputFolder(output_path);
   return status.ok() ? CheckModelFolders(output_path) : status;
 }
 
@@ -108,6 +125,62 @@ Status CheckDatabaseIsFree(const std::string& database_path) {
   }
 }
 
+// Beside the models, if they are somewhere on the Earth.
+Status WriteGeoreferenceOf(const SceneData& scene, bool is_georeferenced,
+                           const std::string& output_path) {
+  RemoveGeoreference(output_path);
+  if (!is_georeferenced || !scene.position_origin.has_value()) {
+    return Status::Ok();
+  }
+  return WriteGeoreference(*scene.position_origin, output_path);
+}
+
+// Positions in one frame: those of the largest model or, georeferenced, of all.
+std::vector<NewPosePrior> CollectPosePriors(const GlobalStageOptions& options,
+                                            const SceneData& scene,
+                                            const GlobalStageResult& result) {
+  const CoarsePoses& poses = result.poses;
+  const Eigen::Quaterniond camera_mount =
+      poses.camera_mount.corrected ? ExpSo3(poses.camera_mount.turn_rad)
+                                   : Eigen::Quaterniond::Identity();
+  const double variance = options.pose_prior_sigma * options.pose_prior_sigma;
+  std::vector<NewPosePrior> priors;
+  for (size_t i = 0; i < result.models.size(); ++i) {
+    const CoarseModel& model = result.models[i];
+    if (i > 0 && !model.positions.success) continue;
+    for (const auto& [image_id, pose] : CamsFromWorld(model.reconstruction)) {
+      const SceneImage& image = scene.images.at(image_id);
+      NewPosePrior prior;
+      prior.image_id = image_id;
+      prior.camera_id = image.camera_id;
+      prior.position = pose.TargetOriginInSource();
+      prior.covariance = variance * Eigen::Matrix3d::Identity();
+      if (image.gravity_in_cam) {
+        prior.gravity_in_cam = camera_mount * *image.gravity_in_cam;
+      } else if (model.gravity_aligned) {
+        prior.gravity_in_cam = pose.rotation * -Eigen::Vector3d::UnitZ();
+      }
+      priors.push_back(prior);
+    }
+  }
+  return priors;
+}
+
+// Into a database whose COLMAP has such a table.
+Status WritePosePriorsTo(const std::string& database_path,
+                         const std::vector<NewPosePrior>& priors) {
+  try {
+    SqliteConnection database(database_path, SqliteConnection::Mode::kWrite);
+    SqliteTransaction transaction(&database);
+    WritePosePriors(priors, &database);
+    transaction.Commit();
+  } catch (const SqliteError& error) {
+    return Status::Error("cannot write pose_priors to " + database_path + ": " +
+                         error.what());
+  }
+  return Status::Ok();
+}
+
 // The models first: a crash in between leaves the database as it was.
 Status WriteGlobalResult(const GlobalStageOptions& options,
                          const std::string& database_path,
@@ -128,8 +201,18 @@ Status WriteGlobalResult(const GlobalStageOptions& options,
   }
   Status status = WriteModelFolder(output_path, models, frames.frames);
   if (status.ok()) {
+    const bool is_georeferenced = std::any_of(
+        result.models.begin(), result.models.end(),
+        [](const CoarseModel& model) { return model.positions.success; });
+    status = WriteGeoreferenceOf(scene, is_georeferenced, output_path);
+  }
+  if (status.ok()) {
     status = WriteTextFile(output_path + "/removed_pairs.txt",
                            FormatRemovedPairs(scene, result));
+  }
+  if (status.ok() && options.write_pose_priors) {
+    status = WritePosePriorsTo(database_path,
+                               CollectPosePriors(options, scene, result));
   }
   if (status.ok() && ChangesDatabase(options)) {
     status = RewriteTwoViewGeometries(database_path, result.geometries,
@@ -293,14 +376,41 @@ MapperStageOptions ResolveOptions(const MapOptions& options,
   return stage;
 }
 
+// Moves the coarse poses into the frame of the scene's positions; positions
+// that do not fit them are left out.
+PositionAlignment AlignCoarseModel(MapReport* report, SceneData* scene,
+                                   CoarsePoseMap* coarse) {
+  PositionAlignment alignment;
+  if (scene->positions.empty()) return alignment;
+  const bool is_metric = std::any_of(
+      scene->priors.begin(), scene->priors.end(),
+      [coarse](const RelativePosePrior& prior) {
+        return prior.HasLength() && coarse->count(prior.image_id1) > 0 &&
+               coarse->count(prior.image_id2) > 0;
+      });
+  alignment = AlignSceneToPositions(*scene, *coarse, is_metric);
+  if (alignment.success) {
+    *coarse = TransformCamsFromWorld(alignment.enu_from_world, *coarse);
+    return alignment;
+  }
+  report->warnings.push_back("the positions are not used: " +
+                             alignment.failure);
+  scene->positions.clear();
+  return alignment;
+}
+
 Status MergeAndWrite(const MapRequest& request, const SceneData& scene,
                      const DatabaseFrames& frames, MapperStage* stage,
                      MapReport* report) {
   const StatusOr<colmap::Reconstruction> model =
       stage->Merge(/*require_all_parts=*/true);
   if (!model.ok()) return model.status();
-  const Status status =
+  Status status =
       WriteModelFolder(request.output_path, {&*model}, frames.frames);
+  if (status.ok()) {
+    status = WriteGeoreferenceOf(scene, stage->Summary().is_georeferenced,
+                                 request.output_path);
+  }
   if (!status.ok()) return status;
   report->verdict = AssessModel(scene, stage->Summary(),
                                 ReadEarlierWarnings(request), *model);
@@ -399,7 +509,9 @@ StatusOr<CoarseModelReport> EstimateCoarseModel(
   CoarseModelReport report;
   report.warnings = scene->warnings;
   if (frames->has_camera_rigs) report.warnings.push_back(kCameraRigsWarning);
-  if (scene->priors.empty()) report.warnings.push_back(kNoPriorsWarning);
+  if (scene->priors.empty() && scene->positions.empty()) {
+    report.warnings.push_back(kNoPriorsWarning);
+  }
   StatusOr<GlobalStageResult> result =
       RunGlobalStage(options, *scene, progress);
   if (!result.ok()) return result.status();
@@ -441,18 +553,26 @@ StatusOr<MapReport> MapParts(const MapOptions& options,
   status = CheckHasMatches(request.database_path, *scene);
   if (!status.ok()) return status;
   MapReport report;
-  const StatusOr<CoarsePoseMap> coarse =
+  StatusOr<CoarsePoseMap> coarse =
       ReadCoarseModel(request.input_path, &report, &*scene);
   if (!coarse.ok()) return coarse.status();
+  const PositionAlignment alignment =
+      AlignCoarseModel(&report, &*scene, &*coarse);
   report.warnings.insert(report.warnings.begin(), scene->warnings.begin(),
                          scene->warnings.end());
-  if (scene->priors.empty()) report.warnings.push_back(kNoPriorsWarning);
+  if (scene->priors.empty() && scene->positions.empty()) {
+    report.warnings.push_back(kNoPriorsWarning);
+  }
   const StatusOr<DatabaseFrames> frames =
       ReadDatabaseFrames(request.database_path);
   if (!frames.ok()) return frames.status();
   if (frames->has_camera_rigs) report.warnings.push_back(kCameraRigsWarning);
-  MapperStage stage(ResolveOptions(options, *scene), *scene, *coarse,
-                    request.output_path, progress);
+  MapperStageOptions stage_options = ResolveOptions(options, *scene);
+  RefineModelOptions& refine = stage_options.refine;
+  refine.initial_position_loss_scale =
+      PositionLossScale(alignment, refine.position_loss_scale, 0, 2);
+  MapperStage stage(stage_options, *scene, *coarse, request.output_path,
+                    progress);
   status = RunMapperSteps(request, *scene, *frames, &stage, &report);
   if (!status.ok()) return status;
   report.summary = stage.Summary();

@@ -124,6 +124,10 @@ void SqliteStatement::BindInt(int parameter, int64_t value) {
   CheckBinding(sqlite3_bind_int64(handle_, parameter, value));
 }
 
+void SqliteStatement::BindDouble(int parameter, double value) {
+  CheckBinding(sqlite3_bind_double(handle_, parameter, value));
+}
+
 void SqliteStatement::BindText(int parameter, const std::string& value) {
   CheckBinding(sqlite3_bind_text(handle_, parameter, value.data(), value.size(),
                                  SQLITE_TRANSIENT));

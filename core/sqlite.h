@@ -63,6 +63,7 @@ class SqliteStatement {
   void Reset();
 
   void BindInt(int parameter, int64_t value);
+  void BindDouble(int parameter, double value);
   void BindText(int parameter, const std::string& value);
   void BindBlob(int parameter, const void* data, size_t num_bytes);
   void BindValue(int parameter, const SqliteValue& value);

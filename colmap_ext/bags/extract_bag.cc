@@ -234,6 +234,7 @@ BagFiles FindBagFiles(const std::string& folder) {
   files.image_times_path = find(kTimesFile);
   files.imu_path = find("imu.csv");
   files.wheel_path = find("wheel.csv");
+  files.gnss_path = find("gnss.csv");
   files.sensors_path = find(kSensorsFile);
   std::ifstream(folder + "/" + kCameraFile) >> files.camera.model >>
       files.camera.params;

@@ -29,6 +29,7 @@ struct BagFiles {
   std::string image_times_path;  // image_times.csv
   std::string imu_path;          // imu.csv
   std::string wheel_path;        // wheel.csv
+  std::string gnss_path;         // gnss.csv
   std::string sensors_path;      // sensors.yaml: mounting from /tf_static
   CameraText camera;             // camera.txt: from CameraInfo
 };

@@ -7,6 +7,7 @@
 #include <stdexcept>
 
 #include "colmap_ext/bundle_adjustment/bundle_problem.h"
+#include "colmap_ext/bundle_adjustment/position_priors.h"
 #include "core/parallel.h"
 
 namespace adasfm {
@@ -146,7 +147,8 @@ PosePriorEdge PosePriorEdgeFromPrior(const RelativePosePrior& prior) {
 bool PriorBundleAdjustmentOptions::IsValid(std::string* error) const {
   if (!shared_errors.IsValid(error)) return false;
   if (!CheckPositive("keypoint_sigma_px", keypoint_sigma_px, error) ||
-      !CheckPositive("prior_loss_scale", prior_loss_scale, error)) {
+      !CheckPositive("prior_loss_scale", prior_loss_scale, error) ||
+      !CheckPositive("position_loss_scale", position_loss_scale, error)) {
     return false;
   }
   if (!std::isfinite(reproj_loss_scale_px)) {
@@ -190,7 +192,10 @@ PriorBundleAdjustmentSummary AdjustBundle(
     summary.message = "nothing to adjust";
     return summary;
   }
-  FixGauge(HasLengths(problem.priors), &bundle);
+  if (AddPositionPriors(options.position_loss_scale, problem, &bundle) <
+      kMinNumPositionsForGauge) {
+    FixGauge(HasLengths(problem.priors), &bundle);
+  }
 
   ceres::Solver::Summary solver_summary;
   ceres::Solve(SolverOptions(options, &bundle), bundle.CeresProblem(),

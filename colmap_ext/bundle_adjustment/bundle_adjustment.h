@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "colmap_ext/bundle_adjustment/shared_errors.h"
+#include "core/position_prior.h"
 #include "core/relative_pose_prior.h"
 #include "core/rigid3d.h"
 #include "core/types.h"
@@ -63,6 +64,10 @@ struct PriorBundleAdjustmentOptions {
   // are what balance_priors.h is for.
   double prior_loss_scale = 3.0;
 
+  // Where the robust loss (Cauchy) on whitened positions takes over, in sigmas.
+  // Larger while the model is still bent.
+  double position_loss_scale = 3.0;
+
   SharedErrorOptions shared_errors;
 
   bool refine_focal_length = false;
@@ -97,6 +102,14 @@ struct PriorBundleAdjustmentProblem {
   // Those of sensors in order of time: a window of the gyroscope's bias ends
   // where a prior does not begin with the image that the last one ended with.
   std::vector<PosePriorEdge> priors;
+  // Positions in the reconstruction's world, which then has no free degrees of
+  // freedom; those of images that do not take part are passed over.
+  std::vector<PositionPrior> positions;
+  // Unit vectors towards the ground (-z of the world) in the cameras' frames,
+  // together one measurement of the vertical with this 1 sigma. Used with
+  // positions only.
+  std::map<image_t, Eigen::Vector3d> gravity_in_cam;
+  double gravity_sigma_rad = std::numeric_limits<double>::infinity();
 };
 
 struct PriorBundleAdjustmentSummary {

@@ -41,6 +41,14 @@ class BundleProblem final : private ceres::EvaluationCallback {
   // it, to this share of the distance.
   void FixDistanceToFarthestPose(double sigma_ratio);
 
+  // The pose of an image that has part in a residual already; null for others.
+  const AdjustedPose* UsedPose(image_t image_id) const;
+  bool IsConstant(image_t image_id) const;
+  // Adds a residual on such poses and takes both over.
+  void AddResidual(std::unique_ptr<ceres::CostFunction> cost,
+                   std::unique_ptr<ceres::LossFunction> loss,
+                   const std::vector<image_t>& image_ids);
+
   // Points are eliminated first.
   std::shared_ptr<ceres::ParameterBlockOrdering> Ordering();
   ceres::Problem* CeresProblem() { return problem_.get(); }
@@ -121,6 +129,7 @@ class BundleProblem final : private ceres::EvaluationCallback {
   size_t direction_drift_ = kGyroscopeBias;
   std::deque<ReprojectionCost> reprojection_costs_;
   std::vector<std::unique_ptr<ceres::CostFunction>> other_costs_;
+  std::vector<std::unique_ptr<ceres::LossFunction>> other_losses_;
   std::unique_ptr<ceres::LossFunction> reprojection_loss_;
   std::unique_ptr<ceres::LossFunction> prior_loss_;
   std::unique_ptr<ceres::Problem> problem_;

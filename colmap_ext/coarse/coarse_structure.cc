@@ -3,10 +3,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "colmap_ext/coarse/select_coarse_points.h"
 #include "colmap_ext/host/pose_conversion.h"
 #include "colmap_ext/scene/align_to_gravity.h"
+#include "colmap_ext/scene/georeference.h"
 #include "colmap_ext/scene/scene_bearings.h"
 
 namespace adasfm {
@@ -93,6 +95,29 @@ void FillFigures(const CoarseStructureOptions& options,
       model->prior_chi2_per_dof <= options.balance.max_chi2_per_dof;
 }
 
+// Moves the poses into the frame of the positions, if they fit.
+CoarseModelInput AlignInput(const SceneData& scene,
+                            const CoarseModelInput& input,
+                            PositionAlignment* alignment) {
+  if (scene.positions.empty()) return input;
+  *alignment = AlignSceneToPositions(scene, input.cams_from_world, input.metric,
+                                     input.camera_mount);
+  if (!alignment->success) return input;
+  CoarseModelInput aligned = input;
+  aligned.cams_from_world =
+      TransformCamsFromWorld(alignment->enu_from_world, input.cams_from_world);
+  return aligned;
+}
+
+void AddPositions(const SceneData& scene, const CoarseModelInput& input,
+                  PriorBundleAdjustmentProblem* problem) {
+  problem->positions = scene.positions;
+  Verticals verticals =
+      FindVerticals(scene, input.cams_from_world, input.camera_mount);
+  problem->gravity_in_cam = std::move(verticals.gravity_in_cam);
+  problem->gravity_sigma_rad = verticals.sigma_rad;
+}
+
 // The threshold falls from round to round, geometrically.
 TrackTriangulationOptions TriangulationOptions(
     const CoarseStructureOptions& options, int round) {
@@ -171,8 +196,11 @@ void BuildRound(const CoarseStructureOptions& options, const SceneData& scene,
 PriorBundleAdjustmentSummary AdjustRound(
     const CoarseStructureOptions& options,
     const PriorBundleAdjustmentProblem& problem, int round,
-    colmap::Reconstruction* reconstruction, double* keypoint_sigma_factor) {
+    const PositionAlignment& alignment, colmap::Reconstruction* reconstruction,
+    double* keypoint_sigma_factor) {
   PriorBundleAdjustmentOptions bundle = options.bundle;
+  bundle.position_loss_scale = PositionLossScale(
+      alignment, bundle.position_loss_scale, round, options.num_rounds);
   PriorBalanceOptions balance = options.balance;
   if (round + 1 < options.num_rounds) {
     bundle.function_tolerance =
@@ -202,11 +230,13 @@ void RepeatWithFreeFocalLength(
   options.bundle.refine_focal_length = true;
   *keypoint_sigma_factor = 1.0;
   model->cameras_refined = true;
-  model->rounds.push_back(AdjustRound(
-      options, problem, last, &model->reconstruction, keypoint_sigma_factor));
+  model->rounds.push_back(AdjustRound(options, problem, last, model->positions,
+                                      &model->reconstruction,
+                                      keypoint_sigma_factor));
   BuildRound(options, scene, bearings, input, tracks, last, model);
-  model->rounds.push_back(AdjustRound(
-      options, problem, last, &model->reconstruction, keypoint_sigma_factor));
+  model->rounds.push_back(AdjustRound(options, problem, last, model->positions,
+                                      &model->reconstruction,
+                                      keypoint_sigma_factor));
 }
 
 }  // namespace
@@ -249,11 +279,15 @@ bool CoarseStructureOptions::IsValid(std::string* error) const {
 CoarseModel BuildCoarseModel(
     const CoarseStructureOptions& options, const SceneData& scene,
     const std::map<image_t, std::vector<Bearing>>& bearings,
-    const CoarseModelInput& input) {
+    const CoarseModelInput& given_input) {
   CoarseModel model;
-  model.metric = input.metric;
+  const CoarseModelInput input =
+      AlignInput(scene, given_input, &model.positions);
+  const bool is_georeferenced = model.positions.success;
+  model.metric = input.metric || is_georeferenced;
   model.max_track_bytes = EstimateTrackBytes(input.matches);
-  const PriorBundleAdjustmentProblem problem = CreateProblem(options, input);
+  PriorBundleAdjustmentProblem problem = CreateProblem(options, input);
+  if (is_georeferenced) AddPositions(scene, input, &problem);
   const RoundTracks tracks = BuildRoundTracks(options, input, problem.images);
   model.num_tracks = tracks.all.size();
   model.num_keyframes = tracks.num_keyframes;
@@ -261,7 +295,7 @@ CoarseModel BuildCoarseModel(
   double keypoint_sigma_factor = 1.0;
   for (int round = 0; round < options.num_rounds; ++round) {
     BuildRound(options, scene, bearings, input, tracks, round, &model);
-    model.rounds.push_back(AdjustRound(options, problem, round,
+    model.rounds.push_back(AdjustRound(options, problem, round, model.positions,
                                        &model.reconstruction,
                                        &keypoint_sigma_factor));
     if (!model.rounds.back().success) break;
@@ -281,6 +315,7 @@ CoarseModel BuildCoarseModel(
       std::min(options.min_angle_floor_deg,
                options.triangulation.min_triangulation_angle_deg));
   model.gravity_aligned =
+      is_georeferenced ||
       AlignToGravity(scene, &model.reconstruction, input.camera_mount);
   model.keypoint_sigma_px = model.rounds.back().keypoint_sigma_px;
   FillFigures(options, problem, &model);

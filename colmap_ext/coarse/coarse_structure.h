@@ -11,6 +11,7 @@
 #include "colmap_ext/bundle_adjustment/balance_priors.h"
 #include "colmap_ext/bundle_adjustment/bundle_adjustment.h"
 #include "colmap_ext/bundle_adjustment/find_focal_length_error.h"
+#include "colmap_ext/scene/align_to_positions.h"
 #include "colmap_ext/scene/scene_data.h"
 #include "core/bearing.h"
 #include "core/rigid3d.h"
@@ -68,6 +69,8 @@ struct CoarseModel {
   bool metric = false;
   // The world's z axis points up.
   bool gravity_aligned = false;
+  // To the scene's positions; if it succeeded, the world is their frame.
+  PositionAlignment positions;
   size_t num_tracks = 0;
   // Images that see points in the rounds before the last.
   size_t num_keyframes = 0;
@@ -96,8 +99,10 @@ struct CoarseModel {
 
 // Step 7 of the coarse global stage (design 7.2): tracks, points with an angle,
 // and rounds of bundle adjustment with priors and tightening thresholds. Points
-// start afresh from the adjusted poses in every round. The unit of the poses is
-// kept; the world is turned z-up when images know where the ground is.
+// start afresh from the adjusted poses in every round. With enough positions of
+// GNSS, which then take part in the adjustments, the world is their frame.
+// Otherwise the unit of the poses is kept, and the world is turned z-up when
+// images know where the ground is.
 CoarseModel BuildCoarseModel(
     const CoarseStructureOptions& options, const SceneData& scene,
     const std::map<image_t, std::vector<Bearing>>& bearings,

@@ -242,6 +242,10 @@ std::string FormatGlobalReportText(const GlobalStageResult& result,
          << " images, " << model.num_points << " points, "
          << (model.metric ? "in metres" : "scale unknown") << ", "
          << (model.gravity_aligned ? "z up" : "gravity unknown");
+    if (model.positions.success) {
+      text << ", georeferenced by " << model.positions.num_inliers << " of "
+           << model.positions.num_positions << " positions";
+    }
     const CoarseComponent& component = result.poses.components[i];
     if (!component.rotations_converged) text << ", rotations not converged";
     if (!component.positions_converged) text << ", positions not converged";
@@ -264,6 +268,10 @@ std::vector<std::string> ListGlobalWarnings(const SceneData& scene,
   AppendMountWarning(result.poses.camera_mount, &warnings);
   for (const CoarseModel& model : result.models) {
     AppendPriorWarnings(model, &warnings);
+    if (model.positions.failure.empty()) continue;
+    warnings.push_back(
+        "a model of " + std::to_string(model.reconstruction.NumRegImages()) +
+        " images is not georeferenced: " + model.positions.failure);
   }
   const LoopClosureReport& loops = result.poses.loop_closures;
   for (const UnverifiedJoin& join : loops.unverified_joins) {

@@ -127,6 +127,12 @@ std::string DescribeMatches(const GlobalStageResult& result) {
 }  // namespace
 
 bool GlobalStageOptions::IsValid(std::string* error) const {
+  if (!(pose_prior_sigma > 0.0)) {
+    *error =
+        "AdaSfmGlobal.pose_prior_sigma = " + std::to_string(pose_prior_sigma) +
+        " must be positive";
+    return false;
+  }
   return two_view.IsValid(error) && poses.IsValid(error) &&
          structure.IsValid(error) && refinement.IsValid(error);
 }

@@ -21,6 +21,12 @@ struct GlobalStageOptions {
   CoarsePoseOptions poses;
   CoarseStructureOptions structure;
   MatchRefinementOptions refinement;
+  // Whether the coarse positions and the directions of gravity go into the
+  // table pose_priors of COLMAP 4, for its own mappers.
+  bool write_pose_priors = false;
+  // 1 sigma of a coarse position there, in m or the model's unit: what coarse
+  // models of drives err by.
+  double pose_prior_sigma = 0.5;
   // Of all steps but structure.bundle; -1: all of the machine's.
   int num_threads = -1;
 

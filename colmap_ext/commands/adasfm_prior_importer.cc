@@ -107,6 +107,16 @@ void AddOptions(PriorImportOptions* options, CommandOptions* command) {
       "error of its rotation between two images, 1 sigma [deg/m]");
   command->AddDefault("AdaSfmTrajectory.max_gap_s", &trajectory->max_gap_s,
                       "longest gap of the trajectory to bridge [s]");
+  PositionPriorOptions* positions = &options->positions;
+  command->AddDefault("AdaSfmGnss.max_fix_gap_s", &positions->max_fix_gap_s,
+                      "longest gap of the positions to bridge [s]");
+  command->AddDefault("AdaSfmGnss.max_image_gap_s", &positions->max_image_gap_s,
+                      "a position between two images at most this far apart "
+                      "belongs to both [s]");
+  command->AddDefault("AdaSfmGnss.correlation_time_s",
+                      &positions->correlation_time_s,
+                      "for so long errors of positions persist; 0: no longer "
+                      "than to the next one [s]");
 }
 
 }  // namespace
@@ -118,7 +128,7 @@ Status RunAdasfmPriorImporter(int argc, char** argv) {
   std::string summary_path;
   CommandOptions command(
       "adasfm_prior_importer",
-      "Turns IMU and wheel logs into relative pose priors in the database.");
+      "Turns logs of an IMU, wheels and GNSS into priors in the database.");
   AddPathOptions(&paths, &command);
   command.AddDefault("force", &force,
                      "import although vision and gyroscope contradict each "
@@ -138,6 +148,7 @@ Status RunAdasfmPriorImporter(int argc, char** argv) {
                      {"image_times_path", paths.image_times_path},
                      {"imu_path", paths.imu_path},
                      {"wheel_path", paths.wheel_path},
+                     {"gnss_path", paths.gnss_path},
                      {"sensors_path", paths.sensors_path}});
   if (!apart.ok()) return apart;
 

@@ -42,6 +42,11 @@ void GlobalOptionAdder::AddPaper() {
   Add("max_epipolar_error_px", &stage_->refinement.max_epipolar_error_px,
       "matches farther from their epipolar lines, both views together, are "
       "dropped [px]");
+  Add("write_pose_priors", &stage_->write_pose_priors,
+      "put coarse positions and gravity into the table pose_priors of a "
+      "COLMAP 4 database, for global_mapper and pose_prior_mapper (0 or 1)");
+  Add("pose_prior_sigma", &stage_->pose_prior_sigma,
+      "1 sigma of a coarse position there [m, or the model's unit]");
   Add("num_threads", &stage_->num_threads, "threads; -1: all of the machine's");
 }
 

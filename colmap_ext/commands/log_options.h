@@ -5,8 +5,8 @@
 
 namespace adasfm {
 
-// --image_times_path, --imu_path and --wheel_path, for every command that reads
-// logs. Paths has members of these names.
+// --image_times_path, --imu_path, --wheel_path and --gnss_path, for every
+// command that reads logs. Paths has members of these names.
 template <typename Paths>
 void AddLogOptions(Paths* paths, CommandOptions* command) {
   command->AddDefault("image_times_path", &paths->image_times_path,
@@ -21,10 +21,15 @@ void AddLogOptions(Paths* paths, CommandOptions* command) {
       "wheel_path", &paths->wheel_path,
       "wheel log, told apart by its header line, a TUM odometry "
       "trajectory or a ROS bag; none when empty");
+  command->AddDefault(
+      "gnss_path", &paths->gnss_path,
+      "positions: CSV whose header names the columns, NMEA, a KITTI oxts "
+      "folder, a ROS bag, or 'database' for those that COLMAP keeps there (of "
+      "EXIF, or pose_priors); none when empty");
 }
 
-// --imu_topic and --wheel_topic, for commands that read bags. Names has members
-// imu and wheel.
+// --imu_topic, --wheel_topic and --gnss_topic, for commands that read bags.
+// Names has members imu, wheel and gnss.
 template <typename Names>
 void AddBagTopicOptions(Names* names, CommandOptions* command) {
   command->AddDefault("imu_topic", &names->imu,
@@ -33,6 +38,9 @@ void AddBagTopicOptions(Names* names, CommandOptions* command) {
   command->AddDefault("wheel_topic", &names->wheel,
                       "topic of odometry, twists or joint states in the bag; "
                       "when empty, the only one; 'none' leaves it out");
+  command->AddDefault("gnss_topic", &names->gnss,
+                      "topic of positions in the bag; when empty, the only "
+                      "one; 'none' leaves it out");
 }
 
 }  // namespace adasfm

@@ -13,6 +13,8 @@ const std::vector<Command>& Commands() {
        RunAdasfmDatabaseMerger},
       {"adasfm_evaluator", "compares a model with the ground truth",
        RunAdasfmEvaluator},
+      {"adasfm_georeferencer", "writes a model in another frame of the Earth",
+       RunAdasfmGeoreferencer},
       {"adasfm_global",
        "coarse global SfM with sensor priors; cleans the matches",
        RunAdasfmGlobal},

@@ -12,6 +12,7 @@ namespace adasfm {
 Status RunAdasfmAutomaticReconstructor(int argc, char** argv);
 Status RunAdasfmDatabaseMerger(int argc, char** argv);
 Status RunAdasfmEvaluator(int argc, char** argv);
+Status RunAdasfmGeoreferencer(int argc, char** argv);
 Status RunAdasfmGlobal(int argc, char** argv);
 Status RunAdasfmMapper(int argc, char** argv);
 Status RunAdasfmPairGenerator(int argc, char** argv);

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "colmap_ext/database/prior_tables.h"
 
+#include <cstdio>
 #include <map>
 #include <utility>
 
@@ -26,7 +27,12 @@ void CreateTables(SqliteConnection* database) {
       "flags INTEGER NOT NULL, PRIMARY KEY (image_id1, image_id2));"
       "CREATE TABLE IF NOT EXISTS adasfm_gravity ("
       "image_id INTEGER PRIMARY KEY NOT NULL, name TEXT NOT NULL, "
-      "gravity_in_cam BLOB NOT NULL);");
+      "gravity_in_cam BLOB NOT NULL);"
+      "CREATE TABLE IF NOT EXISTS adasfm_position_priors ("
+      "image_id1 INTEGER NOT NULL, image_id2 INTEGER NOT NULL, "
+      "name1 TEXT NOT NULL, name2 TEXT NOT NULL, share REAL NOT NULL, "
+      "position BLOB NOT NULL, covariance BLOB NOT NULL, "
+      "antenna_in_cam BLOB NOT NULL);");
 }
 
 using Names = std::map<image_t, std::string>;
@@ -86,6 +92,38 @@ void WriteGravity(const Names& names, const std::vector<GravityRow>& rows,
   }
 }
 
+void WritePositions(const Names& names, const std::vector<PositionPrior>& rows,
+                    SqliteConnection* database) {
+  SqliteStatement statement(database,
+                            "INSERT INTO adasfm_position_priors VALUES "
+                            "(?, ?, ?, ?, ?, ?, ?, ?)");
+  for (const PositionPrior& row : rows) {
+    statement.Reset();
+    statement.BindInt(1, row.image_id1);
+    statement.BindInt(2, row.image_id2);
+    statement.BindText(3, NameOf(names, row.image_id1));
+    statement.BindText(4, NameOf(names, row.image_id2));
+    statement.BindDouble(5, row.share);
+    BindDoubles(&statement, 6, row.position.data(), 3);
+    BindDoubles(&statement, 7, row.covariance.data(), 9);
+    BindDoubles(&statement, 8, row.antenna_in_cam.data(), 3);
+    statement.Step();
+  }
+}
+
+void WritePositionOrigin(const std::optional<GeodeticPosition>& origin,
+                         SqliteConnection* database) {
+  database->Execute("DELETE FROM adasfm_meta WHERE key = 'position_origin'");
+  if (!origin.has_value()) return;
+  char text[96];
+  std::snprintf(text, sizeof(text), "%.17g %.17g %.17g", origin->latitude_deg,
+                origin->longitude_deg, origin->height_m);
+  SqliteStatement statement(database, "INSERT INTO adasfm_meta VALUES (?, ?)");
+  statement.BindText(1, "position_origin");
+  statement.BindText(2, text);
+  statement.Step();
+}
+
 }  // namespace
 
 void CreateMetaTable(SqliteConnection* database) {
@@ -122,10 +160,13 @@ Status WritePriorTables(const std::string& database_path,
     database.Execute(
         "DELETE FROM adasfm_image_times;"
         "DELETE FROM adasfm_relative_pose_priors;"
-        "DELETE FROM adasfm_gravity;");
+        "DELETE FROM adasfm_gravity;"
+        "DELETE FROM adasfm_position_priors;");
     WriteImageTimes(names, tables.image_times, &database);
     WritePriors(names, tables.priors, &database);
     WriteGravity(names, tables.gravity, &database);
+    WritePositions(names, tables.positions, &database);
+    WritePositionOrigin(tables.position_origin, &database);
     RemovePriorCorrections(&database);
     transaction.Commit();
   } catch (const SqliteError& error) {

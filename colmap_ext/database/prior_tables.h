@@ -2,9 +2,11 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <optional>
 #include <string>
 #include <vector>
 
+#include "core/position_prior.h"
 #include "core/relative_pose_prior.h"
 #include "core/sqlite.h"
 #include "core/status.h"
@@ -12,8 +14,10 @@
 
 namespace adasfm {
 
-// The tables adasfm_image_times, adasfm_relative_pose_priors and adasfm_gravity
-// inside a COLMAP database (docs/reference/formats.md).
+// The tables adasfm_image_times, adasfm_relative_pose_priors, adasfm_gravity
+// and adasfm_position_priors inside a COLMAP database
+// (docs/reference/formats.md). Databases of before the last one are read as
+// having no positions.
 
 struct ImageTimeRow {
   image_t image_id = kInvalidImageId;
@@ -31,6 +35,9 @@ struct PriorTables {
   // Consecutive images, sorted by time.
   std::vector<RelativePosePrior> priors;
   std::vector<GravityRow> gravity;
+  std::vector<PositionPrior> positions;
+  // Of the positions' ENU frame; none for positions in a frame of their own.
+  std::optional<GeodeticPosition> position_origin;
 };
 
 // Replaces all rows, in one transaction. An error, and no change, when the

@@ -1,7 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include <Eigen/Cholesky>
 #include <algorithm>
+#include <locale>
 #include <map>
 #include <optional>
+#include <sstream>
 #include <utility>
 
 #include "colmap_ext/database/prior_tables.h"
@@ -133,6 +136,59 @@ void ReadGravity(const IdResolver& ids, SqliteConnection* database,
   }
 }
 
+PositionPrior PositionFromRow(const SqliteStatement& statement) {
+  const std::string row = "table adasfm_position_priors, images " +
+                          statement.Text(0) + " and " + statement.Text(1);
+  PositionPrior prior;
+  prior.share = statement.Double(2);
+  DoublesFromBlob(statement, 3, row, 3, prior.position.data());
+  DoublesFromBlob(statement, 4, row, 9, prior.covariance.data());
+  DoublesFromBlob(statement, 5, row, 3, prior.antenna_in_cam.data());
+  const Eigen::LLT<Eigen::Matrix3d> cholesky(prior.covariance);
+  if (!prior.position.allFinite() || !prior.covariance.allFinite() ||
+      !prior.antenna_in_cam.allFinite() || !(prior.share >= 0.0) ||
+      !(prior.share <= 1.0) || cholesky.info() != Eigen::Success) {
+    throw SqliteError(row + ": values that are not a position");
+  }
+  return prior;
+}
+
+void ReadPositions(const IdResolver& ids, SqliteConnection* database,
+                   LoadedPriorTables* loaded) {
+  if (!database->HasTable("adasfm_position_priors")) return;
+  SqliteStatement statement(
+      database,
+      "SELECT name1, name2, share, position, covariance, antenna_in_cam "
+      "FROM adasfm_position_priors ORDER BY rowid");
+  while (statement.Step()) {
+    const std::optional<image_t> id1 = ids.Resolve(statement.Text(0));
+    const std::optional<image_t> id2 = ids.Resolve(statement.Text(1));
+    if (!id1.has_value() || !id2.has_value()) {
+      ++loaded->num_ignored_rows;
+      continue;
+    }
+    PositionPrior prior = PositionFromRow(statement);
+    prior.image_id1 = *id1;
+    prior.image_id2 = *id2;
+    loaded->tables.positions.push_back(prior);
+  }
+}
+
+void ReadPositionOrigin(SqliteConnection* database, PriorTables* tables) {
+  if (!database->HasTable("adasfm_meta")) return;
+  SqliteStatement statement(
+      database, "SELECT value FROM adasfm_meta WHERE key = 'position_origin'");
+  if (!statement.Step()) return;
+  GeodeticPosition origin;
+  std::istringstream text(statement.Text(0));
+  text.imbue(std::locale::classic());
+  if (!(text >> origin.latitude_deg >> origin.longitude_deg >>
+        origin.height_m)) {
+    throw SqliteError("table adasfm_meta: position_origin is no position");
+  }
+  tables->position_origin = origin;
+}
+
 }  // namespace
 
 StatusOr<LoadedPriorTables> ReadPriorTables(const std::string& database_path) {
@@ -154,6 +210,8 @@ LoadedPriorTables ReadPriorTables(SqliteConnection* database) {
   ReadImageTimes(ids, database, &loaded);
   ReadPriors(ids, database, &loaded);
   ReadGravity(ids, database, &loaded);
+  ReadPositions(ids, database, &loaded);
+  ReadPositionOrigin(database, &loaded.tables);
   return loaded;
 }
 

@@ -28,15 +28,24 @@ struct PhotoHeader {
   int width = 0;
   int height = 0;
   std::optional<double> focal_length_px;
+  // Latitude and longitude in degrees, altitude in m.
+  std::optional<Eigen::Vector3d> position;
 };
 
 std::optional<PhotoHeader> ReadPhotoHeader(const std::string& path) {
   colmap::Bitmap bitmap;
   if (!bitmap.Read(path, /*as_rgb=*/false)) return std::nullopt;
-  PhotoHeader header{bitmap.Width(), bitmap.Height(), std::nullopt};
+  PhotoHeader header{bitmap.Width(), bitmap.Height(), std::nullopt,
+                     std::nullopt};
   double focal_length_px = 0.0;
   if (bitmap.ExifFocalLength(&focal_length_px) && focal_length_px > 0.0) {
     header.focal_length_px = focal_length_px;
+  }
+  Eigen::Vector3d position;
+  if (bitmap.ExifLatitude(&position.x()) &&
+      bitmap.ExifLongitude(&position.y()) &&
+      bitmap.ExifAltitude(&position.z())) {
+    header.position = position;
   }
   return header;
 }
@@ -114,6 +123,8 @@ class ImageWriter {
     image.SetName(name);
     image.SetCameraId(options_.single_camera == 1 ? cameras_.begin()->second
                                                   : entry->second);
+    // Where COLMAP's feature_extractor puts it.
+    if (header.position.has_value()) image.SetTvecPrior(*header.position);
     database_.WriteImage(image);
     ++result_.num_images;
     return Status::Ok();

@@ -13,6 +13,7 @@
 #include "colmap_ext/mapper/part_adjuster.h"
 #include "colmap_ext/mapper/prior_support.h"
 #include "colmap_ext/mapper/register_image.h"
+#include "colmap_ext/scene/georeference.h"
 
 namespace adasfm {
 namespace {
@@ -158,6 +159,10 @@ class ModelRefiner {
     PriorBundleAdjustmentOptions options;
     options.keypoint_sigma_px = options_.keypoint_sigma_px;
     options.shared_errors.enabled = !is_tentative;
+    options.position_loss_scale = is_tentative
+                                      ? options_.initial_position_loss_scale
+                                      : options_.position_loss_scale;
+    AddPositions(&problem);
     options.refine_focal_length = options_.refine_focal_length;
     options.refine_principal_point = options_.refine_principal_point;
     options.refine_extra_params = options_.refine_extra_params;
@@ -174,6 +179,16 @@ class ModelRefiner {
         CorrectSharedErrors(options.shared_errors, adjustment.shared_errors,
                             problem.priors),
         reconstruction_);
+  }
+
+  // The coarse model, and so this one, is in the frame of the positions.
+  void AddPositions(PriorBundleAdjustmentProblem* problem) const {
+    const SceneData& data = *scene_.data;
+    if (data.positions.empty()) return;
+    problem->positions = data.positions;
+    Verticals verticals = FindVerticals(data, *scene_.coarse);
+    problem->gravity_in_cam = std::move(verticals.gravity_in_cam);
+    problem->gravity_sigma_rad = verticals.sigma_rad;
   }
 
   bool IsContradicted(const RelativePosePrior& prior) const {

@@ -26,6 +26,10 @@ struct RefineModelOptions {
   // Parts that were put together need a round with loose thresholds, in which
   // tracks of different parts find each other.
   bool join_parts = true;
+  // Where the robust loss on positions takes over, in sigmas: in the rounds
+  // before the last, as far as the coarse model is bent, and in the last.
+  double initial_position_loss_scale = 3.0;
+  double position_loss_scale = 3.0;
   int num_threads = -1;
 
   bool IsValid(std::string* error) const;

@@ -66,6 +66,14 @@ void AddScene(const SceneData& data, Hash* hash) {
     for (int i = 0; i < 36; ++i) hash->Add(prior.covariance(i));
     hash->Add(prior.flags);
   }
+  for (const PositionPrior& prior : data.positions) {
+    hash->Add(prior.image_id1);
+    hash->Add(prior.image_id2);
+    hash->Add(prior.share);
+    for (int i = 0; i < 3; ++i) hash->Add(prior.position(i));
+    for (int i = 0; i < 9; ++i) hash->Add(prior.covariance(i));
+    for (int i = 0; i < 3; ++i) hash->Add(prior.antenna_in_cam(i));
+  }
 }
 
 void AddBalance(const PriorBalanceOptions& balance, Hash* hash) {
@@ -126,6 +134,8 @@ void AddRefineOptions(const RefineModelOptions& refine, Hash* hash) {
   hash->Add(refine.refine_focal_length);
   hash->Add(refine.refine_principal_point);
   hash->Add(refine.refine_extra_params);
+  hash->Add(refine.initial_position_loss_scale);
+  hash->Add(refine.position_loss_scale);
 }
 
 }  // namespace

@@ -85,7 +85,9 @@ MapperStage::MapperStage(const MapperStageOptions& options,
       part_mapper_(std::move(part_mapper)) {
   std::string error;
   if (!options.IsValid(&error)) throw std::invalid_argument(error);
-  summary_.is_metric = IsMetric(data, coarse);
+  summary_.has_metric_sensors = IsMetric(data, coarse);
+  summary_.is_georeferenced = !data.positions.empty();
+  summary_.is_metric = summary_.has_metric_sensors || summary_.is_georeferenced;
 }
 
 void MapperStage::Report(const std::string& line, double share_done) const {

@@ -53,6 +53,10 @@ struct MapperStageSummary {
   // does; the model was refined from the coarse poses instead.
   bool started_from_coarse_poses = false;
   bool is_metric = false;
+  // Where metres come from: wheels or other odometry, and positions, whose
+  // frame the model then has.
+  bool has_metric_sensors = false;
+  bool is_georeferenced = false;
   bool is_level = false;
   int num_parallel_parts = 0;
   // Of the biggest part, estimated before it runs.
@@ -81,7 +85,8 @@ using PartMapper = std::function<LocalMapResult(
 // Steps 3 and 4 give the model returned; only the last of their folders stays.
 class MapperStage {
  public:
-  // `data` and `coarse` must outlive the stage.
+  // `data` and `coarse` must outlive the stage. If the data has positions, the
+  // coarse poses are in their frame.
   MapperStage(const MapperStageOptions& options, const SceneData& data,
               const CoarsePoseMap& coarse, const std::string& output_path,
               MapperProgress progress = {},

@@ -199,7 +199,8 @@ StatusOr<colmap::Reconstruction> MapperStage::Merge(bool require_all_parts) {
   if (!status.ok()) return status;
   colmap::Reconstruction& model = scene->reconstruction;
   model.TearDown();
-  summary_.is_level = AlignToGravity(data_, &model);
+  summary_.is_level =
+      summary_.is_georeferenced || AlignToGravity(data_, &model);
   summary_.refine_seconds = refine_timer.Seconds();
   summary_.num_images = model.NumRegImages();
   summary_.num_points = model.NumPoints3D();

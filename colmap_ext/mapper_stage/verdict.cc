@@ -260,7 +260,11 @@ Verdict AssessModel(const SceneData& data, const MapperStageSummary& summary,
   Verdict verdict;
   CountImages(data, model, &verdict);
   verdict.is_metric = summary.is_metric;
-  if (summary.is_metric) verdict.metric_source = "wheels";
+  if (summary.has_metric_sensors) verdict.metric_source = "wheels";
+  if (summary.is_georeferenced) {
+    verdict.metric_source +=
+        verdict.metric_source.empty() ? "positions" : " and positions";
+  }
   verdict.priors = ComparePriors(data, model);
   verdict.keypoint_sigma_px = summary.refine.keypoint_sigma_px;
   verdict.keypoint_sigma_factor = summary.refine.keypoint_sigma_factor;

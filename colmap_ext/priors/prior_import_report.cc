@@ -43,12 +43,31 @@ std::string ImuLines(const SensorSummary& summary) {
   return text.str();
 }
 
+std::string PositionLines(const PriorImport& import) {
+  std::ostringstream text;
+  text << "positions           " << import.num_fixes << " fixes, "
+       << import.num_fixes_outside << " of them before or after the images; "
+       << import.tables.positions.size() << " priors\n";
+  for (const auto& [reason, count] : import.num_fixes_left_out) {
+    text << "  left out          " << count << ": " << reason << "\n";
+  }
+  return text.str();
+}
+
 }  // namespace
 
 std::string FormatPriorImport(const PriorImport& import) {
   const SensorSummary& summary = import.summary;
   std::ostringstream text;
   text.precision(4);
+  if (import.num_fixes > 0 && summary.num_priors == 0) {
+    text << "images              " << summary.num_images << " with times\n"
+         << PositionLines(import);
+    for (const std::string& warning : import.warnings) {
+      text << "WARNING: " << warning << "\n";
+    }
+    return text.str();
+  }
   text << "images              " << summary.num_images << " with times, "
        << summary.num_images_in_logs << " inside the logs\n"
        << "priors              " << summary.num_priors << " ("
@@ -80,6 +99,7 @@ std::string FormatPriorImport(const PriorImport& import) {
     text << "expected drift      " << summary.drift_per_100m_m << " m and "
          << summary.drift_per_100m_deg << " deg per 100 m\n";
   }
+  if (import.num_fixes > 0) text << PositionLines(import);
   for (const std::string& warning : import.warnings) {
     text << "WARNING: " << warning << "\n";
   }
@@ -127,6 +147,10 @@ std::string PriorImportToJson(const PriorImport& import) {
       {"distance_m", summary.distance_m},
       {"drift_per_100m_m", summary.drift_per_100m_m},
       {"drift_per_100m_deg", summary.drift_per_100m_deg},
+      {"num_fixes", import.num_fixes},
+      {"num_fixes_outside", import.num_fixes_outside},
+      {"num_fixes_left_out", import.num_fixes_left_out},
+      {"num_position_priors", import.tables.positions.size()},
       {"seconds", import.seconds},
       {"warnings", import.warnings}};
   json["wheel_slips"] = nlohmann::ordered_json::array();

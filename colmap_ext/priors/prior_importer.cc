@@ -15,6 +15,7 @@
 #include "colmap_ext/host/database.h"
 #include "colmap_ext/host/model.h"
 #include "colmap_ext/host/pose_conversion.h"
+#include "colmap_ext/host/pose_prior_table.h"
 #include "colmap_ext/priors/read_sensor_logs.h"
 #include "colmap_ext/scene/image_finder.h"
 #include "colmap_ext/scene/scene_data.h"
@@ -26,6 +27,9 @@
 
 namespace adasfm {
 namespace {
+
+// As --gnss_path.
+constexpr char kStoredPositions[] = "database";
 
 ImageFinder BuildImageFinder(const SceneData& scene) {
   ImageFinder finder;
@@ -135,11 +139,18 @@ Status UseBag(const SensorCalibration& calibration, PriorImportPaths* paths) {
         FindWheelTopic(bag_path, topics, names.wheel, calibration.wheel_type),
         &paths->wheel_path);
   }
+  if (status.ok() && paths->gnss_path.empty()) {
+    status =
+        use(FindGnssTopic(bag_path, topics, names.gnss), &paths->gnss_path);
+  }
   if (!status.ok()) return status;
-  if (!paths->imu_path.empty() || !paths->wheel_path.empty()) return status;
+  if (!paths->imu_path.empty() || !paths->wheel_path.empty() ||
+      !paths->gnss_path.empty()) {
+    return status;
+  }
   return Status::Error(bag_path +
-                       ": no topic of type sensor_msgs/Imu, nor of the wheels "
-                       "that the calibration has");
+                       ": no topic of type sensor_msgs/Imu or NavSatFix, nor "
+                       "of the wheels that the calibration has");
 }
 
 void KeepNearPairs(const std::vector<ImageStamp>& stamps, int max_gap,
@@ -270,11 +281,142 @@ StatusOr<std::map<image_t, Rigid3d>> ReadTrajectoryPoses(
                        "images'");
 }
 
+// Positions of photos, which COLMAP keeps with them.
+StatusOr<std::vector<HostPosition>> ReadStoredPositions(
+    const std::string& database_path) {
+  try {
+    SqliteConnection database(database_path, SqliteConnection::Mode::kRead);
+    std::vector<HostPosition> positions = ReadHostPositions(&database);
+    if (!positions.empty()) return positions;
+  } catch (const SqliteError& error) {
+    return Status::Error(database_path + ": " + error.what());
+  }
+  return Status::Error(database_path +
+                       ": no image has a position, neither in pose_priors nor "
+                       "from EXIF; give a log as --gnss_path");
+}
+
+Eigen::Matrix3d CovarianceOf(const GnssNoise& noise) {
+  const double horizontal = noise.horizontal_m * noise.horizontal_m;
+  return Eigen::Vector3d(horizontal, horizontal,
+                         noise.vertical_m * noise.vertical_m)
+      .asDiagonal();
+}
+
+// Geodetic ones are turned into the ENU frame of the first; a database mixes no
+// systems.
+Status ImportStoredPositions(const PriorImportPaths& paths,
+                             const SensorCalibration& calibration,
+                             const SceneData& scene, PriorImport* import) {
+  const StatusOr<std::vector<HostPosition>> positions =
+      ReadStoredPositions(paths.database_path);
+  if (!positions.ok()) return positions.status();
+  const bool is_geodetic = positions->front().is_geodetic;
+  std::optional<EnuFrame> frame;
+  for (const HostPosition& stored : *positions) {
+    ++import->num_fixes;
+    const Eigen::Vector3d& values = stored.position;
+    const bool is_known = scene.images.count(stored.image_id) > 0 &&
+                          stored.is_geodetic == is_geodetic;
+    if (!is_known || (is_geodetic && values.head<2>().norm() < 1e-6)) {
+      ++import->num_fixes_left_out[is_known ? "no fix (0, 0)"
+                                            : "another coordinate system"];
+      continue;
+    }
+    PositionPrior prior;
+    prior.image_id1 = prior.image_id2 = stored.image_id;
+    prior.position = values;
+    prior.covariance =
+        stored.covariance.value_or(CovarianceOf(calibration.gnss_noise));
+    if (is_geodetic) {
+      if (std::abs(values.x()) > 90.0 || std::abs(values.y()) > 360.0) {
+        return Status::Error(paths.database_path + ": image " +
+                             scene.images.at(stored.image_id).name +
+                             " has a latitude beyond 90 degrees");
+      }
+      const GeodeticPosition position{values.x(), values.y(), values.z()};
+      if (!frame.has_value()) {
+        frame.emplace(position);
+        import->tables.position_origin = position;
+      }
+      prior.position = frame->EnuFromGeodetic(position);
+    }
+    import->tables.positions.push_back(prior);
+  }
+  return Status::Ok();
+}
+
+// Adds the positions of the log or the database to the tables.
+Status ImportPositions(const PriorImportPaths& paths,
+                       const PositionPriorOptions& options,
+                       const SensorCalibration& calibration,
+                       const SceneData& scene,
+                       const std::vector<ImageStamp>& stamps,
+                       PriorImport* import) {
+  if (paths.gnss_path.empty()) return Status::Ok();
+  if (paths.gnss_path == kStoredPositions) {
+    return ImportStoredPositions(paths, calibration, scene, import);
+  }
+  const StatusOr<GnssLog> log =
+      ReadGnss(paths.gnss_path, calibration.gnss_noise, &import->warnings);
+  if (!log.ok()) return log.status();
+  StatusOr<PositionPriors> positions =
+      ComputePositionPriors(options, calibration, stamps, log->fixes);
+  if (!positions.ok()) {
+    return Status::Error(paths.gnss_path + ": " + positions.status().message());
+  }
+  if (!calibration.has_gnss) {
+    import->warnings.push_back(
+        "the calibration has no gnss0, so the antenna is taken to be at the "
+        "camera, and the noise of positions that state none to be 2 m");
+  }
+  import->num_fixes = positions->num_fixes;
+  import->num_fixes_outside = positions->num_fixes_outside;
+  import->num_fixes_left_out = log->num_left_out;
+  import->tables.positions = std::move(positions->priors);
+  import->tables.position_origin = positions->origin;
+  return Status::Ok();
+}
+
+bool HasMotionLogs(const PriorImportPaths& paths) {
+  return !paths.imu_path.empty() || !paths.wheel_path.empty();
+}
+
+StatusOr<SensorCalibration> ReadCalibrationIfGiven(const std::string& path) {
+  if (path.empty()) return SensorCalibration();
+  return ReadSensorCalibration(path);
+}
+
+// Positions alone, without logs of motions.
+StatusOr<PriorImport> ImportPositionsOnly(const PriorImportPaths& paths,
+                                          const PriorImportOptions& options) {
+  const auto start = std::chrono::steady_clock::now();
+  const StatusOr<SensorCalibration> calibration =
+      ReadCalibrationIfGiven(paths.sensors_path);
+  if (!calibration.ok()) return calibration.status();
+  const StatusOr<SceneData> scene = ReadScene(paths.database_path);
+  if (!scene.ok()) return scene.status();
+  PriorImport import;
+  // Stored positions need no times.
+  StatusOr<std::vector<ImageStamp>> stamps = std::vector<ImageStamp>();
+  if (paths.gnss_path != kStoredPositions || !paths.image_times_path.empty()) {
+    stamps = StampImages(paths.image_times_path, *scene, &import);
+  }
+  if (!stamps.ok()) return stamps.status();
+  const Status status = ImportPositions(paths, options.positions, *calibration,
+                                        *scene, *stamps, &import);
+  if (!status.ok()) return status;
+  import.summary.num_images = stamps->size();
+  import.seconds =
+      std::chrono::duration<double>(std::chrono::steady_clock::now() - start)
+          .count();
+  return import;
+}
+
 // Priors of a trajectory, without logs and without a smoother.
 StatusOr<PriorImport> ImportTrajectory(const PriorImportPaths& paths,
                                        const PriorImportOptions& options) {
-  if (!paths.imu_path.empty() || !paths.wheel_path.empty() ||
-      !paths.bag_path.empty()) {
+  if (HasMotionLogs(paths) || !paths.bag_path.empty()) {
     return Status::Error(
         "--trajectory_path stands for all logs; to smooth a trajectory "
         "with an IMU give it as --wheel_path of type odometry");
@@ -291,6 +433,12 @@ StatusOr<PriorImport> ImportTrajectory(const PriorImportPaths& paths,
   if (!poses.ok()) return poses.status();
   import.tables.priors =
       ComputeTrajectoryPriors(*stamps, *poses, options.trajectory);
+  const StatusOr<SensorCalibration> calibration =
+      ReadCalibrationIfGiven(paths.sensors_path);
+  if (!calibration.ok()) return calibration.status();
+  const Status status = ImportPositions(paths, options.positions, *calibration,
+                                        *scene, *stamps, &import);
+  if (!status.ok()) return status;
   SensorSummary& summary = import.summary;
   summary.num_images = stamps->size();
   summary.num_images_in_logs = poses->size();
@@ -314,7 +462,8 @@ bool PriorImportOptions::IsValid(std::string* error) const {
              std::to_string(max_visual_gap) + "; it must be positive";
     return false;
   }
-  return estimation.IsValid(error) && trajectory.IsValid(error);
+  return estimation.IsValid(error) && trajectory.IsValid(error) &&
+         positions.IsValid(error);
 }
 
 StatusOr<PriorImport> ComputePriorImport(const PriorImportPaths& given_paths,
@@ -323,11 +472,11 @@ StatusOr<PriorImport> ComputePriorImport(const PriorImportPaths& given_paths,
   Status status = CheckDatabase(paths.database_path);
   if (!status.ok()) return status;
   if (!paths.trajectory_path.empty()) return ImportTrajectory(paths, options);
-  if (paths.imu_path.empty() && paths.wheel_path.empty() &&
-      paths.bag_path.empty()) {
+  if (!HasMotionLogs(paths) && paths.bag_path.empty()) {
+    if (!paths.gnss_path.empty()) return ImportPositionsOnly(paths, options);
     return Status::Error(
-        "no sensor log; give --imu_path, --wheel_path or both, --bag_path or "
-        "--trajectory_path");
+        "no sensor log; give --imu_path, --wheel_path or both, --gnss_path, "
+        "--bag_path or --trajectory_path");
   }
   if (paths.sensors_path.empty()) {
     return Status::Error(
@@ -339,6 +488,7 @@ StatusOr<PriorImport> ComputePriorImport(const PriorImportPaths& given_paths,
   const auto start = std::chrono::steady_clock::now();
   if (!paths.bag_path.empty()) status = UseBag(*calibration, &paths);
   if (!status.ok()) return status;
+  if (!HasMotionLogs(paths)) return ImportPositionsOnly(paths, options);
   PriorImport import;
   SensorLogs logs;
   status = ReadSensorLogs(paths, *calibration, &logs, &import);
@@ -349,6 +499,9 @@ StatusOr<PriorImport> ComputePriorImport(const PriorImportPaths& given_paths,
   const StatusOr<std::vector<ImageStamp>> stamps =
       StampImages(paths.image_times_path, *scene, &import);
   if (!stamps.ok()) return stamps.status();
+  status = ImportPositions(paths, options.positions, *calibration, *scene,
+                           *stamps, &import);
+  if (!status.ok()) return status;
   std::map<image_t, std::string> names;
   for (const ImageStamp& stamp : *stamps) names[stamp.image_id] = stamp.name;
   KeepNearPairs(*stamps, options.max_visual_gap, &scene->pairs);

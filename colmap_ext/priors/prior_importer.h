@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <map>
 #include <string>
 #include <vector>
 
@@ -9,6 +10,7 @@
 #include "sensors/estimate_priors.h"
 #include "sensors/io/bag_topics.h"
 #include "sensors/log_cleaning/log_fault.h"
+#include "sensors/position_priors.h"
 #include "sensors/trajectory_priors.h"
 
 namespace adasfm {
@@ -19,6 +21,9 @@ struct PriorImportPaths {
   std::string image_times_path;
   std::string imu_path;
   std::string wheel_path;
+  // Positions (sensors/io/read_gnss.h), or "database" for those that COLMAP has
+  // stored in the database.
+  std::string gnss_path;
   std::string sensors_path;
   // A bag with the logs that have no path of their own.
   std::string bag_path;
@@ -31,6 +36,7 @@ struct PriorImportPaths {
 struct PriorImportOptions {
   PriorEstimationOptions estimation;
   TrajectoryPriorOptions trajectory;
+  PositionPriorOptions positions;
   // Two-view rotations are taken from images at most this many apart in time:
   // rotations grow with the gap, but so does the chance of a wrong pair.
   int max_visual_gap = 3;
@@ -47,7 +53,11 @@ struct PriorImport {
   std::vector<std::string> warnings;
   // Samples that were left out of the logs.
   std::vector<LogFault> log_faults;
-  double seconds = 0.0;  // that it took
+  // Of the positions.
+  int num_fixes = 0;
+  int num_fixes_outside = 0;
+  std::map<std::string, int> num_fixes_left_out;  // by reason
+  double seconds = 0.0;                           // that it took
 };
 
 // (1) Reads the scene, the calibration and the logs, (2) gives the images their

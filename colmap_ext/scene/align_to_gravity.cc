@@ -2,19 +2,23 @@
 #include "colmap_ext/scene/align_to_gravity.h"
 
 #include <algorithm>
-#include <map>
 #include <vector>
 
 #include "colmap_ext/host/pose_conversion.h"
-#include "core/sim3d.h"
 
 namespace adasfm {
 
 std::optional<Eigen::Vector3d> FindGravityInWorld(
     const SceneData& scene, const colmap::Reconstruction& reconstruction,
     const Eigen::Quaterniond& camera_mount) {
+  return FindGravityInWorld(scene, CamsFromWorld(reconstruction), camera_mount);
+}
+
+std::optional<Eigen::Vector3d> FindGravityInWorld(
+    const SceneData& scene, const std::map<image_t, Rigid3d>& cams_from_world,
+    const Eigen::Quaterniond& camera_mount) {
   std::vector<Eigen::Vector3d> directions;
-  for (const auto& [image_id, pose] : CamsFromWorld(reconstruction)) {
+  for (const auto& [image_id, pose] : cams_from_world) {
     const auto image = scene.images.find(image_id);
     if (image == scene.images.end() || !image->second.gravity_in_cam) continue;
     directions.push_back(pose.rotation.conjugate() * camera_mount *
@@ -36,6 +40,18 @@ std::optional<Eigen::Vector3d> FindGravityInWorld(
   return median.normalized();
 }
 
+void TransformReconstruction(const Sim3d& new_from_old,
+                             colmap::Reconstruction* reconstruction) {
+  for (const auto& [image_id, pose] : CamsFromWorld(*reconstruction)) {
+    SetCamFromWorld(TransformCamFromWorld(new_from_old, pose),
+                    &reconstruction->Image(image_id));
+  }
+  for (const colmap::point3D_t point_id : reconstruction->Point3DIds()) {
+    colmap::Point3D& point = reconstruction->Point3D(point_id);
+    point.SetXYZ(new_from_old * point.XYZ());
+  }
+}
+
 bool AlignToGravity(const SceneData& scene,
                     colmap::Reconstruction* reconstruction,
                     const Eigen::Quaterniond& camera_mount) {
@@ -47,14 +63,7 @@ bool AlignToGravity(const SceneData& scene,
       Eigen::Quaterniond::FromTwoVectors(*gravity, -Eigen::Vector3d::UnitZ());
   const Eigen::Vector3d origin = poses.begin()->second.TargetOriginInSource();
   const Sim3d new_from_old(1.0, level_from_world, level_from_world * -origin);
-  for (const auto& [image_id, pose] : poses) {
-    SetCamFromWorld(TransformCamFromWorld(new_from_old, pose),
-                    &reconstruction->Image(image_id));
-  }
-  for (const colmap::point3D_t point_id : reconstruction->Point3DIds()) {
-    colmap::Point3D& point = reconstruction->Point3D(point_id);
-    point.SetXYZ(new_from_old * point.XYZ());
-  }
+  TransformReconstruction(new_from_old, reconstruction);
   return true;
 }
 

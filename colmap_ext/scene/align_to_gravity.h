@@ -4,9 +4,11 @@
 #include <base/reconstruction.h>
 
 #include <Eigen/Geometry>
+#include <map>
 #include <optional>
 
 #include "colmap_ext/scene/scene_data.h"
+#include "core/sim3d.h"
 
 namespace adasfm {
 
@@ -18,6 +20,15 @@ namespace adasfm {
 std::optional<Eigen::Vector3d> FindGravityInWorld(
     const SceneData& scene, const colmap::Reconstruction& reconstruction,
     const Eigen::Quaterniond& camera_mount = Eigen::Quaterniond::Identity());
+
+// The same of poses.
+std::optional<Eigen::Vector3d> FindGravityInWorld(
+    const SceneData& scene, const std::map<image_t, Rigid3d>& cams_from_world,
+    const Eigen::Quaterniond& camera_mount = Eigen::Quaterniond::Identity());
+
+// Moves poses and points into another world.
+void TransformReconstruction(const Sim3d& new_from_old,
+                             colmap::Reconstruction* reconstruction);
 
 // Turns the world, by the smallest turn, so that gravity points along -z, and
 // moves its origin to the registered camera of the lowest id. False, and

@@ -49,6 +49,8 @@ void ReadScenePriors(SqliteConnection* database,
   }
   Eigen::Quaterniond camera_mount = Eigen::Quaterniond::Identity();
   scene->priors = std::move(loaded.tables.priors);
+  scene->positions = std::move(loaded.tables.positions);
+  scene->position_origin = loaded.tables.position_origin;
   if (!options.use_original_two_view_geometries) {
     ApplyPriorCorrections(database, &scene->priors);
     camera_mount = ReadCameraMount(database).value_or(camera_mount);

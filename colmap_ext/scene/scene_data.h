@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "core/position_prior.h"
 #include "core/relative_pose_prior.h"
 #include "core/rigid3d.h"
 #include "core/status.h"
@@ -52,6 +53,10 @@ struct SceneData {
   std::vector<ScenePair> pairs;
   // Consecutive images, sorted by time. Empty without sensors.
   std::vector<RelativePosePrior> priors;
+  // Of GNSS or the like, in the ENU frame of the origin or, without one, in a
+  // metric frame of their own.
+  std::vector<PositionPrior> positions;
+  std::optional<GeodeticPosition> position_origin;
   // For the user: what was left out, and why.
   std::vector<std::string> warnings;
 };

@@ -47,6 +47,7 @@ StatusOr<StepInputs> DigestBag(const std::string& path,
       {"image_topic", options.topics.image},
       {"imu_topic", options.topics.imu},
       {"wheel_topic", options.topics.wheel},
+      {"gnss_topic", options.topics.gnss},
       {"image_step", std::to_string(options.photos.image_step)},
       {"image_distance_m", std::to_string(options.photos.image_distance_m)},
       {"has_calibration", std::to_string(options.has_calibration)},
@@ -65,6 +66,7 @@ void UseBagFiles(const BagFiles& files, AutomaticReconstructionOptions* options,
   fill(files.image_times_path, &paths->image_times_path);
   fill(files.imu_path, &paths->imu_path);
   fill(files.wheel_path, &paths->wheel_path);
+  fill(files.gnss_path, &paths->gnss_path);
   fill(files.sensors_path, &paths->sensors_path);
   FeatureOptions& features = options->features;
   // One topic is one camera.
@@ -141,7 +143,7 @@ class Reconstructor {
   Status ExtractAll(const std::vector<std::string>& names);
   Status Matching();
   Status Priors();
-  bool HasSensors() const {
+  bool HasMotionLogs() const {
     return !paths_.imu_path.empty() || !paths_.wheel_path.empty();
   }
   StatusOr<StepInputs> DigestSensors() const;
@@ -330,7 +332,7 @@ Status Reconstructor::Matching() {
 }
 
 Status Reconstructor::ImportForPairs(const ProgressCallback& progress) const {
-  if (!HasSensors()) return Status::Ok();
+  if (!HasMotionLogs()) return Status::Ok();
   const StatusOr<LoadedPriorTables> tables = ReadPriorTables(database_path_);
   if (!tables.ok() || !tables->tables.priors.empty()) return tables.status();
   progress("reading the logs", 0.0);
@@ -343,22 +345,32 @@ StatusOr<PriorImport> Reconstructor::Import() const {
   paths.image_times_path = paths_.image_times_path;
   paths.imu_path = paths_.imu_path;
   paths.wheel_path = paths_.wheel_path;
+  paths.gnss_path = paths_.gnss_path;
   paths.sensors_path = paths_.sensors_path;
   return ImportPriors(options_.priors, paths, database_path_ + ".priors.json");
 }
 
 StatusOr<StepInputs> Reconstructor::DigestSensors() const {
-  return DigestPaths({{"image_times", paths_.image_times_path},
-                      {"imu", paths_.imu_path},
-                      {"wheel", paths_.wheel_path},
-                      {"sensors", paths_.sensors_path}});
+  // "database" is no file.
+  const bool has_stored_positions = paths_.gnss_path == "database";
+  StatusOr<StepInputs> inputs =
+      DigestPaths({{"image_times", paths_.image_times_path},
+                   {"imu", paths_.imu_path},
+                   {"wheel", paths_.wheel_path},
+                   {"gnss", has_stored_positions ? "" : paths_.gnss_path},
+                   {"sensors", paths_.sensors_path}});
+  if (inputs.ok() && has_stored_positions) {
+    inputs.value()["gnss"] = paths_.gnss_path;
+  }
+  return inputs;
 }
 
 Status Reconstructor::Priors() {
   const StatusOr<StepInputs> inputs = DigestSensors();
   if (!inputs.ok()) return inputs.status();
   const auto reset = [this] { return ResetPriors(database_path_); };
-  const bool has_sensors = HasSensors();
+  const bool has_motion_logs = HasMotionLogs();
+  const bool has_sensors = has_motion_logs || !paths_.gnss_path.empty();
   const auto work = [&]() -> Status {
     if (!has_sensors) return Status::Ok();
     ProgressIn(kPriors, "priors")("reading the logs", 0.0);
@@ -371,7 +383,9 @@ Status Reconstructor::Priors() {
     if (!has_sensors) return Status::Ok();
     const StatusOr<LoadedPriorTables> tables = ReadPriorTables(database_path_);
     if (!tables.ok()) return tables.status();
-    return tables->tables.priors.empty()
+    const bool is_missing = has_motion_logs ? tables->tables.priors.empty()
+                                            : tables->tables.positions.empty();
+    return is_missing
                ? Status::Error("the priors are missing in " + database_path_)
                : Status::Ok();
   };

@@ -48,6 +48,7 @@ struct AutomaticReconstructionPaths {
   std::string image_times_path;
   std::string imu_path;
   std::string wheel_path;
+  std::string gnss_path;
   std::string sensors_path;
   std::string ground_truth_path;
 };

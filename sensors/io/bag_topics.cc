@@ -101,6 +101,13 @@ StatusOr<std::optional<BagTopic>> FindImuTopic(
                       "--imu_topic");
 }
 
+StatusOr<std::optional<BagTopic>> FindGnssTopic(
+    const std::string& bag_path, const std::vector<BagTopic>& topics,
+    const std::string& name) {
+  return FindBagTopic(bag_path, topics, {"sensor_msgs/NavSatFix"}, name,
+                      "--gnss_topic");
+}
+
 StatusOr<std::optional<BagTopic>> FindWheelTopic(
     const std::string& bag_path, const std::vector<BagTopic>& topics,
     const std::string& name, const std::optional<WheelType>& wheel_type) {
@@ -145,11 +152,9 @@ StatusOr<BagTopics> FindDriveTopics(
   const auto wheel = FindWheelTopic(bag_path, topics, names.wheel, wheel_type);
   if (!wheel.ok()) return wheel.status();
   chosen.wheel = *wheel;
-  std::vector<BagTopic> fixes;
-  for (const BagTopic& topic : topics) {
-    if (IsOneOf(topic, {"sensor_msgs/NavSatFix"})) fixes.push_back(topic);
-  }
-  if (fixes.size() == 1) chosen.gnss = fixes[0];
+  const auto gnss = FindGnssTopic(bag_path, topics, names.gnss);
+  if (!gnss.ok()) return gnss.status();
+  chosen.gnss = *gnss;
   return chosen;
 }
 

@@ -17,6 +17,7 @@ struct BagTopicNames {
   std::string imu;
   std::string wheel;
   std::string image;
+  std::string gnss;
 };
 
 constexpr char kNoBagTopic[] = "none";
@@ -27,7 +28,7 @@ struct BagTopics {
   std::optional<BagTopic> wheel;
   std::optional<BagTopic> image;
   std::optional<BagTopic> camera_info;  // beside the image's topic
-  std::optional<BagTopic> gnss;         // the only one of its type
+  std::optional<BagTopic> gnss;
 };
 
 // The message types of a wheel log: nav_msgs/Odometry for kOdometry, its twist
@@ -45,6 +46,11 @@ StatusOr<std::optional<BagTopic>> FindBagTopic(
 
 // The topic of the IMU.
 StatusOr<std::optional<BagTopic>> FindImuTopic(
+    const std::string& bag_path, const std::vector<BagTopic>& topics,
+    const std::string& name);
+
+// The topic of the positions.
+StatusOr<std::optional<BagTopic>> FindGnssTopic(
     const std::string& bag_path, const std::vector<BagTopic>& topics,
     const std::string& name);
 

@@ -67,6 +67,22 @@ class CalibrationReader {
     Fail(name, text.str());
   }
 
+  Eigen::Vector3d Vector(const YAML::Node& section,
+                         const std::string& name) const {
+    const YAML::Node node = section[name];
+    if (!node) {
+      Fail(name, "is missing; add three numbers (docs/reference/sensors.md)");
+    }
+    if (!node.IsSequence() || node.size() != 3) Fail(name, "is not 3 numbers");
+    Eigen::Vector3d vector;
+    for (int i = 0; i < 3; ++i) {
+      if (!node[i].IsScalar() || !ParseDouble(node[i].Scalar(), &vector(i))) {
+        Fail(name, "holds something that is not a number");
+      }
+    }
+    return vector;
+  }
+
   Rigid3d Transform(const YAML::Node& section, const std::string& name) const {
     const YAML::Node node = section[name];
     if (!node)
@@ -171,6 +187,28 @@ void ReadWheelSection(const CalibrationReader& reader, const YAML::Node& wheel,
   calibration->imu_from_wheel = reader.Transform(wheel, "T_imu_wheel");
 }
 
+void ReadGnssSection(const CalibrationReader& reader, const YAML::Node& gnss,
+                     SensorCalibration* calibration) {
+  calibration->has_gnss = true;
+  if (gnss["T_imu_gnss"]) {
+    calibration->antenna_in_imu =
+        reader.Transform(gnss, "T_imu_gnss").translation;
+  } else {
+    calibration->antenna_in_imu = reader.Vector(gnss, "p_imu_antenna");
+  }
+  calibration->timeshift_gnss_imu_s =
+      reader.NumberOr(gnss, "timeshift_gnss_imu", 0.0);
+  GnssNoise& noise = calibration->gnss_noise;
+  if (gnss["horizontal_noise"]) {
+    noise.horizontal_m =
+        reader.InRange(gnss, "horizontal_noise", 1e-3, 100.0, "m");
+    noise.vertical_m = 2.0 * noise.horizontal_m;
+  }
+  if (gnss["vertical_noise"]) {
+    noise.vertical_m = reader.InRange(gnss, "vertical_noise", 1e-3, 1e3, "m");
+  }
+}
+
 }  // namespace
 
 StatusOr<SensorCalibration> ReadSensorCalibration(const std::string& path) {
@@ -199,6 +237,9 @@ StatusOr<SensorCalibration> ReadSensorCalibration(const std::string& path) {
     }
     if (root["wheel0"] && root["wheel0"].IsMap()) {
       ReadWheelSection(reader, root["wheel0"], &calibration);
+    }
+    if (root["gnss0"] && root["gnss0"].IsMap()) {
+      ReadGnssSection(reader, root["gnss0"], &calibration);
     }
     return calibration;
   } catch (const YAML::Exception& exception) {

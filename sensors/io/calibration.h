@@ -6,6 +6,7 @@
 #include "core/rigid3d.h"
 #include "core/sensor_log.h"
 #include "core/status.h"
+#include "sensors/io/read_gnss.h"
 
 namespace adasfm {
 
@@ -27,6 +28,13 @@ struct SensorCalibration {
   double wheel_speed_noise = 0.05;     // m/s, 1 sigma of one sample
   double wheel_yaw_rate_noise = 0.02;  // rad/s, 1 sigma of one sample
   Rigid3d imu_from_wheel;
+
+  bool has_gnss = false;
+  GnssNoise gnss_noise;
+  // Where the antenna's phase centre is, in the IMU frame, m.
+  Eigen::Vector3d antenna_in_imu = Eigen::Vector3d::Zero();
+  // t_imu = t_gnss + shift.
+  double timeshift_gnss_imu_s = 0.0;
 };
 
 // Reads the YAML file of docs/reference/sensors.md (Kalibr's keys). Every error

@@ -91,10 +91,14 @@ StatusOr<LogFile> LogFile::Parse(const std::string& path, std::string text) {
   return file;
 }
 
+std::string_view LogFile::Text(size_t index) const {
+  return LineAt(text_, line_begins_[index]);
+}
+
 LogLine LogFile::Line(size_t index) const {
   LogLine result;
   result.number = line_numbers_[index];
-  std::string_view rest = LineAt(text_, line_begins_[index]);
+  std::string_view rest = Text(index);
   while (true) {
     const size_t end = has_commas_ ? rest.find(',') : rest.find_first_of(" \t");
     result.fields.push_back(Trim(rest.substr(0, end)));

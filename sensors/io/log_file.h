@@ -33,6 +33,8 @@ class LogFile {
   bool has_commas() const { return has_commas_; }
   size_t num_lines() const { return line_begins_.size(); }
   LogLine Line(size_t index) const;
+  // The same line in one piece, without white space around it.
+  std::string_view Text(size_t index) const;
   size_t LineNumber(size_t index) const { return line_numbers_[index]; }
 
   // "path, line 7: text".

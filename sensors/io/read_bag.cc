@@ -100,6 +100,20 @@ StatusOr<std::vector<ImuSample>> ReadBagImu(
   return RequireSamples(path, std::move(logs->imu));
 }
 
+StatusOr<std::vector<RosNavSatFix>> ReadBagGnss(
+    const std::string& path, std::vector<std::string>* warnings) {
+  StatusOr<BagLogs> logs = ReadOneLog(
+      path,
+      [](const BagPath& bag, const std::vector<BagTopic>& topics,
+         BagTopics* chosen) {
+        return RequireTopic(FindGnssTopic(bag.file, topics, bag.topic),
+                            bag.file, "sensor_msgs/NavSatFix", &chosen->gnss);
+      },
+      std::nullopt, warnings);
+  if (!logs.ok()) return logs.status();
+  return RequireSamples(path, std::move(logs->gnss));
+}
+
 StatusOr<std::vector<OdometryPose>> ReadBagOdometry(
     const std::string& path, std::vector<std::string>* warnings) {
   StatusOr<BagLogs> logs = ReadWheelLog(path, WheelType::kOdometry, warnings);

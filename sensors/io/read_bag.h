@@ -6,6 +6,7 @@
 
 #include "core/sensor_log.h"
 #include "core/status.h"
+#include "sensors/bags/ros_messages.h"
 
 namespace adasfm {
 
@@ -17,6 +18,8 @@ bool IsBagPath(const std::string& path);
 StatusOr<std::vector<ImuSample>> ReadBagImu(const std::string& path,
                                             std::vector<std::string>* warnings);
 StatusOr<std::vector<OdometryPose>> ReadBagOdometry(
+    const std::string& path, std::vector<std::string>* warnings);
+StatusOr<std::vector<RosNavSatFix>> ReadBagGnss(
     const std::string& path, std::vector<std::string>* warnings);
 // Of every type but kOdometry.
 StatusOr<std::vector<WheelSample>> ReadBagWheel(

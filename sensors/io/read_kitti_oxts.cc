@@ -2,7 +2,9 @@
 #include "sensors/io/read_kitti_oxts.h"
 
 #include <cstdio>
+#include <functional>
 
+#include "sensors/io/calendar.h"
 #include "sensors/io/log_file.h"
 
 namespace adasfm {
@@ -12,18 +14,8 @@ namespace {
 constexpr size_t kMinNumFields = 20;
 constexpr size_t kForceField = 11;
 constexpr size_t kRateField = 17;
+constexpr size_t kPositionSigmaField = 23;
 constexpr timestamp_t kSecondNs = 1'000'000'000;
-
-// Days since 1970-01-01 in the Gregorian calendar, from the day count of whole
-// years that begin in March, so that a leap day ends its year.
-int64_t DaysSinceEpoch(int64_t year, int64_t month, int64_t day) {
-  const int64_t march_year = month <= 2 ? year - 1 : year;
-  const int64_t march_month = (month + 9) % 12;
-  const int64_t days = 365 * march_year + march_year / 4 - march_year / 100 +
-                       march_year / 400 + (153 * march_month + 2) / 5 + day - 1;
-  constexpr int64_t kDaysToEpoch = 719468;
-  return days - kDaysToEpoch;
-}
 
 // "2011-09-26 13:02:25.594360375".
 bool ParseDateTime(const LogLine& line, timestamp_t* timestamp_ns) {
@@ -51,16 +43,16 @@ bool ParseDateTime(const LogLine& line, timestamp_t* timestamp_ns) {
   return true;
 }
 
-}  // namespace
-
-StatusOr<std::vector<ImuSample>> ReadKittiOxts(const std::string& folder) {
+// Calls read(time, file, line) for every packet.
+Status ForEachPacket(const std::string& folder,
+                     const std::function<Status(timestamp_t, const LogFile&,
+                                                const LogLine&)>& read) {
   const StatusOr<LogFile> times = LogFile::Read(folder + "/timestamps.txt");
   if (!times.ok()) return times.status();
-  std::vector<ImuSample> samples;
   for (size_t i = 0; i < times->num_lines(); ++i) {
     const LogLine time_line = times->Line(i);
-    ImuSample sample;
-    if (!ParseDateTime(time_line, &sample.timestamp_ns)) {
+    timestamp_t timestamp_ns = 0;
+    if (!ParseDateTime(time_line, &timestamp_ns)) {
       return times->Error(time_line.number,
                           "is not 'YYYY-MM-DD hh:mm:ss.fraction'");
     }
@@ -74,16 +66,53 @@ StatusOr<std::vector<ImuSample>> ReadKittiOxts(const std::string& folder) {
                                           std::to_string(line.fields.size()) +
                                           " columns; an oxts packet has 30");
     }
+    const Status status = read(timestamp_ns, *data, line);
+    if (!status.ok()) return status;
+  }
+  return Status::Ok();
+}
+
+}  // namespace
+
+StatusOr<std::vector<ImuSample>> ReadKittiOxts(const std::string& folder) {
+  std::vector<ImuSample> samples;
+  const auto read = [&](timestamp_t timestamp_ns, const LogFile& data,
+                        const LogLine& line) {
+    ImuSample sample;
+    sample.timestamp_ns = timestamp_ns;
     double values[3];
-    Status status = ParseNumbers(*data, line, kForceField, 3, values);
+    Status status = ParseNumbers(data, line, kForceField, 3, values);
     if (!status.ok()) return status;
     sample.specific_force << values[0], values[1], values[2];
-    status = ParseNumbers(*data, line, kRateField, 3, values);
+    status = ParseNumbers(data, line, kRateField, 3, values);
     if (!status.ok()) return status;
     sample.angular_velocity << values[0], values[1], values[2];
     samples.push_back(sample);
-  }
+    return status;
+  };
+  const Status status = ForEachPacket(folder, read);
+  if (!status.ok()) return status;
   return samples;
+}
+
+StatusOr<std::vector<KittiOxtsFix>> ReadKittiOxtsFixes(
+    const std::string& folder) {
+  std::vector<KittiOxtsFix> fixes;
+  const auto read = [&](timestamp_t timestamp_ns, const LogFile& data,
+                        const LogLine& line) {
+    double values[3];
+    Status status = ParseNumbers(data, line, 0, 3, values);
+    if (!status.ok()) return status;
+    KittiOxtsFix fix{timestamp_ns, values[0], values[1], values[2], 0.0};
+    if (line.fields.size() > kPositionSigmaField) {
+      status = ParseNumbers(data, line, kPositionSigmaField, 1, &fix.sigma_m);
+    }
+    fixes.push_back(fix);
+    return status;
+  };
+  const Status status = ForEachPacket(folder, read);
+  if (!status.ok()) return status;
+  return fixes;
 }
 
 }  // namespace adasfm

@@ -44,7 +44,19 @@ class PriorTablesTest : public testing::Test {
       prior.covariance = root * root.transpose();
       prior.flags = kPriorRotation | kPriorDirection | kPriorLength;
       tables.priors.push_back(prior);
+      PositionPrior position;
+      position.image_id1 = prior.image_id1;
+      position.image_id2 = i % 2 == 0 ? prior.image_id1 : prior.image_id2;
+      position.share = i % 2 == 0 ? 0.0 : random.Uniform(0.0, 1.0);
+      position.position = random.GaussianVector(100.0);
+      position.covariance =
+          root.topLeftCorner<3, 3>() * root.topLeftCorner<3, 3>().transpose() +
+          Eigen::Matrix3d::Identity();
+      position.antenna_in_cam = random.GaussianVector(1.0);
+      tables.positions.push_back(position);
     }
+    tables.position_origin = GeodeticPosition{
+        random.Uniform(-90.0, 90.0), random.Uniform(-180.0, 180.0), 512.3};
     // The last one has seen no translation.
     RelativePosePrior& last = tables.priors.back();
     last.flags = kPriorRotation;
@@ -89,6 +101,20 @@ void ExpectEqual(const PriorTables& a, const PriorTables& b) {
     EXPECT_EQ(a.gravity[i].image_id, b.gravity[i].image_id);
     EXPECT_EQ(a.gravity[i].gravity_in_cam, b.gravity[i].gravity_in_cam);
   }
+  ASSERT_EQ(a.positions.size(), b.positions.size());
+  for (size_t i = 0; i < a.positions.size(); ++i) {
+    EXPECT_EQ(a.positions[i].image_id1, b.positions[i].image_id1);
+    EXPECT_EQ(a.positions[i].image_id2, b.positions[i].image_id2);
+    EXPECT_EQ(a.positions[i].share, b.positions[i].share);
+    EXPECT_EQ(a.positions[i].position, b.positions[i].position);
+    EXPECT_EQ(a.positions[i].covariance, b.positions[i].covariance);
+    EXPECT_EQ(a.positions[i].antenna_in_cam, b.positions[i].antenna_in_cam);
+  }
+  ASSERT_EQ(a.position_origin.has_value(), b.position_origin.has_value());
+  if (!a.position_origin) return;
+  EXPECT_EQ(a.position_origin->latitude_deg, b.position_origin->latitude_deg);
+  EXPECT_EQ(a.position_origin->longitude_deg, b.position_origin->longitude_deg);
+  EXPECT_EQ(a.position_origin->height_m, b.position_origin->height_m);
 }
 
 TEST_F(PriorTablesTest, WithoutTablesThereIsNothing) {
@@ -113,6 +139,25 @@ TEST_F(PriorTablesTest, ReadsWhatWasWrittenLast) {
   EXPECT_EQ(scene->priors.size(), 5);
   EXPECT_EQ(scene->images.at(2).timestamp_ns, world_.images[1].timestamp_ns);
   EXPECT_TRUE(scene->images.at(2).gravity_in_cam.has_value());
+}
+
+// As written before there were positions, and again after an import without.
+TEST_F(PriorTablesTest, DatabasesWithoutPositionsAreRead) {
+  PriorTables tables = MakeTables(1);
+  ASSERT_TRUE(WritePriorTables(path_, tables).ok());
+  Execute(
+      "DROP TABLE adasfm_position_priors;"
+      "DELETE FROM adasfm_meta WHERE key = 'position_origin';");
+  tables.positions.clear();
+  tables.position_origin.reset();
+  StatusOr<LoadedPriorTables> loaded = ReadPriorTables(path_);
+  ASSERT_TRUE(loaded.ok()) << loaded.status().message();
+  ExpectEqual(loaded->tables, tables);
+  ASSERT_TRUE(WritePriorTables(path_, MakeTables(2)).ok());
+  ASSERT_TRUE(WritePriorTables(path_, tables).ok());
+  loaded = ReadPriorTables(path_);
+  ASSERT_TRUE(loaded.ok());
+  ExpectEqual(loaded->tables, tables);
 }
 
 TEST_F(PriorTablesTest, UserVersionStays) {
@@ -142,8 +187,10 @@ TEST_F(PriorTablesTest, NamesDecideWhenIdsChange) {
       "DELETE FROM images WHERE image_id = 6;");
   const StatusOr<LoadedPriorTables> loaded = ReadPriorTables(path_);
   ASSERT_TRUE(loaded.ok()) << loaded.status().message();
-  // Its time, its gravity and one prior.
-  EXPECT_EQ(loaded->num_ignored_rows, 3);
+  // Its time, its gravity, one prior and one position.
+  EXPECT_EQ(loaded->num_ignored_rows, 4);
+  EXPECT_EQ(loaded->tables.positions.size(), 4);
+  EXPECT_EQ(loaded->tables.positions[2].image_id1, 103);
   ASSERT_EQ(loaded->tables.priors.size(), 4);
   EXPECT_EQ(loaded->tables.priors[1].image_id2, 103);
   EXPECT_EQ(loaded->tables.priors[2].image_id1, 103);
@@ -152,13 +199,17 @@ TEST_F(PriorTablesTest, NamesDecideWhenIdsChange) {
 
 TEST_F(PriorTablesTest, RefusesRowsItCouldNotHaveWritten) {
   const char* statements[] = {
-      "UPDATE adasfm_meta SET value = '2';",
+      "UPDATE adasfm_meta SET value = '2' WHERE key = 'schema_version';",
       "UPDATE adasfm_relative_pose_priors SET qvec = zeroblob(32);",
       "UPDATE adasfm_relative_pose_priors SET tvec = zeroblob(23);",
       "UPDATE adasfm_relative_pose_priors SET flags = 1024;",
       "UPDATE adasfm_relative_pose_priors SET dt_ns = -1;",
       "UPDATE adasfm_gravity SET gravity_in_cam = zeroblob(24);",
       "DELETE FROM adasfm_image_times WHERE image_id = 2;",
+      "UPDATE adasfm_position_priors SET share = 1.5;",
+      "UPDATE adasfm_position_priors SET covariance = zeroblob(72);",
+      "UPDATE adasfm_position_priors SET position = zeroblob(23);",
+      "UPDATE adasfm_meta SET value = 'here' WHERE key = 'position_origin';",
   };
   ASSERT_TRUE(WritePriorTables(path_, MakeTables(1)).ok());
   const std::string original = ReadBytes(path_);

@@ -342,6 +342,43 @@ TEST_F(Readers, CalibrationErrors) {
               "none.yaml", {"no such file"});
 }
 
+TEST_F(Readers, CalibrationOfAReceiver) {
+  const std::string camera =
+      "cam0:\n  T_cam_imu: [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, "
+      "0, 1]]\n";
+  auto read = ReadSensorCalibration(Write("none.yaml", camera));
+  ASSERT_TRUE(read.ok()) << read.status().message();
+  EXPECT_FALSE(read->has_gnss);
+  read = ReadSensorCalibration(
+      Write("point.yaml", camera + "gnss0:\n  p_imu_antenna: [0.1, -0.2, 1.5]\n"
+                                   "  timeshift_gnss_imu: 0.25\n"
+                                   "  horizontal_noise: 0.5\n"));
+  ASSERT_TRUE(read.ok()) << read.status().message();
+  EXPECT_TRUE(read->has_gnss);
+  EXPECT_EQ(read->antenna_in_imu, Eigen::Vector3d(0.1, -0.2, 1.5));
+  EXPECT_EQ(read->timeshift_gnss_imu_s, 0.25);
+  EXPECT_EQ(read->gnss_noise.horizontal_m, 0.5);
+  EXPECT_EQ(read->gnss_noise.vertical_m, 1.0);
+  read = ReadSensorCalibration(Write(
+      "transform.yaml",
+      camera + "gnss0:\n  T_imu_gnss: [[1, 0, 0, 1], [0, 1, 0, 2], [0, 0, 1, "
+               "3], [0, 0, 0, 1]]\n"));
+  ASSERT_TRUE(read.ok()) << read.status().message();
+  EXPECT_EQ(read->antenna_in_imu, Eigen::Vector3d(1.0, 2.0, 3.0));
+  const struct {
+    std::string text;
+    std::string word;
+  } cases[] = {{"gnss0:\n  horizontal_noise: 1\n", "p_imu_antenna"},
+               {"gnss0:\n  p_imu_antenna: [1, 2]\n", "3 numbers"},
+               {"gnss0:\n  p_imu_antenna: [1, 2, up]\n", "not a number"},
+               {"gnss0:\n  p_imu_antenna: [0, 0, 0]\n  horizontal_noise: 0\n",
+                "horizontal_noise"}};
+  for (const auto& c : cases) {
+    const std::string path = Write("bad.yaml", camera + c.text);
+    ExpectError(ReadSensorCalibration(path).status(), path, {c.word});
+  }
+}
+
 // Whatever the bytes: a value or an error, never a crash.
 TEST_F(Readers, DamagedFilesGiveAnErrorOrAValue) {
   const std::string texts[] = {

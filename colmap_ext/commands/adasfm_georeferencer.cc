@@ -1,0 +1,79 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <filesystem>
+#include <iostream>
+#include <string>
+
+#include "colmap_ext/commands/registry.h"
+#include "colmap_ext/host/model.h"
+#include "colmap_ext/host/model_folder.h"
+#include "colmap_ext/io/georeference_file.h"
+#include "colmap_ext/io/output_files.h"
+#include "colmap_ext/scene/align_to_gravity.h"
+#include "colmap_ext/scene/georeferenced_model.h"
+
+namespace adasfm {
+namespace {
+
+struct GeoreferencerOptions {
+  std::string input_path;
+  std::string output_path;
+  std::string frame = "ecef";
+  GeodeticPosition enu_origin;
+  std::string georeference_path;
+};
+
+Status WriteInFrame(const GeoreferencerOptions& options) {
+  const StatusOr<GeodeticPosition> origin =
+      ReadGeoreference(options.georeference_path);
+  if (!origin.ok()) return origin.status();
+  const StatusOr<TargetFrame> target =
+      FindTargetFrame(options.frame, *origin, options.enu_origin);
+  if (!target.ok()) return target.status();
+  StatusOr<colmap::Reconstruction> model = ReadModel(options.input_path);
+  if (!model.ok()) return model.status();
+  TransformReconstruction(target->target_from_enu, &*model);
+  Status status = PrepareOutputFolder(options.output_path);
+  if (status.ok()) status = CheckModelFolder(options.output_path);
+  if (status.ok()) status = WriteBinaryModel(*model, options.output_path);
+  if (!status.ok()) return status;
+  std::cout << "Model in " << target->description << " written to "
+            << options.output_path << std::endl;
+  return Status::Ok();
+}
+
+}  // namespace
+
+Status RunAdasfmGeoreferencer(int argc, char** argv) {
+  GeoreferencerOptions options;
+  CommandOptions command(
+      "adasfm_georeferencer",
+      "Writes a model that was made with positions in another frame of the "
+      "Earth.");
+  command.AddRequired("input_path", &options.input_path,
+                      "model in the frame of georeference.json beside it");
+  command.AddRequired("output_path", &options.output_path,
+                      "folder for the model");
+  command.AddDefault("frame", &options.frame,
+                     "ecef, utm (of the origin's zone), or enu of the origin "
+                     "below");
+  command.AddDefault("latitude_deg", &options.enu_origin.latitude_deg,
+                     "origin of --frame enu [deg]");
+  command.AddDefault("longitude_deg", &options.enu_origin.longitude_deg,
+                     "origin of --frame enu [deg]");
+  command.AddDefault("height_m", &options.enu_origin.height_m,
+                     "origin of --frame enu, above the ellipsoid [m]");
+  command.AddDefault("georeference_path", &options.georeference_path,
+                     "georeference of the model; when empty, "
+                     "georeference.json in the folder above it");
+  const Status parsed = command.Parse(argc, argv);
+  if (!parsed.ok() || command.HelpShown()) return parsed;
+  if (options.georeference_path.empty()) {
+    options.georeference_path =
+        (std::filesystem::path(options.input_path) / ".." / kGeoreferenceName)
+            .lexically_normal()
+            .string();
+  }
+  return WriteInFrame(options);
+}
+
+}  // namespace adasfm

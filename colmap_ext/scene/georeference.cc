@@ -1,0 +1,73 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "colmap_ext/scene/georeference.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "colmap_ext/scene/align_to_gravity.h"
+#include "core/so3.h"
+
+namespace adasfm {
+namespace {
+
+// What accelerometers know of the vertical over a drive: a bias that is left of
+// 0.03 m/s^2, and a wrong mounting that averages out as the machine turns.
+constexpr double kGravitySigmaRad = DegToRad(0.2);
+constexpr double kUprightSigmaRad = DegToRad(10.0);
+// What is within this many sigmas needs no wider loss.
+constexpr double kNormalSigmas = 4.0;
+
+}  // namespace
+
+PositionAlignment AlignSceneToPositions(
+    const SceneData& scene, const std::map<image_t, Rigid3d>& cams_from_world,
+    bool is_metric, const Eigen::Quaterniond& camera_mount) {
+  PositionAlignmentInput input;
+  input.positions = scene.positions;
+  input.cams_from_world = cams_from_world;
+  input.is_metric = is_metric;
+  input.down_in_world =
+      FindGravityInWorld(scene, cams_from_world, camera_mount);
+  return AlignToPositions(input);
+}
+
+std::map<image_t, Rigid3d> TransformCamsFromWorld(
+    const Sim3d& enu_from_world,
+    const std::map<image_t, Rigid3d>& cams_from_world) {
+  std::map<image_t, Rigid3d> transformed;
+  for (const auto& [image_id, pose] : cams_from_world) {
+    transformed[image_id] = TransformCamFromWorld(enu_from_world, pose);
+  }
+  return transformed;
+}
+
+Verticals FindVerticals(const SceneData& scene,
+                        const std::map<image_t, Rigid3d>& cams_from_enu,
+                        const Eigen::Quaterniond& camera_mount) {
+  Verticals verticals;
+  verticals.sigma_rad = kGravitySigmaRad;
+  for (const auto& [image_id, pose] : cams_from_enu) {
+    const auto image = scene.images.find(image_id);
+    if (image == scene.images.end() || !image->second.gravity_in_cam) continue;
+    verticals.gravity_in_cam[image_id] =
+        camera_mount * *image->second.gravity_in_cam;
+  }
+  if (!verticals.gravity_in_cam.empty()) return verticals;
+  verticals.sigma_rad = kUprightSigmaRad;
+  for (const auto& [image_id, pose] : cams_from_enu) {
+    verticals.gravity_in_cam[image_id] =
+        pose.rotation * -Eigen::Vector3d::UnitZ();
+  }
+  return verticals;
+}
+
+double PositionLossScale(const PositionAlignment& alignment, double final_scale,
+                         int round, int num_rounds) {
+  if (num_rounds < 2) return final_scale;
+  const double widening =
+      std::max(1.0, alignment.threshold_sigmas / kNormalSigmas);
+  const double share_left = 1.0 - static_cast<double>(round) / (num_rounds - 1);
+  return final_scale * std::pow(widening, std::max(0.0, share_left));
+}
+
+}  // namespace adasfm

@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "core/position_prior.h"
+#include "core/status.h"
+#include "sensors/estimate_priors.h"
+#include "sensors/io/calibration.h"
+
+namespace adasfm {
+
+struct PositionPriorOptions {
+  // An image between two fixes further apart than this gets no position:
+  // nobody knows the way between them.
+  double max_fix_gap_s = 3.0;
+  // A fix between two images at most this far apart belongs to both, weighted
+  // by time. At 2 m/s^2 a straight line between them errs by 6 cm at most.
+  double max_image_gap_s = 0.5;
+  // Errors of a receiver persist for this long: fixes that follow each other
+  // faster share them, so that each has a larger variance. 0: independent.
+  double correlation_time_s = 0.0;
+
+  bool IsValid(std::string* error) const;
+};
+
+struct PositionPriors {
+  // In the ENU frame of the origin, in order of time.
+  std::vector<PositionPrior> priors;
+  GeodeticPosition origin;
+  int num_fixes = 0;
+  // Fixes before the first and after the last image.
+  int num_fixes_outside = 0;
+  // Fixes between images that are too far apart, and so used by interpolation
+  // between fixes, or not at all.
+  int num_fixes_between_far_images = 0;
+};
+
+// Gives fixes to images (ordered by time, on the camera's clock). A fix between
+// near images is a position on the line between them; where images are further
+// apart, each gets a position on the line between the fixes around it. An error
+// when no fix falls between the images, naming both spans.
+StatusOr<PositionPriors> ComputePositionPriors(
+    const PositionPriorOptions& options, const SensorCalibration& calibration,
+    const std::vector<ImageStamp>& images, const std::vector<GnssFix>& fixes);
+
+}  // namespace adasfm
