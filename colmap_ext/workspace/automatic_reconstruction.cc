@@ -365,12 +365,12 @@ Status Reconstructor::Model() {
   const auto work = [this]() -> Status {
     MapRequest request;
     request.database_path = database_path_;
-    request.input_path = InWorkspace("coarse/0");
+    request.input_path = InWorkspace("coarse");
     request.output_path = InWorkspace("sparse");
     const StatusOr<MapReport> report =
         MapParts(options_.map, request, ProgressIn(kModel, "model"));
     if (!report.ok()) return report.status();
-    message_(FormatMapperSummaryText(report->summary));
+    message_(FormatMappingText(report->models));
     return ColorPoints(paths_.image_path, InWorkspace("sparse"),
                        InWorkspace("logs/colors.log"));
   };
