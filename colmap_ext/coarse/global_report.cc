@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 #include <sstream>
 
+#include "colmap_ext/coarse/weak_places.h"
 #include "core/so3.h"
 
 namespace adasfm {
@@ -40,6 +41,20 @@ Json JoinFilterJson(const SceneData& scene, const JoinFilterReport& joins) {
           {"confirmed", joins.num_confirmed},
           {"pairs_removed", joins.num_removed_pairs},
           {"not_made", split}};
+}
+
+Json WeakPlacesJson(const SceneData& scene, const CoarsePoses& poses) {
+  Json json = Json::array();
+  for (const WeakPlace& place : FindWeakPlaces(poses)) {
+    json.push_back({{"model1", place.model1},
+                    {"model2", place.model2},
+                    {"name1", scene.images.at(place.pair.image_id1).name},
+                    {"name2", scene.images.at(place.pair.image_id2).name},
+                    {"inliers", place.num_inliers},
+                    {"pairs", place.num_pairs},
+                    {"reason", EdgeRemovalName(place.removal)}});
+  }
+  return json;
 }
 
 std::string DescribeSplitJoin(const SceneData& scene, const SplitJoin& join) {
@@ -205,6 +220,7 @@ std::string FormatGlobalReportJson(const SceneData& scene,
                               {"pairs", rates.num_pairs},
                               {"max_rate_rad_s", rates.max_rate_rad_s}};
   report["joins"] = JoinFilterJson(scene, result.poses.join_filter);
+  report["weak_places"] = WeakPlacesJson(scene, result.poses);
   for (size_t i = 0; i < result.models.size(); ++i) {
     report["models"].push_back(
         ModelJson(scene, result.poses.components[i], result.models[i]));

@@ -300,14 +300,20 @@ void JudgeEachModel(const std::vector<AssessedModel>& models, int num_images,
   }
 }
 
+// "of 1 of 3 models " when not all are meant.
+std::string OfModels(int num_models, int num_all_models) {
+  if (num_models == num_all_models) return "";
+  return "of " + std::to_string(num_models) + " of " +
+         std::to_string(num_all_models) + " models ";
+}
+
 void CollectFigures(const std::vector<AssessedModel>& models,
                     Verdict* verdict) {
   verdict->num_models = static_cast<int>(models.size());
-  verdict->is_metric = !models.empty();
   double sum_px = 0.0;
   for (const AssessedModel& model : models) {
     const MapperStageSummary& summary = *model.summary;
-    verdict->is_metric = verdict->is_metric && summary.is_metric;
+    verdict->num_metric_models += summary.is_metric;
     sum_px += summary.mean_reproj_error_px * model.model->NumPoints3D();
     if (summary.refine.keypoint_sigma_factor <=
             verdict->keypoint_sigma_factor &&
@@ -317,7 +323,8 @@ void CollectFigures(const std::vector<AssessedModel>& models,
     verdict->keypoint_sigma_px = summary.refine.keypoint_sigma_px;
     verdict->keypoint_sigma_factor = summary.refine.keypoint_sigma_factor;
   }
-  if (verdict->is_metric) verdict->metric_source = "wheels";
+  verdict->is_metric = verdict->num_metric_models == verdict->num_models;
+  if (verdict->num_metric_models > 0) verdict->metric_source = "wheels";
   if (verdict->num_points > 0) {
     verdict->mean_reproj_error_px = sum_px / verdict->num_points;
   }
@@ -348,7 +355,10 @@ Verdict AssessModels(const std::vector<AssessedModel>& models,
     judge.Doubt("an earlier step warned: " + warning);
   }
   if (!verdict.is_metric && has_priors) {
-    judge.Doubt("lengths are in no unit, since no sensor knows them");
+    judge.Doubt("lengths " +
+                OfModels(verdict.num_models - verdict.num_metric_models,
+                         verdict.num_models) +
+                "are in no unit, since no sensor knows them");
   }
   judge.Decide(&verdict);
   return verdict;
@@ -385,8 +395,10 @@ std::string FormatVerdict(const Verdict& verdict) {
                : "in " + std::to_string(verdict.num_models) + " models, ")
        << verdict.num_points << " points, "
        << static_cast<int>(verdict.median_points_per_image) << " an image, "
-       << (verdict.is_metric ? "in metres from " + verdict.metric_source
-                             : "no metres");
+       << (verdict.num_metric_models == 0
+               ? "no metres"
+               : OfModels(verdict.num_metric_models, verdict.num_models) +
+                     "in metres from " + verdict.metric_source);
   for (const PriorAgreement& priors : verdict.priors) {
     text << ", " << priors.kind << "s agree to "
          << Percent(1.0 - priors.share_contradicting);
@@ -409,6 +421,7 @@ nlohmann::json VerdictToJson(const Verdict& verdict) {
       {"num_points", verdict.num_points},
       {"median_points_per_image", verdict.median_points_per_image},
       {"is_metric", verdict.is_metric},
+      {"num_metric_models", verdict.num_metric_models},
       {"metric_source", verdict.metric_source},
       {"keypoint_sigma_px", verdict.keypoint_sigma_px},
       {"keypoint_sigma_factor", verdict.keypoint_sigma_factor},

@@ -44,7 +44,7 @@ struct Verdict {
   int num_points = 0;
   // Of the registered images.
   double median_points_per_image = 0.0;
-  bool is_metric = false;
+  bool is_metric = false;  // all models are
   // Where metres come from; empty without.
   std::string metric_source;
   std::vector<PriorAgreement> priors;
@@ -52,6 +52,7 @@ struct Verdict {
   double keypoint_sigma_factor = 1.0;
   double mean_reproj_error_px = 0.0;
   int num_models = 1;
+  int num_metric_models = 0;
   // The images of no model; filled by the caller, for the line and the lists.
   std::vector<LostImage> lost_images;
 };
