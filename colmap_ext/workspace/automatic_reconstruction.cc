@@ -338,7 +338,7 @@ Status Reconstructor::Priors() {
     if (!has_sensors) return Status::Ok();
     const StatusOr<LoadedPriorTables> tables = ReadPriorTables(database_path_);
     if (!tables.ok()) return tables.status();
-    return tables->tables.priors.empty()
+    return tables->tables.image_times.empty()
                ? Status::Error("the priors are missing in " + database_path_)
                : Status::Ok();
   };
