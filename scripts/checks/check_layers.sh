@@ -48,7 +48,7 @@ colmap_ext/datasets            core colmap_ext/io synthetic
 colmap_ext/bags                core sensors/bags sensors/io colmap_ext/io colmap_ext/datasets
 colmap_ext/mapper_stage        core colmap_ext/io colmap_ext/host colmap_ext/scene colmap_ext/mapper partition
 colmap_ext/report              core colmap_ext/io colmap_ext/host colmap_ext/database colmap_ext/evaluation
-colmap_ext                     core colmap_ext/io colmap_ext/host colmap_ext/database colmap_ext/priors colmap_ext/coarse colmap_ext/mapper_stage
+colmap_ext                     core colmap_ext/io colmap_ext/host colmap_ext/database colmap_ext/scene colmap_ext/priors colmap_ext/coarse colmap_ext/mapper_stage
 colmap_ext/workspace           core sensors/io colmap_ext colmap_ext/bags colmap_ext/io colmap_ext/host colmap_ext/database colmap_ext/coarse colmap_ext/pairs colmap_ext/datasets colmap_ext/report
 colmap_ext/commands            core synthetic sensors sensors/... global global/... partition colmap_ext colmap_ext/...
 '
