@@ -7,6 +7,7 @@
 
 #include "colmap_ext/coarse/global_stage.h"
 #include "colmap_ext/mapper_stage/mapper_stage.h"
+#include "colmap_ext/mapper_stage/mapping_summary.h"
 #include "colmap_ext/mapper_stage/verdict.h"
 #include "colmap_ext/priors/prior_importer.h"
 #include "core/progress.h"
@@ -31,7 +32,7 @@ namespace adasfm {
 //        2.4 directions                     2.8 match refinement
 //
 //   3  MapParts             adasfm_mapper              partition/, colmap_ext/
-//      coarse model + cleaned matches -> the model
+//      coarse models + cleaned matches -> a model each
 //        3.1 cut into overlapping parts     3.3 align to the coarse frame
 //        3.2 incremental SfM per part       3.4 merge and refine the whole
 //
@@ -72,27 +73,30 @@ struct MapOptions {
   bool IsValid(std::string* error) const;
 };
 
-// input_path is a coarse model of stage 2; the model goes to output_path/0.
+// input_path is the folder that stage 2 wrote its models 0, 1, ... to, or one
+// of these; the models go to output_path/0, 1, ..., most images first.
 struct MapRequest {
   std::string database_path;
   std::string input_path;
   std::string output_path;
   // All steps, or one of them for runs spread over machines.
   MapperSteps steps = MapperSteps::kAll;
-  int part_index = -1;  // of kPart
+  // Of kPart; the parts of all models are numbered one after another.
+  int part_index = -1;
 };
 
 // What a run of stage 3 did beside its files.
 struct MapReport {
-  MapperStageSummary summary;
-  // With the steps kAll and kMerge.
+  // With the steps kAll and kMerge: as the models were written, and the verdict
+  // on all together, with the images of no model.
+  std::vector<ModelSummary> models;
   std::optional<Verdict> verdict;
   std::vector<std::string> warnings;
 };
 
-// Stage 3. Writes the model and summary.json with the steps kAll and kMerge,
-// checkpoints with all; after a crash the same call continues. A model that
-// failed by its verdict is written all the same.
+// Stage 3. Writes the models and summary.json with the steps kAll and kMerge,
+// checkpoints with all; after a crash the same call continues. Models that
+// failed by their verdict are written all the same.
 StatusOr<MapReport> MapParts(const MapOptions& options,
                              const MapRequest& request,
                              const ProgressCallback& progress = {});

@@ -24,8 +24,19 @@ enum class WheelType {
   kVelocity,      // forward speed [m/s], yaw rate [rad/s]
   kSpeed,         // forward speed [m/s], unused
   kTicks,         // left counter, right counter
+  kEncoder,       // counter of one wheel, unused
+  kSteering,      // speed of the rear axle [m/s], steering angle [rad]
   kOdometry,      // a trajectory of poses instead of samples
 };
+
+// One wheel's speed or counter tells nothing of the yaw.
+inline bool TellsYaw(WheelType type) {
+  return type != WheelType::kSpeed && type != WheelType::kEncoder;
+}
+
+inline bool CountsTicks(WheelType type) {
+  return type == WheelType::kTicks || type == WheelType::kEncoder;
+}
 
 struct WheelSample {
   timestamp_t timestamp_ns = 0;

@@ -57,7 +57,7 @@ fi
 
 # The model, in parts that are merged.
 "$colmap" adasfm_mapper \
-  --database_path "$database" --input_path "$workspace/coarse/0" \
+  --database_path "$database" --input_path "$workspace/coarse" \
   --output_path "$workspace/sparse"
 
 # One page to look at.

@@ -117,7 +117,7 @@ std::string FindContradiction(const MotionLogs& logs,
                               const SensorCalibration& calibration,
                               std::vector<std::string>* warnings) {
   if (logs.imu.empty() || logs.wheel.empty()) return "";
-  const bool has_yaw = calibration.wheel_type != WheelType::kSpeed;
+  const bool has_yaw = TellsYaw(calibration.wheel_type);
   const WheelCheck check =
       CheckWheels(logs.imu, logs.wheel, has_yaw, calibration);
   warnings->insert(warnings->end(), check.warnings.begin(),
@@ -141,7 +141,7 @@ void RaiseNoiseFigures(const MotionLogs& logs, SensorCalibration* calibration,
   Raise("accelerometer_noise_density",
         root_period * QuietSigma(times_ns, forces, 3),
         &noise.accelerometer_noise_density, warnings);
-  if (calibration->wheel_type == WheelType::kTicks) return;
+  if (CountsTicks(calibration->wheel_type)) return;
   times_ns.clear();
   std::vector<Eigen::Vector3d> speeds;
   for (const WheelSpeed& speed : logs.wheel) {

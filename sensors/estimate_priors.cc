@@ -3,12 +3,14 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <stdexcept>
 
 #include "core/so3.h"
 #include "sensors/bridged_holes.h"
 #include "sensors/calibration_check/check_against_vision.h"
 #include "sensors/calibration_check/clock_jump.h"
+#include "sensors/calibration_check/wheel_clock.h"
 #include "sensors/check_logs.h"
 #include "sensors/io/format_figures.h"
 #include "sensors/preintegration/imu_noise.h"
@@ -27,6 +29,9 @@ namespace {
 constexpr int kMaxNumCorrections = 3;
 constexpr double kMaxNoiseFactor = 5.0;
 constexpr double kMinNoiseChange = 1.2;
+// Below it gyroscope and pictures have nothing in common, as logs of another
+// drive; a stabilised video keeps the slow turns.
+constexpr double kMinSameMotionCorrelation = 0.4;
 
 timestamp_t NsFromSeconds(double seconds) {
   return std::llround(1e9 * seconds);
@@ -57,6 +62,10 @@ class PriorEstimator {
   void SelectLogs(const SensorLogs& logs);
   Status FindImagesInLogs();
   Status CheckVision();
+  void CorrectTimeShift(const VisionCheck& check);
+  // What the IMU says is of no use; the other logs stay.
+  Status LeaveOutImu(const VisionCheck& check);
+  void CorrectWheelClock();
   Status CheckMotion();
   void UndoFilter(const VisionCheck& check);
   void Fuse();
@@ -140,10 +149,16 @@ Status PriorEstimator::CheckVision() {
     return Status::Ok();
   }
   summary.visual_timeshift_correction_s = check.time_shift_correction_s;
-  const bool only_shift = check.contradiction_is_time_shift;
-  if (options_.estimate_time_shift &&
-      (check.contradiction.empty() || only_shift)) {
-    timeshift_ns_ += NsFromSeconds(check.time_shift_correction_s);
+  summary.unexplained_rotation = check.unexplained;
+  if (check.contradiction_is_motion && options_.check_against_vision) {
+    return LeaveOutImu(check);
+  }
+  const bool may_correct =
+      check.contradiction.empty() || check.contradiction_is_time_shift;
+  if (may_correct &&
+      (options_.estimate_time_shift == 1 ||
+       (options_.estimate_time_shift == -1 && check.is_clock_shift))) {
+    CorrectTimeShift(check);
   } else if (!check.contradiction.empty()) {
     if (options_.check_against_vision) {
       return Status::Error(check.contradiction);
@@ -156,6 +171,54 @@ Status PriorEstimator::CheckVision() {
   visual_bias_ = check.gyroscope_bias;
   if (options_.undo_gyroscope_filter) UndoFilter(check);
   return Status::Ok();
+}
+
+void PriorEstimator::CorrectTimeShift(const VisionCheck& check) {
+  SensorSummary& summary = estimate_.summary;
+  timeshift_ns_ += NsFromSeconds(check.time_shift_correction_s);
+  summary.timeshift_was_corrected = true;
+  if (options_.estimate_time_shift == 1) return;
+  summary.warnings.push_back(FormatFigures(
+      "vision shows that images and IMU differ by %+.4f s more than "
+      "timeshift_cam_imu says, and the priors were made with that: write "
+      "timeshift_cam_imu: %.4f into the calibration",
+      check.time_shift_correction_s, SecondsFromNs(timeshift_ns_)));
+}
+
+Status PriorEstimator::LeaveOutImu(const VisionCheck& check) {
+  if (!(logs_.wheel.empty() && logs_.odometry.empty()) &&
+      check.shifted_correlation < kMinSameMotionCorrelation) {
+    return Status::Error(
+        "vision and gyroscope contradict each other: check T_cam_imu, the "
+        "clocks and whether logs and images belong together (" +
+        check.contradiction + ")");
+  }
+  SensorSummary& summary = estimate_.summary;
+  summary.imu_was_left_out = true;
+  summary.warnings.push_back(
+      check.contradiction +
+      ". The IMU is left out: a video that the camera stabilised turns "
+      "otherwise than the camera; switch the stabilisation off "
+      "(--force 1 uses the IMU all the same)");
+  logs_.imu.clear();
+  rotations_.clear();
+  return logs_.IsEmpty() ? Status::Ok() : FindImagesInLogs();
+}
+
+void PriorEstimator::CorrectWheelClock() {
+  if (options_.estimate_time_shift == 0) return;
+  const std::optional<double> shift_s =
+      FindWheelClockShift(logs_.imu, logs_.wheel, calibration_);
+  if (!shift_s) return;
+  for (WheelSpeed& speed : logs_.wheel) {
+    speed.timestamp_ns += NsFromSeconds(*shift_s);
+  }
+  SensorSummary& summary = estimate_.summary;
+  summary.wheel_clock_shift_s = *shift_s;
+  summary.warnings.push_back(FormatFigures(
+      "wheels and gyroscope turn at times that differ by %+.3f s: this was "
+      "added to the times of the wheels",
+      *shift_s, 0.0));
 }
 
 Status PriorEstimator::CheckMotion() {
@@ -368,7 +431,12 @@ StatusOr<PriorEstimate> PriorEstimator::Run(
     status = FindImagesInLogs();
   }
   if (!status.ok()) return status;
+  if (logs_.IsEmpty()) {
+    estimate_.summary.num_images = static_cast<int>(all_images_.size());
+    return std::move(estimate_);
+  }
   // The other sensors against each other.
+  CorrectWheelClock();
   status = CheckMotion();
   if (!status.ok()) return status;
   // 3. and 4. Preintegration and smoother.

@@ -59,8 +59,9 @@ struct PriorEstimationOptions {
   // against the IMU (check_wheels.h there). Else it is a warning.
   bool check_against_vision = true;
   // Whether the time shift that vision and gyroscope agree on is added to the
-  // calibration's.
-  bool estimate_time_shift = false;
+  // calibration's: 0, 1, or -1: when vision tells it clearly and it may be a
+  // clock's (VisionCheck::is_clock_shift).
+  int estimate_time_shift = -1;
   // Whether a low-pass filter in the gyroscope's log that vision clearly shows
   // (sensors/calibration_check/gyroscope_filter.h) is undone.
   bool undo_gyroscope_filter = true;

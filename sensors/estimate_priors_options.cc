@@ -19,6 +19,11 @@ bool PriorEstimationOptions::IsValid(std::string* error) const {
     *error = "AdaSfmPriors.max_lead_s must not be negative";
     return false;
   }
+  if (estimate_time_shift < -1 || estimate_time_shift > 1) {
+    *error = "AdaSfmPriors.estimate_time_shift is " +
+             std::to_string(estimate_time_shift) + "; it must be -1, 0 or 1";
+    return false;
+  }
   return fusion.IsValid(error);
 }
 

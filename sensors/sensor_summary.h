@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "sensors/calibration_check/check_against_vision.h"
 #include "sensors/smoother/build_odometry_links.h"
 #include "sensors/smoother/odometry_fusion.h"
 
@@ -47,6 +48,12 @@ struct SensorSummary {
   // The time shift in use, and what vision would add to it (0 when unknown).
   double timeshift_cam_imu_s = 0.0;
   double visual_timeshift_correction_s = 0.0;
+  bool timeshift_was_corrected = false;
+  // What was added to the times of the wheels.
+  double wheel_clock_shift_s = 0.0;
+  // Vision against the gyroscope, and whether that was reason to use no IMU.
+  UnexplainedRotation unexplained_rotation;
+  bool imu_was_left_out = false;
   // The low-pass filter that was undone (see GyroscopeFilter); 0: none.
   double gyroscope_lag_s = 0.0;
   double gyroscope_delay_s = 0.0;

@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 #include <sstream>
 
+#include "colmap_ext/coarse/weak_places.h"
 #include "core/so3.h"
 
 namespace adasfm {
@@ -43,6 +44,20 @@ Json PartJoinsJson(const SceneData& scene, const LoopClosureReport& report) {
           {"not_made", report.joins_were_split
                            ? JoinsJson(scene, report.unverified_joins)
                            : Json::array()}};
+}
+
+Json WeakPlacesJson(const SceneData& scene, const CoarsePoses& poses) {
+  Json json = Json::array();
+  for (const WeakPlace& place : FindWeakPlaces(poses)) {
+    json.push_back({{"model1", place.model1},
+                    {"model2", place.model2},
+                    {"name1", scene.images.at(place.pair.image_id1).name},
+                    {"name2", scene.images.at(place.pair.image_id2).name},
+                    {"inliers", place.num_inliers},
+                    {"pairs", place.num_pairs},
+                    {"reason", EdgeRemovalName(place.removal)}});
+  }
+  return json;
 }
 
 std::string DescribeSplitJoin(const SceneData& scene,
@@ -210,6 +225,7 @@ std::string FormatGlobalReportJson(const SceneData& scene,
                               {"max_rate_rad_s", rates.max_rate_rad_s}};
   report["loop_closures"] = LoopClosuresJson(result.poses.loop_closures);
   report["joins"] = PartJoinsJson(scene, result.poses.loop_closures);
+  report["weak_places"] = WeakPlacesJson(scene, result.poses);
   for (size_t i = 0; i < result.models.size(); ++i) {
     report["models"].push_back(
         ModelJson(scene, result.poses.components[i], result.models[i]));

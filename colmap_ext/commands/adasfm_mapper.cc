@@ -122,13 +122,15 @@ Status RunAdasfmMapper(int argc, char** argv) {
   CommandOptions command(
       "adasfm_mapper",
       "Reconstructs overlapping parts incrementally, steered by the coarse "
-      "model, and merges them into one.");
+      "model, and merges them into one; of each coarse model.");
   command.AddRequired("database_path", &options.request.database_path,
                       "COLMAP database with verified matches");
   command.AddRequired("input_path", &options.request.input_path,
-                      "coarse model that adasfm_global made");
+                      "folder of the coarse models 0, 1, ... that "
+                      "adasfm_global made, or one of them");
   command.AddRequired("output_path", &options.request.output_path,
-                      "folder for the model (0) and checkpoints");
+                      "folder for the models (0, 1, ..., one for each coarse "
+                      "model) and checkpoints");
   AddMapperOptions(&options, &command);
   AddPartitionOptions(&options.map.stage, &command);
   AddAlignOptions(&options.map.stage.align, &command);
@@ -154,7 +156,7 @@ Status RunAdasfmMapper(int argc, char** argv) {
     std::cout << "WARNING: " << warning << std::endl;
   }
   if (*steps == MapperSteps::kAll || *steps == MapperSteps::kMerge) {
-    std::cout << FormatMapperSummaryText(report->summary) << std::flush;
+    std::cout << FormatMappingText(report->models) << std::flush;
   }
   if (!report->verdict) return Status::Ok();
   if (report->verdict->result == VerdictResult::kFailed) {

@@ -90,7 +90,7 @@ void AddOptions(PriorImportOptions* options, CommandOptions* command) {
       "[rad/s]");
   add("estimate_time_shift", &estimation->estimate_time_shift,
       "add the time shift that vision and gyroscope agree on to the "
-      "calibration's (0 or 1)");
+      "calibration's: 0, 1, or -1: when it is clear and at most 0.15 s");
   add("undo_gyroscope_filter", &estimation->undo_gyroscope_filter,
       "undo a low-pass filter in the gyroscope's log when vision clearly shows "
       "one (0 or 1)");

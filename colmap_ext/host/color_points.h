@@ -7,9 +7,9 @@
 
 namespace adasfm {
 
-// Gives the points of the model output_path/0 the colours of the photos below
-// image_path, by COLMAP's own function, and writes it anew. What COLMAP prints,
-// as for a photo that is gone, goes to the end of log_path.
+// Gives the points of the models output_path/0, 1, ... the colours of the
+// photos below image_path, by COLMAP's own function, and writes them anew. What
+// COLMAP prints, as for a photo that is gone, goes to the end of log_path.
 Status ColorPoints(const std::string& image_path,
                    const std::string& output_path, const std::string& log_path);
 

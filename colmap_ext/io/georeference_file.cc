@@ -55,9 +55,13 @@ StatusOr<GeodeticPosition> ReadGeoreference(const std::string& path) {
   return Status::Error(path + ": is not the georeference of a model");
 }
 
-void RemoveGeoreference(const std::string& folder) {
+Status UpdateGeoreference(bool is_georeferenced,
+                          const std::optional<GeodeticPosition>& origin,
+                          const std::string& folder) {
+  if (is_georeferenced && origin) return WriteGeoreference(*origin, folder);
   std::error_code none;
   std::filesystem::remove(folder + "/" + kGeoreferenceName, none);
+  return Status::Ok();
 }
 
 }  // namespace adasfm

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <optional>
 #include <string>
 
 #include "core/geodesy.h"
@@ -19,7 +20,10 @@ Status WriteGeoreference(const GeodeticPosition& origin,
 // An error for a missing file and one that is not such a file.
 StatusOr<GeodeticPosition> ReadGeoreference(const std::string& path);
 
-// Removes the file of an earlier run, if there is one.
-void RemoveGeoreference(const std::string& folder);
+// Writes the origin of models that are somewhere on the Earth; of others, it
+// removes the file of an earlier run.
+Status UpdateGeoreference(bool is_georeferenced,
+                          const std::optional<GeodeticPosition>& origin,
+                          const std::string& folder);
 
 }  // namespace adasfm

@@ -134,14 +134,19 @@ Status MapperStage::ReadPlan(CheckpointCondition* condition) {
   return Status::Ok();
 }
 
-Status MapperStage::RunPart(int part_index) {
+StatusOr<int> MapperStage::ReadNumParts() {
   const Status status = ReadPlan();
   if (!status.ok()) return status;
-  const int num_parts = static_cast<int>(summary_.plan.parts.size());
-  if (part_index < 0 || part_index >= num_parts) {
+  return static_cast<int>(summary_.plan.parts.size());
+}
+
+Status MapperStage::RunPart(int part_index) {
+  const StatusOr<int> num_parts = ReadNumParts();
+  if (!num_parts.ok()) return num_parts.status();
+  if (part_index < 0 || part_index >= *num_parts) {
     return Status::Error(
         "AdaSfmMapper.part_index = " + std::to_string(part_index) +
-        ", but the plan has the parts 0 to " + std::to_string(num_parts - 1));
+        ", but the plan has the parts 0 to " + std::to_string(*num_parts - 1));
   }
   return RunPartWithThreads(part_index,
                             EffectiveNumThreads(options_.num_threads));

@@ -94,6 +94,8 @@ class MapperStage {
 
   // Makes the plan, or takes the one that is there.
   Status Plan();
+  // The parts of the plan that is there.
+  StatusOr<int> ReadNumParts();
   // Reconstructs one part of the plan. A part that throws is tried once more
   // with stricter settings; its report then says why.
   Status RunPart(int part_index);
@@ -102,8 +104,9 @@ class MapperStage {
   int FindNumParallelParts();
   // All parts of the plan, the biggest first.
   Status RunAllParts();
-  // Merges the parts that are there and refines the model. With
-  // `require_all_parts` a missing part is an error that names it.
+  // Merges the parts that are there and refines the model, which is empty when
+  // no part has any images. With `require_all_parts` a missing part is an error
+  // that names it.
   StatusOr<colmap::Reconstruction> Merge(bool require_all_parts);
 
   const MapperStageSummary& Summary() const { return summary_; }

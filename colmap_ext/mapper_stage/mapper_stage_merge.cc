@@ -113,11 +113,6 @@ Status MapperStage::MergePartModels(const std::string& fingerprint) {
       FindSmallestSigmaFactor(summary_.parts, summary_.aligned);
   const std::unique_ptr<MapperScene> scene = BuildWholeScene();
   summary_.merge = MergeParts(summary_.aligned, parts, scene.get());
-  if (scene->reconstruction.NumRegImages() < 2) {
-    return Status::Error(
-        "no image could be reconstructed; does the coarse model at "
-        "--input_path belong to this database?");
-  }
   return WriteMergeCheckpoint(checkpoint_path_, fingerprint, 0, summary_,
                               *scene);
 }
@@ -194,6 +189,9 @@ StatusOr<colmap::Reconstruction> MapperStage::Merge(bool require_all_parts) {
     if (!num_done.ok()) return num_done.status();
   }
   summary_.merge_seconds = timer.Seconds();
+  if (scene->reconstruction.NumRegImages() < 2) {
+    return colmap::Reconstruction();
+  }
   const StepTimer refine_timer;
   status = RefineMerged(fingerprint, *num_done, &scene);
   if (!status.ok()) return status;

@@ -3,8 +3,7 @@
 #include <nlohmann/json.hpp>
 #include <sstream>
 
-#include "colmap_ext/mapper_stage/mapper_stage.h"
-#include "colmap_ext/mapper_stage/verdict.h"
+#include "colmap_ext/mapper_stage/mapping_summary.h"
 
 namespace adasfm {
 namespace {
@@ -38,8 +37,7 @@ nlohmann::json PartAsJson(const MapperStageSummary& summary, size_t k) {
 
 }  // namespace
 
-std::string FormatMapperSummaryJson(const MapperStageSummary& summary,
-                                    const Verdict* verdict) {
+nlohmann::json MapperSummaryToJson(const MapperStageSummary& summary) {
   nlohmann::json json = {
       {"num_images", summary.num_images},
       {"num_points", summary.num_points},
@@ -64,11 +62,17 @@ std::string FormatMapperSummaryJson(const MapperStageSummary& summary,
       {"parts_seconds", summary.parts_seconds},
       {"merge_seconds", summary.merge_seconds},
       {"refine_seconds", summary.refine_seconds}};
-  if (verdict != nullptr) json["verdict"] = VerdictToJson(*verdict);
   json["parts"] = nlohmann::json::array();
   for (size_t k = 0; k < summary.parts.size(); ++k) {
     json["parts"].push_back(PartAsJson(summary, k));
   }
+  return json;
+}
+
+std::string FormatMapperSummaryJson(const MapperStageSummary& summary,
+                                    const Verdict* verdict) {
+  nlohmann::json json = MapperSummaryToJson(summary);
+  if (verdict != nullptr) json["verdict"] = VerdictToJson(*verdict);
   return json.dump(1) + "\n";
 }
 

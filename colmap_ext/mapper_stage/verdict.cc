@@ -82,9 +82,15 @@ PriorAgreement Summarize(const std::string& kind, std::vector<double> chi2) {
   return agreement;
 }
 
-std::vector<PriorAgreement> ComparePriors(const SceneData& data,
-                                          const colmap::Reconstruction& model) {
-  std::vector<double> rotations, translations;
+// Squared whitened residuals.
+struct PriorResiduals {
+  std::vector<double> rotations;
+  std::vector<double> translations;
+};
+
+void CollectResiduals(const SceneData& data,
+                      const colmap::Reconstruction& model,
+                      PriorResiduals* residuals) {
   for (const RelativePosePrior& prior : data.priors) {
     if (!IsHeld(model, prior.image_id1) || !IsHeld(model, prior.image_id2)) {
       continue;
@@ -95,37 +101,49 @@ std::vector<PriorAgreement> ComparePriors(const SceneData& data,
       const double chi2 = Chi2(
           LogSo3(motion.rotation * prior.cam2_from_cam1.rotation.conjugate()),
           prior.covariance.topLeftCorner<3, 3>());
-      if (chi2 >= 0.0) rotations.push_back(chi2);
+      if (chi2 >= 0.0) residuals->rotations.push_back(chi2);
     }
     if (prior.HasDirection() && prior.HasLength()) {
       const double chi2 =
           Chi2(motion.translation - prior.cam2_from_cam1.translation,
                prior.covariance.bottomRightCorner<3, 3>());
-      if (chi2 >= 0.0) translations.push_back(chi2);
+      if (chi2 >= 0.0) residuals->translations.push_back(chi2);
     }
   }
-  std::vector<PriorAgreement> agreements;
-  if (!rotations.empty()) {
-    agreements.push_back(Summarize("rotation", std::move(rotations)));
+}
+
+std::vector<PriorAgreement> ComparePriors(
+    const std::vector<AssessedModel>& models) {
+  PriorResiduals residuals;
+  for (const AssessedModel& model : models) {
+    CollectResiduals(*model.data, *model.model, &residuals);
   }
-  if (!translations.empty()) {
-    agreements.push_back(Summarize("translation", std::move(translations)));
+  std::vector<PriorAgreement> agreements;
+  if (!residuals.rotations.empty()) {
+    agreements.push_back(Summarize("rotation", std::move(residuals.rotations)));
+  }
+  if (!residuals.translations.empty()) {
+    agreements.push_back(
+        Summarize("translation", std::move(residuals.translations)));
   }
   return agreements;
 }
 
-void CountImages(const SceneData& data, const colmap::Reconstruction& model,
-                 Verdict* verdict) {
+void CountImages(const std::vector<AssessedModel>& models,
+                 const SceneData& rest, Verdict* verdict) {
   std::vector<double> counts;
-  for (const image_t image_id : model.RegImageIds()) {
-    counts.push_back(model.Image(image_id).NumPoints3D());
-    if (counts.back() >= kMinPointsOfImage) {
-      ++verdict->num_images_held_by_points;
+  verdict->num_database_images = static_cast<int>(rest.images.size());
+  for (const AssessedModel& model : models) {
+    for (const image_t image_id : model.model->RegImageIds()) {
+      counts.push_back(model.model->Image(image_id).NumPoints3D());
+      if (counts.back() >= kMinPointsOfImage) {
+        ++verdict->num_images_held_by_points;
+      }
     }
+    verdict->num_database_images += static_cast<int>(model.data->images.size());
+    verdict->num_points += static_cast<int>(model.model->NumPoints3D());
   }
-  verdict->num_database_images = static_cast<int>(data.images.size());
   verdict->num_images = static_cast<int>(counts.size());
-  verdict->num_points = static_cast<int>(model.NumPoints3D());
   if (counts.empty()) return;
   std::nth_element(counts.begin(), counts.begin() + counts.size() / 2,
                    counts.end());
@@ -160,20 +178,29 @@ class Judge {
   std::vector<std::string> doubts_;
 };
 
-// Images that have verified matches must have points too, unlike those in the
-// dark. The reason names how many have not.
-void JudgeMatchedImages(const SceneData& data,
-                        const colmap::Reconstruction& model, Judge* judge) {
+std::set<image_t> FindMatchedImages(const SceneData& data) {
   std::set<image_t> matched;
   for (const ScenePair& pair : data.pairs) {
     if (pair.inlier_matches.empty()) continue;
     matched.insert(pair.image_id1);
     matched.insert(pair.image_id2);
   }
-  const int num_held = static_cast<int>(std::count_if(
-      matched.begin(), matched.end(),
-      [&model](image_t image_id) { return IsHeld(model, image_id); }));
-  const int num_matched = static_cast<int>(matched.size());
+  return matched;
+}
+
+// Images that have verified matches must have points too, unlike those in the
+// dark. The reason names how many have not.
+void JudgeMatchedImages(const std::vector<AssessedModel>& models,
+                        const SceneData& rest, Judge* judge) {
+  int num_matched = static_cast<int>(FindMatchedImages(rest).size());
+  int num_held = 0;
+  for (const AssessedModel& model : models) {
+    const std::set<image_t> matched = FindMatchedImages(*model.data);
+    num_matched += static_cast<int>(matched.size());
+    num_held += static_cast<int>(std::count_if(
+        matched.begin(), matched.end(),
+        [&](image_t image_id) { return IsHeld(*model.model, image_id); }));
+  }
   judge->Limit(1.0 * num_held / std::max(1, num_matched),
                kMinShareOfMatchedHeld, kGoodShareOfMatchedHeld,
                std::to_string(num_matched - num_held) + " of " +
@@ -226,14 +253,14 @@ void JudgePriors(const Verdict& verdict, Judge* judge) {
   }
 }
 
-void JudgeStages(const MapperStageSummary& summary, const Verdict& verdict,
-                 const std::vector<std::string>& warnings, Judge* judge) {
+// `name` tells the model from others; empty for the only one.
+void JudgeStage(const std::string& name, const MapperStageSummary& summary,
+                int num_images, Judge* judge) {
   if (summary.started_from_coarse_poses) {
-    judge->Doubt("the parts contradicted the sensors and were given up");
+    judge->Doubt(name + "the parts contradicted the sensors and were given up");
   }
-  if (summary.refine.num_images_put_back >
-      kGoodSharePutBack * verdict.num_images) {
-    judge->Doubt(std::to_string(summary.refine.num_images_put_back) +
+  if (summary.refine.num_images_put_back > kGoodSharePutBack * num_images) {
+    judge->Doubt(name + std::to_string(summary.refine.num_images_put_back) +
                  " images contradicted the sensors and were put back");
   }
   int num_lost_parts = 0;
@@ -243,42 +270,115 @@ void JudgeStages(const MapperStageSummary& summary, const Verdict& verdict,
     if (!summary.parts[k].failure.empty() || !is_merged) ++num_lost_parts;
   }
   if (num_lost_parts > 0) {
-    judge->Doubt(std::to_string(num_lost_parts) + " of " +
+    judge->Doubt(name + std::to_string(num_lost_parts) + " of " +
                  std::to_string(summary.parts.size()) +
                  " parts could not be used");
   }
-  for (const std::string& warning : warnings) {
-    judge->Doubt("an earlier step warned: " + warning);
+}
+
+// Each by itself: a wrong one must not hide behind a large sound one.
+void JudgeEachModel(const std::vector<AssessedModel>& models, int num_images,
+                    Judge* judge) {
+  int num_sound_images = num_images;
+  std::string reason;
+  for (size_t k = 0; k < models.size(); ++k) {
+    const AssessedModel& model = models[k];
+    const Verdict verdict =
+        AssessModel(*model.data, *model.summary, {}, *model.model);
+    if (verdict.result != VerdictResult::kFailed) continue;
+    num_sound_images -= verdict.num_images;
+    reason += std::string(reason.empty() ? "" : "; ") + "model " +
+              std::to_string(k) + " of " + std::to_string(verdict.num_images) +
+              " images failed: " + verdict.reasons.front();
+  }
+  if (reason.empty()) return;
+  const double share = 1.0 * num_sound_images / std::max(1, num_images);
+  if (share < kMinShareOfImages) {
+    judge->Fail(reason);
+  } else {
+    judge->Doubt(reason);
+  }
+}
+
+// "of 1 of 3 models " when not all are meant.
+std::string OfModels(int num_models, int num_all_models) {
+  if (num_models == num_all_models) return "";
+  return "of " + std::to_string(num_models) + " of " +
+         std::to_string(num_all_models) + " models ";
+}
+
+std::string MetricSource(const std::vector<AssessedModel>& models) {
+  bool has_metric_sensors = false;
+  bool is_georeferenced = false;
+  for (const AssessedModel& model : models) {
+    has_metric_sensors |= model.summary->has_metric_sensors;
+    is_georeferenced |= model.summary->is_georeferenced;
+  }
+  if (!is_georeferenced) return has_metric_sensors ? "wheels" : "";
+  return has_metric_sensors ? "wheels and positions" : "positions";
+}
+
+void CollectFigures(const std::vector<AssessedModel>& models,
+                    Verdict* verdict) {
+  verdict->num_models = static_cast<int>(models.size());
+  double sum_px = 0.0;
+  for (const AssessedModel& model : models) {
+    const MapperStageSummary& summary = *model.summary;
+    verdict->num_metric_models += summary.is_metric;
+    sum_px += summary.mean_reproj_error_px * model.model->NumPoints3D();
+    if (summary.refine.keypoint_sigma_factor <=
+            verdict->keypoint_sigma_factor &&
+        verdict->keypoint_sigma_px > 0.0) {
+      continue;
+    }
+    verdict->keypoint_sigma_px = summary.refine.keypoint_sigma_px;
+    verdict->keypoint_sigma_factor = summary.refine.keypoint_sigma_factor;
+  }
+  verdict->is_metric = verdict->num_metric_models == verdict->num_models;
+  verdict->metric_source = MetricSource(models);
+  if (verdict->num_points > 0) {
+    verdict->mean_reproj_error_px = sum_px / verdict->num_points;
   }
 }
 
 }  // namespace
 
-Verdict AssessModel(const SceneData& data, const MapperStageSummary& summary,
-                    const std::vector<std::string>& warnings,
-                    const colmap::Reconstruction& model) {
+Verdict AssessModels(const std::vector<AssessedModel>& models,
+                     const SceneData& rest,
+                     const std::vector<std::string>& warnings) {
   Verdict verdict;
-  CountImages(data, model, &verdict);
-  verdict.is_metric = summary.is_metric;
-  if (summary.has_metric_sensors) verdict.metric_source = "wheels";
-  if (summary.is_georeferenced) {
-    verdict.metric_source +=
-        verdict.metric_source.empty() ? "positions" : " and positions";
-  }
-  verdict.priors = ComparePriors(data, model);
-  verdict.keypoint_sigma_px = summary.refine.keypoint_sigma_px;
-  verdict.keypoint_sigma_factor = summary.refine.keypoint_sigma_factor;
-  verdict.mean_reproj_error_px = summary.mean_reproj_error_px;
+  CountImages(models, rest, &verdict);
+  CollectFigures(models, &verdict);
+  verdict.priors = ComparePriors(models);
   Judge judge;
   JudgeImages(verdict, &judge);
-  JudgeMatchedImages(data, model, &judge);
+  JudgeMatchedImages(models, rest, &judge);
   JudgePriors(verdict, &judge);
-  JudgeStages(summary, verdict, warnings, &judge);
-  if (!summary.is_metric && !data.priors.empty()) {
-    judge.Doubt("lengths are in no unit, since no sensor knows them");
+  if (models.size() > 1) JudgeEachModel(models, verdict.num_images, &judge);
+  bool has_priors = false;
+  for (size_t k = 0; k < models.size(); ++k) {
+    JudgeStage(models.size() == 1 ? "" : "model " + std::to_string(k) + ": ",
+               *models[k].summary,
+               static_cast<int>(models[k].model->NumRegImages()), &judge);
+    has_priors = has_priors || !models[k].data->priors.empty();
+  }
+  for (const std::string& warning : warnings) {
+    judge.Doubt("an earlier step warned: " + warning);
+  }
+  if (!verdict.is_metric && has_priors) {
+    judge.Doubt("lengths " +
+                OfModels(verdict.num_models - verdict.num_metric_models,
+                         verdict.num_models) +
+                "are in no unit, since no sensor knows them");
   }
   judge.Decide(&verdict);
   return verdict;
+}
+
+Verdict AssessModel(const SceneData& data, const MapperStageSummary& summary,
+                    const std::vector<std::string>& warnings,
+                    const colmap::Reconstruction& model) {
+  return AssessModels({{&data, &summary, &model}}, {}, warnings);
 }
 
 const char* VerdictName(VerdictResult result) {
@@ -300,13 +400,22 @@ std::string FormatVerdict(const Verdict& verdict) {
     text << (i == 0 ? ": " : "; ") << verdict.reasons[i];
   }
   text << ". " << verdict.num_images << " of " << verdict.num_database_images
-       << " images, " << verdict.num_points << " points, "
+       << " images, "
+       << (verdict.num_models == 1
+               ? ""
+               : "in " + std::to_string(verdict.num_models) + " models, ")
+       << verdict.num_points << " points, "
        << static_cast<int>(verdict.median_points_per_image) << " an image, "
-       << (verdict.is_metric ? "in metres from " + verdict.metric_source
-                             : "no metres");
+       << (verdict.num_metric_models == 0
+               ? "no metres"
+               : OfModels(verdict.num_metric_models, verdict.num_models) +
+                     "in metres from " + verdict.metric_source);
   for (const PriorAgreement& priors : verdict.priors) {
     text << ", " << priors.kind << "s agree to "
          << Percent(1.0 - priors.share_contradicting);
+  }
+  if (!verdict.lost_images.empty()) {
+    text << ". In no model: " << DescribeLostImages(verdict.lost_images);
   }
   return text.str();
 }
@@ -318,10 +427,12 @@ nlohmann::json VerdictToJson(const Verdict& verdict) {
       {"reasons", verdict.reasons},
       {"num_database_images", verdict.num_database_images},
       {"num_images", verdict.num_images},
+      {"num_models", verdict.num_models},
       {"num_images_held_by_points", verdict.num_images_held_by_points},
       {"num_points", verdict.num_points},
       {"median_points_per_image", verdict.median_points_per_image},
       {"is_metric", verdict.is_metric},
+      {"num_metric_models", verdict.num_metric_models},
       {"metric_source", verdict.metric_source},
       {"keypoint_sigma_px", verdict.keypoint_sigma_px},
       {"keypoint_sigma_factor", verdict.keypoint_sigma_factor},

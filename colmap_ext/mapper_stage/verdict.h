@@ -5,17 +5,18 @@
 #include <string>
 #include <vector>
 
+#include "colmap_ext/mapper_stage/lost_images.h"
 #include "colmap_ext/mapper_stage/mapper_stage.h"
 #include "colmap_ext/scene/scene_data.h"
 
 namespace adasfm {
 
-// What a model is worth, for somebody who does not know the field and for
-// programs.
+// What the models of a database are worth, for somebody who does not know the
+// field and for programs.
 //
-// Inputs: the finished model, the database that it was made from, and what the
-// stages said. Method: figures that need no ground truth, each against a limit
-// (docs/reference/mapper.md tells what they catch on worlds with truth).
+// Inputs: the finished models, the scenes that they were made from, and what
+// the stages said. Method: figures that need no ground truth, each against a
+// limit (docs/reference/mapper.md tells what they catch on worlds with truth).
 
 enum class VerdictResult { kGood, kDoubtful, kFailed };
 
@@ -43,17 +44,36 @@ struct Verdict {
   int num_points = 0;
   // Of the registered images.
   double median_points_per_image = 0.0;
-  bool is_metric = false;
+  bool is_metric = false;  // all models are
   // Where metres come from; empty without.
   std::string metric_source;
   std::vector<PriorAgreement> priors;
   double keypoint_sigma_px = 0.0;
   double keypoint_sigma_factor = 1.0;
   double mean_reproj_error_px = 0.0;
+  int num_models = 1;
+  int num_metric_models = 0;
+  // The images of no model; filled by the caller, for the line and the lists.
+  std::vector<LostImage> lost_images;
 };
 
+// A finished model with the scene that it was made from; all outlive the
+// assessment. A model without images is one that could not be made.
+struct AssessedModel {
+  const SceneData* data = nullptr;
+  const MapperStageSummary* summary = nullptr;
+  const colmap::Reconstruction* model = nullptr;
+};
+
+// Of all models together, the largest first; counts are sums and figures those
+// of all images. `rest` holds the images that belong to no model's scene.
 // `warnings` are those of the stages before: of the import and of the coarse
 // model.
+Verdict AssessModels(const std::vector<AssessedModel>& models,
+                     const SceneData& rest,
+                     const std::vector<std::string>& warnings);
+
+// Of one model, whose scene is all there is.
 Verdict AssessModel(const SceneData& data, const MapperStageSummary& summary,
                     const std::vector<std::string>& warnings,
                     const colmap::Reconstruction& model);

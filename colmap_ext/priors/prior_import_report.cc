@@ -74,8 +74,15 @@ std::string FormatPriorImport(const PriorImport& import) {
        << 100.0 * summary.prior_ratio << " % of consecutive images)\n"
        << "two-view rotations  " << import.num_visual_rotations << "\n"
        << "time shift          " << summary.timeshift_cam_imu_s
-       << " s, vision would add " << summary.visual_timeshift_correction_s
-       << " s\n";
+       << (summary.timeshift_was_corrected ? " s, vision added "
+                                           : " s, vision would add ")
+       << summary.visual_timeshift_correction_s << " s\n";
+  if (summary.unexplained_rotation.is_conclusive) {
+    const UnexplainedRotation& rotation = summary.unexplained_rotation;
+    text << "gyroscope, vision   turn by " << rotation.turning_deg
+         << " deg a photo, differ by " << rotation.residual_deg
+         << ", vision errs by " << rotation.visual_error_deg << "\n";
+  }
   if (summary.imu_rate_hz > 0.0) text << ImuLines(summary);
   text << "noise / stated      gyroscope " << summary.gyroscope_noise_factor
        << ", accelerometer " << summary.accelerometer_noise_factor
@@ -117,6 +124,13 @@ std::string PriorImportToJson(const PriorImport& import) {
       {"num_visual_rotations", import.num_visual_rotations},
       {"timeshift_cam_imu_s", summary.timeshift_cam_imu_s},
       {"visual_timeshift_correction_s", summary.visual_timeshift_correction_s},
+      {"timeshift_was_corrected", summary.timeshift_was_corrected},
+      {"wheel_clock_shift_s", summary.wheel_clock_shift_s},
+      {"imu_was_left_out", summary.imu_was_left_out},
+      {"rotation_turning_deg", summary.unexplained_rotation.turning_deg},
+      {"rotation_residual_deg", summary.unexplained_rotation.residual_deg},
+      {"rotation_visual_error_deg",
+       summary.unexplained_rotation.visual_error_deg},
       {"gyroscope_lag_s", summary.gyroscope_lag_s},
       {"gyroscope_delay_s", summary.gyroscope_delay_s},
       {"num_visual_links", summary.num_visual_links},

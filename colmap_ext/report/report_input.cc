@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "colmap_ext/report/report_input.h"
 
+#include <algorithm>
 #include <filesystem>
 #include <utility>
 
@@ -65,6 +66,30 @@ Status ReadPairs(const std::string& path, ReportInput* input) {
   return Status::Ok();
 }
 
+// The pairs that stand for weak places, as far as the database has them.
+std::vector<ReportPair> FindWeakPairs(const ReportOptions& options,
+                                      const ReportInput& input) {
+  std::vector<ReportPair> weak;
+  for (const ReportPlace& place : FindWeakPlaces(input.summaries)) {
+    const auto image1 = input.scene.index_of_name.find(place.name1);
+    const auto image2 = input.scene.index_of_name.find(place.name2);
+    if (image1 == input.scene.index_of_name.end() ||
+        image2 == input.scene.index_of_name.end()) {
+      continue;
+    }
+    const auto indices = std::minmax(image1->second, image2->second);
+    const auto pair =
+        std::find_if(input.pairs->pairs.begin(), input.pairs->pairs.end(),
+                     [&indices](const ReportPair& candidate) {
+                       return candidate.index1 == indices.first &&
+                              candidate.index2 == indices.second;
+                     });
+    if (pair != input.pairs->pairs.end()) weak.push_back(*pair);
+    if (static_cast<int>(weak.size()) == options.max_num_examples) break;
+  }
+  return weak;
+}
+
 Status ReadExamples(const ReportOptions& options, ReportInput* input) {
   if (!fs::is_directory(options.image_path)) {
     return Status::Error("there is no folder " + options.image_path +
@@ -77,7 +102,9 @@ Status ReadExamples(const ReportOptions& options, ReportInput* input) {
       *input->pairs, num_images, options.max_num_examples);
   const std::vector<ReportPair> kept =
       SelectKeptExamples(*input->pairs, num_images, options.max_num_examples);
+  const std::vector<ReportPair> weak = FindWeakPairs(options, *input);
   int num_removed_unreadable = 0, num_kept_unreadable = 0;
+  int num_weak_unreadable = 0;
   try {
     SqliteConnection database(options.database_path,
                               SqliteConnection::Mode::kRead);
@@ -85,10 +112,13 @@ Status ReadExamples(const ReportOptions& options, ReportInput* input) {
         removed, input->scene, photos, &database, &num_removed_unreadable);
     input->kept_examples = FormatExamples(kept, input->scene, photos, &database,
                                           &num_kept_unreadable);
+    input->weak_examples = FormatExamples(weak, input->scene, photos, &database,
+                                          &num_weak_unreadable);
   } catch (const SqliteError& error) {
     return Status::Error(error.what());
   }
-  const int num_unreadable = num_removed_unreadable + num_kept_unreadable;
+  const int num_unreadable =
+      num_removed_unreadable + num_kept_unreadable + num_weak_unreadable;
   if (num_unreadable > 0) {
     input->notes.push_back(FormatCount(num_unreadable) +
                            " of the pairs on photos: " + options.image_path +

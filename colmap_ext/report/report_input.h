@@ -32,6 +32,7 @@ struct ReportInput {
   // HTML of pairs with their matches on the photos.
   std::string removed_examples;
   std::string kept_examples;
+  std::string weak_examples;
   NamedPoses truth;
   std::optional<Evaluation> evaluation;
   // What is not shown, and why.

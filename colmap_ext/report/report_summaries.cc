@@ -4,6 +4,7 @@
 #include <cmath>
 #include <fstream>
 #include <limits>
+#include <map>
 
 namespace adasfm {
 namespace {
@@ -69,6 +70,22 @@ std::vector<std::vector<image_t>> PartsOfPlan(const Json& plan) {
   return parts;
 }
 
+// Of all components; their images differ.
+std::vector<std::vector<image_t>> ReadPlans(const std::string& mapper_folder,
+                                            std::vector<std::string>* notes) {
+  std::vector<std::vector<image_t>> parts;
+  std::string folder = mapper_folder;
+  for (int k = 1;; ++k) {
+    const Json plan = ReadJson(folder + "/checkpoints/plan.json",
+                               Json::value_t::object, notes);
+    if (plan.is_null()) break;
+    const auto more = PartsOfPlan(plan);
+    parts.insert(parts.end(), more.begin(), more.end());
+    folder = mapper_folder + "/component_" + std::to_string(k);
+  }
+  return parts;
+}
+
 std::string PartOutcome(const Json& part) {
   const std::string failure = TextAt(part, "failure");
   if (!failure.empty()) return "failed: " + failure;
@@ -98,9 +115,7 @@ ReportSummaries ReadReportSummaries(const std::string& database_path,
   if (!mapper_folder.empty()) {
     summaries.mapper =
         ReadJson(mapper_folder + "/summary.json", Json::value_t::object, notes);
-    summaries.parts =
-        PartsOfPlan(ReadJson(mapper_folder + "/checkpoints/plan.json",
-                             Json::value_t::object, notes));
+    summaries.parts = ReadPlans(mapper_folder, notes);
     summaries.steps =
         ReadJson(mapper_folder + "/../steps.json", Json::value_t::array, notes);
   }
@@ -214,30 +229,93 @@ ReportTable FormatGlobalSteps(const ReportSummaries& summaries) {
   return table;
 }
 
+ReportTable FormatModels(const ReportSummaries& summaries) {
+  ReportTable table;
+  const Json models = ListAt(summaries.mapper, "models");
+  if (models.size() < 2) return table;
+  table.head = {"model",      "coarse model", "images", "points",
+                "error [px]", "in metres",    "verdict"};
+  for (size_t k = 0; k < models.size(); ++k) {
+    const Json& model = models[k];
+    if (!model.is_object()) continue;
+    table.rows.push_back(
+        {std::to_string(k), Cell("%.0f", model, "coarse_model"),
+         Cell("%.0f", model, "num_images"), Cell("%.0f", model, "num_points"),
+         Cell("%.2f", model, "mean_reproj_error_px"),
+         model.value("is_metric", Json()) == true ? "yes" : "no",
+         TextAt(model.value("verdict", Json()), "line")});
+  }
+  return table;
+}
+
+ReportTable FormatLostImages(const ReportSummaries& summaries) {
+  std::map<std::string, std::vector<std::string>> names;
+  for (const Json& image : ListAt(summaries.mapper, "images_in_no_model")) {
+    names[TextAt(image, "reason")].push_back(TextAt(image, "name"));
+  }
+  ReportTable table;
+  table.head = {"images in no model", "number", "names"};
+  for (const auto& [reason, list] : names) {
+    std::string text;
+    for (const std::string& name : list) {
+      text += (text.empty() ? "" : ", ") + name;
+    }
+    table.rows.push_back({reason, FormatCount(list.size()), text});
+  }
+  return table;
+}
+
+std::vector<ReportPlace> FindWeakPlaces(const ReportSummaries& summaries) {
+  std::vector<ReportPlace> places;
+  for (const Json& place : ListAt(summaries.global, "weak_places")) {
+    places.push_back({TextAt(place, "name1"), TextAt(place, "name2"),
+                      "between the coarse models " +
+                          Cell("%.0f", place, "model1") + " and " +
+                          Cell("%.0f", place, "model2") + ": " +
+                          Cell("%.0f", place, "pairs") + " pairs, not used (" +
+                          TextAt(place, "reason") + ")"});
+  }
+  const Json models = ListAt(summaries.global, "models");
+  for (size_t k = 0; k < models.size(); ++k) {
+    for (const Json& join : ListAt(models[k], "unverified_joins")) {
+      places.push_back(
+          {TextAt(join, "name1"), TextAt(join, "name2"),
+           "in the coarse model " + std::to_string(k) + ": " +
+               Cell("%.0f", join, "pairs") + " pairs, which alone hold " +
+               Cell("%.0f", join, "images") + " images to the rest"});
+    }
+  }
+  return places;
+}
+
+ReportTable FormatWeakPlaces(const std::vector<ReportPlace>& places) {
+  ReportTable table;
+  table.head = {"photo", "photo", "place"};
+  for (const ReportPlace& place : places) {
+    table.rows.push_back({place.name1, place.name2, place.what});
+  }
+  return table;
+}
+
 ReportTable FormatParts(const ReportSummaries& summaries, bool is_metric) {
   const std::string unit = is_metric ? " [m]" : " [units]";
   ReportTable table;
-  table.head = {"part",
-                "outcome",
-                "images",
-                "registered",
-                "by coarse pose",
-                "points",
-                "error [px]",
-                "overlap [%]",
-                "fit inliers [%]",
-                "fit RMSE" + unit,
-                "threshold" + unit,
-                "scale",
-                "time [s]"};
+  table.head = {"model",           "part",
+                "outcome",         "images",
+                "registered",      "by coarse pose",
+                "points",          "error [px]",
+                "overlap [%]",     "fit inliers [%]",
+                "fit RMSE" + unit, "threshold" + unit,
+                "scale",           "time [s]"};
   for (const Json& part : ListAt(summaries.mapper, "parts")) {
     const auto percent = [&part](const char* key) {
       const double ratio = NumberAt(part, key);
       return std::isfinite(ratio) ? FormatNumber("%.0f", 100.0 * ratio) : "-";
     };
     table.rows.push_back(
-        {Cell("%.0f", part, "part_index"), PartOutcome(part),
-         Cell("%.0f", part, "num_images"), Cell("%.0f", part, "num_registered"),
+        {Cell("%.0f", part, "model"), Cell("%.0f", part, "part_index"),
+         PartOutcome(part), Cell("%.0f", part, "num_images"),
+         Cell("%.0f", part, "num_registered"),
          Cell("%.0f", part, "num_registered_by_global_pose"),
          Cell("%.0f", part, "num_points"),
          Cell("%.2f", part, "mean_reproj_error_px"), percent("overlap_ratio"),

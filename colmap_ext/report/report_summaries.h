@@ -18,7 +18,7 @@ struct ReportSummaries {
   nlohmann::json global;    // summary.json beside the coarse model
   nlohmann::json mapper;    // summary.json beside the model
   nlohmann::json steps;     // steps.json of the workspace above the model
-  // Image ids of the mapper's parts, of its checkpoints' plan.
+  // Image ids of the mapper's parts, of its checkpoints' plans.
   std::vector<std::vector<image_t>> parts;
   std::vector<std::string> notes;
 };
@@ -49,6 +49,21 @@ std::vector<StageTime> ListStageTimes(const ReportSummaries& summaries);
 
 ReportTable FormatSensors(const ReportSummaries& summaries);
 ReportTable FormatGlobalSteps(const ReportSummaries& summaries);
+// The models of the mapper's run, when there are several.
+ReportTable FormatModels(const ReportSummaries& summaries);
+// The images of no model, by reason.
+ReportTable FormatLostImages(const ReportSummaries& summaries);
+
+// A place that holds models together, or might: one pair of images stands for
+// all pairs there.
+struct ReportPlace {
+  std::string name1;
+  std::string name2;
+  std::string what;
+};
+std::vector<ReportPlace> FindWeakPlaces(const ReportSummaries& summaries);
+ReportTable FormatWeakPlaces(const std::vector<ReportPlace>& places);
+
 ReportTable FormatParts(const ReportSummaries& summaries, bool is_metric);
 
 }  // namespace adasfm

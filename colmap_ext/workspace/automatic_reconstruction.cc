@@ -383,7 +383,7 @@ Status Reconstructor::Priors() {
     if (!has_sensors) return Status::Ok();
     const StatusOr<LoadedPriorTables> tables = ReadPriorTables(database_path_);
     if (!tables.ok()) return tables.status();
-    const bool is_missing = has_motion_logs ? tables->tables.priors.empty()
+    const bool is_missing = has_motion_logs ? tables->tables.image_times.empty()
                                             : tables->tables.positions.empty();
     return is_missing
                ? Status::Error("the priors are missing in " + database_path_)
@@ -412,12 +412,12 @@ Status Reconstructor::Model() {
   const auto work = [this]() -> Status {
     MapRequest request;
     request.database_path = database_path_;
-    request.input_path = InWorkspace("coarse/0");
+    request.input_path = InWorkspace("coarse");
     request.output_path = InWorkspace("sparse");
     const StatusOr<MapReport> report =
         MapParts(options_.map, request, ProgressIn(kModel, "model"));
     if (!report.ok()) return report.status();
-    message_(FormatMapperSummaryText(report->summary));
+    message_(FormatMappingText(report->models));
     return ColorPoints(paths_.image_path, InWorkspace("sparse"),
                        InWorkspace("logs/colors.log"));
   };

@@ -8,6 +8,7 @@
 #include "sensors/calibration_check/calibration_mistakes.h"
 #include "sensors/calibration_check/rotation_comparison.h"
 #include "sensors/calibration_check/shift_search.h"
+#include "sensors/calibration_check/unexplained_rotation.h"
 #include "sensors/io/format_figures.h"
 
 namespace adasfm {
@@ -38,7 +39,8 @@ class VisionComparer {
                  const std::vector<ImuSample>& imu,
                  const SensorCalibration& calibration,
                  const VisionCheckOptions& options)
-      : search_(rotations, imu, calibration.timeshift_cam_imu_s, options),
+      : rotations_(rotations),
+        search_(rotations, imu, calibration.timeshift_cam_imu_s, options),
         cam_from_imu_(calibration.cam_from_imu.rotation.toRotationMatrix()),
         timeshift_s_(calibration.timeshift_cam_imu_s),
         options_(options) {}
@@ -51,6 +53,8 @@ class VisionComparer {
   void CompareAsIs(VisionCheck* check);
   // Whether there is one.
   bool NameMistake(VisionCheck* check) const;
+  // Whether there is one.
+  bool FindOtherMotion(VisionCheck* check) const;
   bool IsWorseThanNone() const;
   void CheckTurnScale(VisionCheck* check) const;
   void CheckTimeShift(VisionCheck* check) const;
@@ -59,6 +63,7 @@ class VisionComparer {
   const Explanation* FindBetter() const;
   const Explanation& calibrated() const { return explanations_[0]; }
 
+  const std::vector<TimedRotation>& rotations_;
   ShiftSearch search_;
   Eigen::Matrix3d cam_from_imu_;
   double timeshift_s_;
@@ -132,6 +137,28 @@ bool VisionComparer::NameMistake(VisionCheck* check) const {
   return false;
 }
 
+bool VisionComparer::FindOtherMotion(VisionCheck* check) const {
+  const UnexplainedRotation found = FindUnexplainedRotation(
+      rotations_, search_, calibrated().shift_s, options_);
+  check->unexplained = found;
+  if (!found.is_conclusive ||
+      found.turning_deg < options_.min_rotation_rms_deg ||
+      found.residual_deg < options_.max_unexplained_ratio * found.turning_deg ||
+      // Another scale is a mistake of its own, which is named.
+      found.scaled_residual_deg <
+          options_.max_unexplained_ratio * found.visual_turning_deg ||
+      found.visual_error_deg >
+          options_.max_visual_error_ratio * found.residual_deg) {
+    return false;
+  }
+  check->contradiction_is_motion = true;
+  check->contradiction = FormatFigures(
+      "gyroscope and pictures show different motions: of %.2f deg from photo "
+      "to photo %.2f are left at the best clock and mounting",
+      found.turning_deg, found.residual_deg);
+  return true;
+}
+
 bool VisionComparer::IsWorseThanNone() const {
   Explanation none = as_is_;
   none.mistake.map.setZero();
@@ -170,6 +197,9 @@ void VisionComparer::CheckTimeShift(VisionCheck* check) const {
   check->time_shift_correction_s = calibrated().shift_s;
   const bool is_better = calibrated().fit.cost < kTie * as_is_.fit.cost &&
                          search_.Evidence(as_is_, calibrated()) >= kMinEvidence;
+  check->is_clock_shift =
+      is_better && has_unshifted_ &&
+      std::abs(calibrated().shift_s) <= options_.max_clock_shift_s;
   if (std::abs(calibrated().shift_s) > options_.max_accepted_shift_s &&
       (is_better || !has_unshifted_)) {
     check->contradiction =
@@ -203,9 +233,11 @@ VisionCheck VisionComparer::Run() {
   CompareAsIs(&check);
   // 3. A mistake that explains vision better.
   if (NameMistake(&check)) return check;
+  // 4. Pictures that turn otherwise than the camera.
+  if (FindOtherMotion(&check)) return check;
   if (check.shifted_correlation < options_.min_correlation) {
     if (check.total_correlation >= options_.min_correlation) return check;
-    // 4. Nothing fits: is the gyroscope worse than none?
+    // 5. Nothing fits: is the gyroscope worse than none?
     if (!IsWorseThanNone()) return VisionCheck();
     check.contradiction =
         "vision and gyroscope contradict each other: check T_cam_imu, the "
@@ -213,12 +245,12 @@ VisionCheck VisionComparer::Run() {
         Figures(check);
     return check;
   }
-  // 5. The gyroscope's scale.
+  // 6. The gyroscope's scale.
   CheckTurnScale(&check);
   if (!check.contradiction.empty()) return check;
-  // 6. What no time shift explains.
+  // 7. What no time shift explains.
   check.filter = FindFilter();
-  // 7. The time shift.
+  // 8. The time shift.
   CheckTimeShift(&check);
   return check;
 }
@@ -229,7 +261,8 @@ bool VisionCheckOptions::IsValid(std::string* error) const {
   if (max_time_shift_s > 0.0 && min_rotation_rms_deg > 0.0 &&
       min_contradicting_rms_deg > 0.0 && min_num_rotations > 1 &&
       min_correlation > 0.0 && min_correlation < 1.0 &&
-      max_accepted_shift_s > 0.0) {
+      max_accepted_shift_s > 0.0 && max_clock_shift_s > 0.0 &&
+      max_unexplained_ratio > 0.0 && max_visual_error_ratio > 0.0) {
     return true;
   }
   *error =

@@ -35,8 +35,32 @@ struct VisionCheckOptions {
   double min_correlation = 0.8;
   // A shift beyond this is refused unless it is to be estimated.
   double max_accepted_shift_s = 0.03;
+  // A shift up to this is a clock's, and may be corrected without asking:
+  // exposure, readout and the driver's delay make tens of milliseconds. Beyond
+  // it another mistake is likelier.
+  double max_clock_shift_s = 0.15;
+  // A gyroscope that leaves this share of the turning unexplained is that of
+  // another motion than the pictures',
+  double max_unexplained_ratio = 0.5;
+  // if vision itself errs by no more than this share of what is left.
+  double max_visual_error_ratio = 0.33;
 
   bool IsValid(std::string* error) const;
+};
+
+// Medians over intervals of one to two frames, of the lengths of rotation
+// vectors (unexplained_rotation.h).
+struct UnexplainedRotation {
+  bool is_conclusive = false;
+  // Of the gyroscope about its mean, what no clock and no mounting explains of
+  // vision, and what vision errs by itself.
+  double turning_deg = 0.0;
+  double residual_deg = 0.0;
+  double visual_error_deg = 0.0;
+  // Of vision about its mean, and what is left when the gyroscope may have any
+  // scale too.
+  double visual_turning_deg = 0.0;
+  double scaled_residual_deg = 0.0;
 };
 
 struct VisionCheck {
@@ -58,6 +82,12 @@ struct VisionCheck {
   GyroscopeFilter filter;
   // The only mistake is the time shift.
   bool contradiction_is_time_shift = false;
+  // That time shift is clear from vision, and small enough for a clock's.
+  bool is_clock_shift = false;
+  UnexplainedRotation unexplained;
+  // Gyroscope and pictures show different motions, which no calibration mends:
+  // a video stabilised in the camera.
+  bool contradiction_is_motion = false;
   // Empty when vision and gyroscope agree; else one line that names the
   // mistake and what to do.
   std::string contradiction;

@@ -36,6 +36,11 @@ class ShiftSearch {
     return Compare(rotations_, shift_s, 0.0);
   }
 
+  // Of up to two frames, where there are enough of them.
+  RotationComparison CompareShortest(double shift_s) const {
+    return Compare(short_rotations_, shift_s, 0.0);
+  }
+
   // The best shift on a coarse grid for every explanation.
   void SearchShifts(std::vector<Explanation>* explanations) const;
 

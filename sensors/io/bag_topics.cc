@@ -65,6 +65,8 @@ Types WheelMessageTypes(WheelType type) {
     case WheelType::kTicks:
       return {"sensor_msgs/JointState"};
     case WheelType::kDifferential:
+    case WheelType::kEncoder:
+    case WheelType::kSteering:
       break;
   }
   return {};

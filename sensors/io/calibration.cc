@@ -156,6 +156,8 @@ void ReadWheelSection(const CalibrationReader& reader, const YAML::Node& wheel,
       {"velocity", WheelType::kVelocity},
       {"speed", WheelType::kSpeed},
       {"ticks", WheelType::kTicks},
+      {"encoder", WheelType::kEncoder},
+      {"steering", WheelType::kSteering},
       {"odometry", WheelType::kOdometry}};
   calibration->has_wheel = true;
   if (!wheel["type"] || !wheel["type"].IsScalar()) {
@@ -163,10 +165,11 @@ void ReadWheelSection(const CalibrationReader& reader, const YAML::Node& wheel,
   }
   const auto type = kTypes.find(wheel["type"].Scalar());
   if (type == kTypes.end()) {
-    reader.Fail("wheel0/type",
-                "is '" + wheel["type"].Scalar() +
-                    "'; differential, velocity, speed, ticks or odometry are "
-                    "known");
+    reader.Fail(
+        "wheel0/type",
+        "is '" + wheel["type"].Scalar() +
+            "'; differential, velocity, speed, steering, ticks, encoder "
+            "or odometry are known");
   }
   calibration->wheel_type = type->second;
   if (type->second == WheelType::kDifferential ||
@@ -174,9 +177,13 @@ void ReadWheelSection(const CalibrationReader& reader, const YAML::Node& wheel,
     calibration->track_width_m =
         reader.InRange(wheel, "track_width", 0.01, 20.0, "m");
   }
-  if (type->second == WheelType::kTicks) {
+  if (CountsTicks(type->second)) {
     calibration->metres_per_tick =
         reader.InRange(wheel, "metres_per_tick", 1e-9, 10.0, "m");
+  }
+  if (type->second == WheelType::kSteering) {
+    calibration->wheelbase_m =
+        reader.InRange(wheel, "wheelbase", 0.05, 20.0, "m");
   }
   calibration->wheel_speed_noise =
       reader.InRange(wheel, "speed_noise", 1e-5, 20.0, "m/s");

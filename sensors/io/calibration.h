@@ -25,6 +25,7 @@ struct SensorCalibration {
   WheelType wheel_type = WheelType::kDifferential;
   double track_width_m = 1.0;
   double metres_per_tick = 0.0;
+  double wheelbase_m = 1.0;            // rear to front axle, of kSteering
   double wheel_speed_noise = 0.05;     // m/s, 1 sigma of one sample
   double wheel_yaw_rate_noise = 0.02;  // rad/s, 1 sigma of one sample
   Rigid3d imu_from_wheel;

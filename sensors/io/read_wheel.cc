@@ -22,6 +22,10 @@ std::string TypeName(WheelType type) {
       return "speed";
     case WheelType::kTicks:
       return "ticks";
+    case WheelType::kEncoder:
+      return "encoder";
+    case WheelType::kSteering:
+      return "steering";
     case WheelType::kOdometry:
       return "odometry";
   }
@@ -53,11 +57,13 @@ StatusOr<WheelType> FindType(const LogFile& file) {
       return WheelType::kDifferential;
     }
     if (names[1] == "v" && names[2] == "omega") return WheelType::kVelocity;
+    if (names[1] == "v" && names[2] == "steering") return WheelType::kSteering;
     if (names[1] == "ticks_left" && names[2] == "ticks_right") {
       return WheelType::kTicks;
     }
   }
   if (names.size() == 2 && names[1] == "v") return WheelType::kSpeed;
+  if (names.size() == 2 && names[1] == "ticks") return WheelType::kEncoder;
   if (!file.has_commas() && file.Line(0).fields.size() == 8) {
     return WheelType::kOdometry;
   }
@@ -65,12 +71,15 @@ StatusOr<WheelType> FindType(const LogFile& file) {
       file.path() + ", line 1: the header '" + file.header().substr(0, 80) +
       "' is none of '#timestamp [ns],v_left [m s^-1],v_right [m s^-1]', "
       "'...,v [m s^-1],omega [rad s^-1]', '...,v [m s^-1]', "
-      "'...,ticks_left,ticks_right'; nor is the file a TUM trajectory");
+      "'...,v [m s^-1],steering [rad]', '...,ticks_left,ticks_right', "
+      "'...,ticks'; nor is the file a TUM trajectory");
 }
 
 // Faster than any machine with photos to match: km/h or mm/s were logged.
 constexpr double kMaxSpeed = 120.0;
 constexpr double kMaxYawRate = 20.0;
+// Beyond it no front wheel turns.
+constexpr double kMaxSteeringRad = 1.3;
 
 // 4Seasons' times are whole nanoseconds, TUM's are decimal seconds.
 bool ParseTumTime(std::string_view field, timestamp_t* timestamp_ns) {
@@ -115,7 +124,7 @@ StatusOr<std::vector<OdometryPose>> CheckPoseTimes(
 
 Status CheckWheelUnits(const std::vector<WheelSample>& samples, WheelType type,
                        const LogOrigin& origin) {
-  if (type == WheelType::kTicks) return Status::Ok();
+  if (CountsTicks(type)) return Status::Ok();
   const bool has_two_speeds = type == WheelType::kDifferential;
   for (size_t i = 0; i < samples.size(); ++i) {
     const WheelSample& sample = samples[i];
@@ -131,6 +140,14 @@ Status CheckWheelUnits(const std::vector<WheelSample>& samples, WheelType type,
       return Status::Error(origin.Locate(i) + ": a yaw rate of " +
                            std::to_string(sample.second) +
                            " rad/s; the log seems to be in deg/s (rad/s are "
+                           "expected)");
+    }
+    if (type == WheelType::kSteering &&
+        std::abs(sample.second) > kMaxSteeringRad) {
+      return Status::Error(origin.Locate(i) + ": a steering angle of " +
+                           std::to_string(sample.second) +
+                           " rad; the log seems to be in degrees, or of the "
+                           "steering wheel (rad of the front wheels are "
                            "expected)");
     }
   }
@@ -187,14 +204,15 @@ StatusOr<std::vector<WheelSample>> ReadWheel(const std::string& path,
                          TypeName(expected_type) +
                          "; set wheel0/type in the calibration");
   }
-  const bool is_speed = *type == WheelType::kSpeed;
+  const bool has_one_column =
+      *type == WheelType::kSpeed || *type == WheelType::kEncoder;
   LogOrigin origin;
   origin.path = path;
   std::vector<WheelSample> samples;
   for (size_t i = 0; i < file->num_lines(); ++i) {
     const LogLine line = file->Line(i);
-    Status status =
-        CheckNumFields(*file, line, is_speed ? 2 : 3, "as its header says");
+    Status status = CheckNumFields(*file, line, has_one_column ? 2 : 3,
+                                   "as its header says");
     if (!status.ok()) return status;
     WheelSample sample;
     if (!ParseNanoseconds(line.fields[0], &sample.timestamp_ns)) {
@@ -204,7 +222,7 @@ StatusOr<std::vector<WheelSample>> ReadWheel(const std::string& path,
                              "', not a time in whole nanoseconds");
     }
     double values[2] = {0.0, 0.0};
-    status = ParseNumbers(*file, line, 1, is_speed ? 1 : 2, values);
+    status = ParseNumbers(*file, line, 1, has_one_column ? 1 : 2, values);
     if (!status.ok()) return status;
     sample.first = values[0];
     sample.second = values[1];

@@ -95,7 +95,7 @@ StatusOr<CleanedLog<WheelSample>> CleanWheel(
   if (!status.ok()) return status;
   const double period_s = ComputeMedianPeriod(times_ns);
   std::vector<LogFaultKind> kinds(samples.size(), LogFaultKind::kNone);
-  if (type != WheelType::kTicks && period_s > 0.0) {
+  if (!CountsTicks(type) && period_s > 0.0) {
     MarkRuns(samples, type, period_s, &kinds);
     MarkDropOuts(samples, &WheelSample::first, &kinds);
     if (type == WheelType::kDifferential) {

@@ -37,6 +37,7 @@ WheelSpeed Interpolate(const std::vector<WheelSpeed>& speeds,
 // Speeds between counts, stamped in the middle between them.
 std::vector<WheelSpeed> SpeedsFromTicks(const std::vector<WheelSample>& samples,
                                         const SensorCalibration& calibration) {
+  const bool is_one_wheel = calibration.wheel_type == WheelType::kEncoder;
   std::vector<WheelSpeed> speeds;
   for (size_t i = 1; i < samples.size(); ++i) {
     const timestamp_t dt_ns =
@@ -47,9 +48,10 @@ std::vector<WheelSpeed> SpeedsFromTicks(const std::vector<WheelSample>& samples,
         metres_per_second * (samples[i].first - samples[i - 1].first);
     const double right =
         metres_per_second * (samples[i].second - samples[i - 1].second);
-    speeds.push_back({samples[i - 1].timestamp_ns + dt_ns / 2,
-                      0.5 * (left + right),
-                      (right - left) / calibration.track_width_m});
+    speeds.push_back(
+        {samples[i - 1].timestamp_ns + dt_ns / 2,
+         is_one_wheel ? left : 0.5 * (left + right),
+         is_one_wheel ? 0.0 : (right - left) / calibration.track_width_m});
   }
   return speeds;
 }
@@ -97,7 +99,7 @@ Eigen::Quaterniond InterpolateProfile(
 std::vector<WheelSpeed> ComputeWheelSpeeds(
     const std::vector<WheelSample>& samples,
     const SensorCalibration& calibration) {
-  if (calibration.wheel_type == WheelType::kTicks) {
+  if (CountsTicks(calibration.wheel_type)) {
     return SpeedsFromTicks(samples, calibration);
   }
   std::vector<WheelSpeed> speeds;
@@ -112,6 +114,11 @@ std::vector<WheelSpeed> ComputeWheelSpeeds(
           (sample.second - sample.first) / calibration.track_width_m;
     } else if (calibration.wheel_type == WheelType::kVelocity) {
       speed.yaw_rate = sample.second;
+    } else if (calibration.wheel_type == WheelType::kSteering) {
+      // The bicycle model: the rear axle turns about where its line meets that
+      // of the steered front axle.
+      speed.yaw_rate =
+          sample.first * std::tan(sample.second) / calibration.wheelbase_m;
     }
     speeds.push_back(speed);
   }

@@ -134,6 +134,9 @@ WheelNoise ComputeWheelNoise(const SensorCalibration& calibration,
     noise.distance_rounding = wheel / std::sqrt(2.0);
     noise.yaw_rounding = std::sqrt(2.0) * wheel / calibration.track_width_m;
   }
+  if (calibration.wheel_type == WheelType::kEncoder) {
+    noise.distance_rounding = calibration.metres_per_tick / std::sqrt(6.0);
+  }
   noise.lateral = options.lateral_speed_noise;
   noise.vertical = options.vertical_speed_noise;
   return noise;
@@ -186,7 +189,7 @@ std::vector<OdometryLink> BuildOdometryLinks(
     } else if (CoversInterval(logs.wheel, start, end,
                               options.max_wheel_gap_s)) {
       link.has_wheel = true;
-      link.has_wheel_yaw = calibration.wheel_type != WheelType::kSpeed;
+      link.has_wheel_yaw = TellsYaw(calibration.wheel_type);
       link.wheel = PreintegrateWheel(logs.wheel, start, end,
                                      calibration.imu_from_wheel.rotation,
                                      wheel_noise, profile);

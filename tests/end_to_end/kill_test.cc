@@ -27,11 +27,11 @@ int NumKills() {
 
 class KillTest : public CommandLineTest {
  protected:
-  void SetUp() override {
-    const Run run = Call(
-        "adasfm_synthesizer --num_images 40 --num_keypoints 150 --seed 5 "
-        "--output_path " +
-        folder_.Path());
+  // A world, and the chain on it. `mapper_input` is the mapper's in $OUT.
+  void Prepare(const std::string& world, const std::string& importer,
+               const std::string& mapper_input) {
+    const Run run = Call("adasfm_synthesizer --num_keypoints 150 " + world +
+                         " --output_path " + folder_.Path());
     ASSERT_EQ(run.ExitCode(), 0) << run.err;
     // One thread: the same sums, so the same bits.
     const std::string sh =
@@ -39,11 +39,15 @@ class KillTest : public CommandLineTest {
         "adasfm() { $LAUNCHER \"$@\" > \"$OUT/log\" 2>&1; }\n"
         "adasfm adasfm_prior_importer --database_path $OUT/database.db "
         "--image_times_path $IN/times.csv --imu_path $IN/imu.csv "
-        "--wheel_path $IN/wheel.csv --sensors_path $IN/sensors.yaml\n"
+        "--sensors_path $IN/sensors.yaml " +
+        importer +
+        "\n"
         "adasfm adasfm_global --database_path $OUT/database.db "
         "--output_path $OUT/global --AdaSfmGlobal.num_threads 1\n"
         "adasfm adasfm_mapper --database_path $OUT/database.db "
-        "--input_path $OUT/global/0 --output_path $OUT/sparse "
+        "--input_path $OUT/" +
+        mapper_input +
+        " --output_path $OUT/sparse "
         "--num_threads 1 --AdaSfmPartition.max_part_size 20 "
         "--AdaSfmPartition.max_num_images_undivided 20\n";
     script_ = folder_.Write("chain.sh", sh);
@@ -89,10 +93,14 @@ class KillTest : public CommandLineTest {
     return ReadBytes(out);
   }
 
+  void KillAndCompare(int num_models);
+
   std::string script_;
 };
 
-TEST_F(KillTest, EndsInTheSameModelWithTheDatabaseIntact) {
+// Kills the chain again and again; it ends in the same models, and nothing else
+// beside them.
+void KillTest::KillAndCompare(int num_models) {
   const std::string expected = NewRun("undisturbed");
   const auto start = std::chrono::steady_clock::now();
   ASSERT_NO_FATAL_FAILURE(Finish(expected));
@@ -113,14 +121,33 @@ TEST_F(KillTest, EndsInTheSameModelWithTheDatabaseIntact) {
     num_killed += WIFSIGNALED(status);
     EXPECT_EQ(Sqlite(path, "PRAGMA integrity_check"), "ok\n");
     ASSERT_NO_FATAL_FAILURE(Finish(path));
-    for (const char* name : {"cameras.bin", "images.bin", "points3D.bin"}) {
-      const std::string file = std::string("/sparse/0/") + name;
-      EXPECT_EQ(ReadBytes(path + file), ReadBytes(expected + file)) << trial;
+    for (int k = 0; k < num_models; ++k) {
+      for (const char* name : {"cameras.bin", "images.bin", "points3D.bin"}) {
+        const std::string file = "/sparse/" + std::to_string(k) + "/" + name;
+        EXPECT_EQ(ReadBytes(path + file), ReadBytes(expected + file)) << trial;
+        EXPECT_FALSE(ReadBytes(path + file).empty()) << file;
+      }
     }
+    EXPECT_FALSE(std::filesystem::exists(path + "/sparse/" +
+                                         std::to_string(num_models)));
     EXPECT_EQ(Sqlite(path, ".dump"), expected_database) << trial;
     std::filesystem::remove_all(path);
   }
   std::cout << num_killed << " runs killed, of " << seconds << " s each\n";
+}
+
+TEST_F(KillTest, EndsInTheSameModelWithTheDatabaseIntact) {
+  ASSERT_NO_FATAL_FAILURE(Prepare("--num_images 40 --seed 5",
+                                  "--wheel_path $IN/wheel.csv", "global/0"));
+  KillAndCompare(1);
+}
+
+// Without wheels nothing leads through the dark.
+TEST_F(KillTest, EndsInTheSameModelsOfSeveralComponents) {
+  ASSERT_NO_FATAL_FAILURE(
+      Prepare("--num_images 60 --seed 5 --num_blackouts 1 --blackout_images 14",
+              "", "global"));
+  KillAndCompare(2);
 }
 
 }  // namespace

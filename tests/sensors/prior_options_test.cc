@@ -122,7 +122,7 @@ INSTANTIATE_TEST_SUITE_P(
                      [](Options* o) { o->undo_gyroscope_filter = false; },
                      Sensors::kFilteredImu},
         OptionChange{"EstimateTimeShift",
-                     [](Options* o) { o->estimate_time_shift = true; }}),
+                     [](Options* o) { o->estimate_time_shift = 1; }}),
     [](const auto& change) { return change.param.name; });
 
 INSTANTIATE_TEST_SUITE_P(

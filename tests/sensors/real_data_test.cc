@@ -78,7 +78,7 @@ TEST_P(RealData, KittiTimeShiftIsFoundWithinTenMilliseconds) {
   const double true_shift_s = data.calibration.timeshift_cam_imu_s;
   data.calibration.timeshift_cam_imu_s = 0.0;
   PriorEstimationOptions options;
-  options.estimate_time_shift = true;
+  options.estimate_time_shift = 1;
   for (const uint64_t seed : {1, 2, 3}) {
     Random random(seed);
     std::vector<VisualRotation> rotations;

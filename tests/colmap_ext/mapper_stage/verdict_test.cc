@@ -146,5 +146,44 @@ TEST_F(VerdictTest, WhatTheStagesSaid) {
   ExpectResult(Assess(), VerdictResult::kDoubtful, "no metres");
 }
 
+TEST_F(VerdictTest, SeveralModelsAreJudgedTogetherAndEachByItself) {
+  SceneData rest;
+  rest.images[2000].image_id = 2000;
+  const AssessedModel sound = {&world_.data, &summary_, &model_};
+  MapperStageSummary without_metres = summary_;
+  without_metres.is_metric = false;
+  const Verdict verdict =
+      AssessModels({sound, {&world_.data, &without_metres, &model_}}, rest, {});
+  ExpectResult(verdict, VerdictResult::kDoubtful,
+               "80 of 81 images, in 2 models");
+  ExpectResult(verdict, VerdictResult::kDoubtful,
+               "lengths of 1 of 2 models are in no unit");
+  EXPECT_FALSE(verdict.is_metric);
+  EXPECT_EQ(verdict.num_metric_models, 1);
+  EXPECT_EQ(verdict.num_points, 2 * static_cast<int>(model_.NumPoints3D()));
+  EXPECT_EQ(verdict.priors[0].num_priors, 2 * 39);
+
+  // A model that failed by itself: behind one sound model it makes doubt, and
+  // where it holds most images all has failed.
+  colmap::Reconstruction without_points = model_;
+  for (const colmap::point3D_t point_id : model_.Point3DIds()) {
+    without_points.DeletePoint3D(point_id);
+  }
+  const AssessedModel failed = {&world_.data, &summary_, &without_points};
+  const Verdict doubtful = AssessModels({sound, sound, failed}, {}, {});
+  ExpectResult(doubtful, VerdictResult::kDoubtful,
+               "model 2 of 40 images failed: the model has no points");
+  ExpectResult(AssessModels({sound, failed, failed}, {}, {}),
+               VerdictResult::kFailed, "model 2 of 40 images failed");
+}
+
+TEST_F(VerdictTest, TheLineNamesImagesOfNoModel) {
+  Verdict verdict = Assess();
+  EXPECT_EQ(FormatVerdict(verdict).find("In no model"), std::string::npos);
+  verdict.lost_images = {{7, "dark.png", LostReason::kNoMatches}};
+  EXPECT_THAT(FormatVerdict(verdict),
+              HasSubstr("In no model: 1 without verified matches (dark.png)"));
+}
+
 }  // namespace
 }  // namespace adasfm

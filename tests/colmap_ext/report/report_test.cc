@@ -171,6 +171,35 @@ TEST_F(ReportTest, IsSelfContainedAndHoldsTheFigures) {
   EXPECT_EQ(*page, *BuildReport(AllInputs()));
 }
 
+TEST_F(ReportTest, NamesModelsLostImagesAndWeakPlaces) {
+  folder_.Write(
+      "global/summary.json",
+      "{\"weak_places\": [{\"model1\": 0, \"model2\": 1, \"pairs\": 4, "
+      "\"inliers\": 31, \"reason\": \"unverified join\", \"name1\": \"" +
+          world_.images[2].name + "\", \"name2\": \"" + world_.images[5].name +
+          "\"}], \"models\": [{\"unverified_joins\": [{\"pairs\": 3, "
+          "\"images\": 12, \"name1\": \"a\", \"name2\": \"b\"}]}]}");
+  folder_.Write("sparse/summary.json",
+                R"({"models": [
+                      {"coarse_model": 1, "num_images": 25, "is_metric": true,
+                       "verdict": {"line": "Verdict: good"}},
+                      {"coarse_model": 0, "num_images": 7,
+                       "verdict": {"line": "Verdict: failed"}}],
+                    "images_in_no_model": [
+                      {"name": "x<1>.png", "reason": "lost in the dark"},
+                      {"name": "x2.png", "reason": "lost in the dark"}]})");
+  const StatusOr<std::string> page = BuildReport(AllInputs());
+  ASSERT_TRUE(page.ok()) << page.status().message();
+  ExpectSelfContained(*page);
+  for (const std::string text :
+       {"Verdict: failed", "lost in the dark</th><td>2</td>",
+        "x&lt;1&gt;.png, x2.png",
+        "between the coarse models 0 and 1: 4 pairs, not used (unverified",
+        "3 pairs, which alone hold 12 images"}) {
+    EXPECT_NE(page->find(text), std::string::npos) << text;
+  }
+}
+
 TEST_F(ReportTest, DrawsMatchesOnPhotos) {
   ReportOptions options = AllInputs();
   options.image_path = folder_.File("photos");

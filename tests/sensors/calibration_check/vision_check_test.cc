@@ -104,12 +104,149 @@ TEST(VisionCheck, FindsTheTimeShift) {
     Dataset data = ToDataset(world);
     data.calibration.timeshift_cam_imu_s = 0.0;
     PriorEstimationOptions options;
-    options.estimate_time_shift = true;
+    options.estimate_time_shift = 1;
     const StatusOr<PriorEstimate> estimate =
         EstimatePriors(data.images, data.logs, data.calibration,
                        SimulateVision(world, seed), options);
     ASSERT_TRUE(estimate.ok()) << estimate.status().message();
     EXPECT_NEAR(estimate->summary.timeshift_cam_imu_s, 0.0623, 0.01);
+  }
+}
+
+PriorEstimate EstimateFrom(const Dataset& data,
+                           const std::vector<VisualRotation>& vision) {
+  const StatusOr<PriorEstimate> estimate =
+      EstimatePriors(data.images, data.logs, data.calibration, vision, {});
+  EXPECT_TRUE(estimate.ok()) << estimate.status().message();
+  return estimate.ok() ? *estimate : PriorEstimate();
+}
+
+// Without asking: what vision tells clearly, of the size of a phone's.
+TEST(VisionCheck, ClearClockShiftsAreCorrected) {
+  for (const double shift_s : {-0.053, -0.045, 0.062, 0.12}) {
+    SyntheticWorldOptions world_options = SmallWorld(4, 120);
+    world_options.timeshift_cam_imu_s = shift_s;
+    const SyntheticWorld world = BuildSyntheticWorld(world_options);
+    Dataset data = ToDataset(world);
+    data.calibration.timeshift_cam_imu_s = 0.0;
+    const PriorEstimate estimate = EstimateFrom(data, SimulateVision(world, 4));
+    EXPECT_NEAR(estimate.summary.timeshift_cam_imu_s, shift_s, 0.01);
+    EXPECT_TRUE(estimate.summary.timeshift_was_corrected);
+    ASSERT_FALSE(estimate.summary.warnings.empty());
+    EXPECT_NE(estimate.summary.warnings[0].find("timeshift_cam_imu"),
+              std::string::npos);
+  }
+}
+
+TEST(VisionCheck, InsignificantShiftsAreNotApplied) {
+  for (const uint64_t seed : {1, 2, 3}) {
+    const SyntheticWorld world = BuildSyntheticWorld(SmallWorld(seed, 120));
+    const Dataset data = ToDataset(world);
+    const PriorEstimate estimate =
+        EstimateFrom(data, SimulateVision(world, seed));
+    EXPECT_EQ(estimate.summary.timeshift_cam_imu_s,
+              data.calibration.timeshift_cam_imu_s);
+    EXPECT_FALSE(estimate.summary.timeshift_was_corrected);
+    EXPECT_FALSE(estimate.summary.imu_was_left_out);
+  }
+}
+
+// The rotations between images and the next two, so that triangles close.
+std::vector<VisualRotation> Film(
+    const Dataset& data, const std::map<image_t, Eigen::Quaterniond>& shown,
+    Random* random) {
+  std::vector<VisualRotation> rotations;
+  for (size_t i = 0; i < data.images.size(); ++i) {
+    for (size_t k = i + 1; k < std::min(i + 3, data.images.size()); ++k) {
+      const image_t image_id1 = data.images[i].image_id;
+      const image_t image_id2 = data.images[k].image_id;
+      rotations.push_back(
+          {image_id1, image_id2,
+           ExpSo3(random->GaussianVector(5e-4)) * shown.at(image_id2) *
+               shown.at(image_id1).conjugate(),
+           100});
+    }
+  }
+  return rotations;
+}
+
+// As the camera turns, and as a stabilised video shows it: the mean over a
+// second, which keeps the bends and loses what shakes.
+std::map<image_t, Eigen::Quaterniond> ShownRotations(const Dataset& data,
+                                                     bool is_stabilized) {
+  std::map<image_t, Eigen::Quaterniond> shown;
+  const std::vector<ImageStamp>& images = data.images;
+  const size_t reach = is_stabilized ? 3 : 0;
+  for (size_t i = 0; i < images.size(); ++i) {
+    const Eigen::Quaterniond center =
+        data.cams_from_world.at(images[i].image_id).rotation;
+    Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+    const size_t begin = i < reach ? 0 : i - reach;
+    const size_t end = std::min(images.size(), i + reach + 1);
+    for (size_t k = begin; k < end; ++k) {
+      sum += LogSo3(data.cams_from_world.at(images[k].image_id).rotation *
+                    center.conjugate());
+    }
+    shown[images[i].image_id] = ExpSo3(sum / (end - begin)) * center;
+  }
+  return shown;
+}
+
+// A hand-held camera: each image turned by some degrees, and the gyroscope's
+// log turned with it.
+void Shake(double amplitude_rad, Dataset* data) {
+  const auto turn_at = [amplitude_rad](timestamp_t time_ns) -> Eigen::Vector3d {
+    const double t = SecondsFromNs(time_ns % 1'000'000'000'000);
+    return amplitude_rad * Eigen::Vector3d(std::sin(9.0 * t + 1.0),
+                                           std::sin(11.0 * t),
+                                           std::sin(7.0 * t + 2.0));
+  };
+  const timestamp_t shift_ns =
+      std::llround(1e9 * data->calibration.timeshift_cam_imu_s);
+  const Eigen::Quaterniond cam_from_imu =
+      data->calibration.cam_from_imu.rotation;
+  for (const ImageStamp& image : data->images) {
+    Rigid3d& pose = data->cams_from_world.at(image.image_id);
+    const Eigen::Quaterniond imu_from_world =
+        cam_from_imu.conjugate() * pose.rotation;
+    pose.rotation = cam_from_imu *
+                    ExpSo3(turn_at(image.timestamp_ns + shift_ns)).conjugate() *
+                    imu_from_world;
+  }
+  for (ImuSample& sample : data->logs.imu) {
+    const timestamp_t time_ns = sample.timestamp_ns;
+    constexpr timestamp_t kStepNs = 1'000'000;
+    const Eigen::Quaterniond turn = ExpSo3(turn_at(time_ns));
+    const Eigen::Quaterniond next = ExpSo3(turn_at(time_ns + kStepNs));
+    sample.angular_velocity =
+        turn.conjugate() * sample.angular_velocity +
+        LogSo3(turn.conjugate() * next) / SecondsFromNs(kStepNs);
+    sample.specific_force = turn.conjugate() * sample.specific_force;
+  }
+}
+
+TEST(VisionCheck, StabilizedVideoLeavesTheImuOut) {
+  for (const uint64_t seed : {1, 2, 3}) {
+    const SyntheticWorld world = BuildSyntheticWorld(SmallWorld(seed, 150));
+    Dataset data = ToDataset(world);
+    data.logs.wheel.clear();
+    data.calibration.has_wheel = false;
+    Shake(DegToRad(2.0), &data);
+    Random random(seed);
+    const PriorEstimate estimate =
+        EstimateFrom(data, Film(data, ShownRotations(data, true), &random));
+    EXPECT_TRUE(estimate.summary.imu_was_left_out);
+    EXPECT_TRUE(estimate.priors.empty());
+    EXPECT_TRUE(estimate.gravity_in_cam.empty());
+    ASSERT_FALSE(estimate.summary.warnings.empty());
+    EXPECT_NE(estimate.summary.warnings.back().find("stabilised"),
+              std::string::npos);
+
+    // The same shaking, as it was filmed.
+    const PriorEstimate honest =
+        EstimateFrom(data, Film(data, ShownRotations(data, false), &random));
+    EXPECT_FALSE(honest.summary.imu_was_left_out);
+    EXPECT_EQ(honest.priors.size(), data.images.size() - 1);
   }
 }
 
@@ -129,7 +266,7 @@ TEST(VisionCheck, TimeShiftsAreExactAndUnbiased) {
         ExpSo3(random.GaussianVector(DegToRad(0.5))) *
         data.calibration.cam_from_imu.rotation;
     PriorEstimationOptions options;
-    options.estimate_time_shift = true;
+    options.estimate_time_shift = 1;
     const StatusOr<PriorEstimate> estimate =
         EstimatePriors(data.images, data.logs, data.calibration,
                        SimulateVision(world, seed, {1e-3, 3, 0.02}), options);

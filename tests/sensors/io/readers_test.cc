@@ -226,6 +226,9 @@ TEST_F(Readers, WheelTypesByHeader) {
        WheelType::kVelocity},
       {"#timestamp [ns],v [m s^-1]\n1,2\n", WheelType::kSpeed},
       {"#timestamp [ns],ticks_left,ticks_right\n1,2,3\n", WheelType::kTicks},
+      {"#timestamp [ns],v [m s^-1],steering [rad]\n1,2,0.3\n",
+       WheelType::kSteering},
+      {"#timestamp [ns],ticks\n1,2\n", WheelType::kEncoder},
       {"timestamp,v_left,v_right\n1,2,3\n", WheelType::kDifferential}};
   for (const auto& [text, type] : cases) {
     const std::string path = Write("wheel.csv", text);
@@ -235,7 +238,10 @@ TEST_F(Readers, WheelTypesByHeader) {
     const auto samples = ReadWheel(path, type);
     ASSERT_TRUE(samples.ok()) << samples.status().message();
     EXPECT_EQ((*samples)[0].first, 2.0);
-    EXPECT_EQ((*samples)[0].second, type == WheelType::kSpeed ? 0.0 : 3.0);
+    EXPECT_EQ((*samples)[0].second,
+              type == WheelType::kSteering                               ? 0.3
+              : type == WheelType::kSpeed || type == WheelType::kEncoder ? 0.0
+                                                                         : 3.0);
   }
 }
 

@@ -1,0 +1,275 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Stage 3 of adasfm_pipeline.h.
+#include <algorithm>
+#include <fstream>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <set>
+#include <utility>
+
+#include "colmap_ext/adasfm_pipeline.h"
+#include "colmap_ext/check_scene.h"
+#include "colmap_ext/database/two_view_geometry_backup.h"
+#include "colmap_ext/host/database.h"
+#include "colmap_ext/host/frames.h"
+#include "colmap_ext/host/model_folder.h"
+#include "colmap_ext/io/folder_lock.h"
+#include "colmap_ext/io/georeference_file.h"
+#include "colmap_ext/io/output_files.h"
+#include "colmap_ext/mapper_stage/lost_images.h"
+#include "colmap_ext/mapper_stage/map_components.h"
+#include "colmap_ext/read_coarse_models.h"
+#include "colmap_ext/scene/georeference.h"
+#include "core/check_options.h"
+#include "core/sqlite.h"
+
+namespace adasfm {
+namespace {
+
+// Before any work: nothing is lost when the result cannot be written.
+Status CheckMapPaths(const MapRequest& request) {
+  Status status = CheckDatabase(request.database_path);
+  if (status.ok()) status = PrepareOutputFolder(request.output_path);
+  if (status.ok()) {
+    status = CheckCoarseModels(request.input_path, request.output_path);
+  }
+  if (status.ok()) status = CheckModelFolders(request.output_path);
+  if (status.ok()) status = CheckComponentCheckpoints(request.output_path);
+  return status;
+}
+
+// Single parts may be made at the same time, each by one run.
+StatusOr<std::vector<std::shared_ptr<FolderLock>>> LockMapFolder(
+    const MapRequest& request) {
+  using Mode = FolderLock::Mode;
+  const bool is_part = request.steps == MapperSteps::kPart;
+  const auto whole = FolderLock::Acquire(
+      request.output_path, is_part ? Mode::kShared : Mode::kExclusive);
+  if (!whole.ok()) return whole.status();
+  if (!is_part) return std::vector<std::shared_ptr<FolderLock>>{*whole};
+  const auto part = FolderLock::Acquire(
+      request.output_path, Mode::kExclusive,
+      ".adasfm_part_" + std::to_string(request.part_index) + ".lock");
+  if (!part.ok()) return part.status();
+  return std::vector<std::shared_ptr<FolderLock>>{*whole, *part};
+}
+
+// What a stage wrote about itself; empty when it left no summary.
+std::vector<std::string> ReadWarnings(const std::string& summary_path) {
+  std::ifstream file(summary_path);
+  const nlohmann::json json =
+      nlohmann::json::parse(file, nullptr, /*allow_exceptions=*/false);
+  std::vector<std::string> warnings;
+  if (!json.is_object() || !json.contains("warnings")) return warnings;
+  for (const nlohmann::json& warning : json["warnings"]) {
+    if (warning.is_string()) warnings.push_back(warning.get<std::string>());
+  }
+  return warnings;
+}
+
+std::vector<std::string> ReadEarlierWarnings(const MapRequest& request) {
+  std::vector<std::string> warnings;
+  // The importer's other warnings are about its input.
+  for (std::string& warning :
+       ReadWarnings(request.database_path + ".priors.json")) {
+    if (warning.find("contradict") == std::string::npos) continue;
+    warnings.push_back(std::move(warning));
+  }
+  const std::string folder = IsFolderOfModels(request.input_path)
+                                 ? request.input_path
+                                 : request.input_path + "/..";
+  for (std::string& warning : ReadWarnings(folder + "/summary.json")) {
+    warnings.push_back(std::move(warning));
+  }
+  return warnings;
+}
+
+// The stage's options for this scene's cameras, with the thresholds that local
+// mapping and refinement share.
+MapperStageOptions ResolveOptions(const MapOptions& options,
+                                  const SceneData& scene) {
+  const bool is_calibrated = std::all_of(
+      scene.cameras.begin(), scene.cameras.end(),
+      [](const auto& entry) { return entry.second.HasPriorFocalLength(); });
+  const auto resolve = [is_calibrated](int choice) {
+    return choice < 0 ? !is_calibrated : choice != 0;
+  };
+  MapperStageOptions stage = options.stage;
+  stage.refine.refine_focal_length = resolve(options.refine_focal_length);
+  stage.refine.refine_extra_params = resolve(options.refine_extra_params);
+  const LocalMapperOptions& local = stage.local;
+  stage.refine.use_priors_in_adjustment = local.use_priors_in_adjustment;
+  stage.refine.filter_max_reproj_error_px = local.filter_max_reproj_error_px;
+  stage.refine.min_triangulation_angle_deg = local.min_triangulation_angle_deg;
+  stage.refine.keypoint_sigma_px = local.keypoint_sigma_px;
+  stage.refine.balance = local.balance;
+  return stage;
+}
+
+// Images with verified matches, those that adasfm_global removed among them.
+StatusOr<std::set<image_t>> FindMatchedImages(
+    const std::string& database_path) {
+  std::set<image_t> images;
+  const auto add = [&images](const ImagePair& pair, int64_t) {
+    images.insert(pair.image_id1);
+    images.insert(pair.image_id2);
+  };
+  const int min_num_matches = SceneDataOptions().min_num_matches;
+  try {
+    SqliteConnection database(database_path, SqliteConnection::Mode::kRead);
+    for (const char* table :
+         {"two_view_geometries", kTwoViewGeometryBackupTable}) {
+      if (!database.HasTable(table)) continue;
+      CountMatches(&database, table, min_num_matches, add);
+    }
+  } catch (const SqliteError& error) {
+    return Status::Error(database_path + ": " + error.what());
+  }
+  return images;
+}
+
+StatusOr<std::vector<LostImage>> FindLost(
+    const MapRequest& request, const CoarseModels& coarse,
+    const std::vector<MappedComponent>& mapped) {
+  const StatusOr<std::set<image_t>> matched =
+      FindMatchedImages(request.database_path);
+  if (!matched.ok()) return matched.status();
+  std::set<image_t> images;
+  for (const MappedComponent& component : mapped) {
+    const std::vector<image_t> ids = component.model.RegImageIds();
+    images.insert(ids.begin(), ids.end());
+  }
+  return FindLostImages(coarse.components, coarse.rest,
+                        coarse.images_of_small_components, *matched, images);
+}
+
+Verdict Assess(const MapRequest& request, const CoarseModels& coarse,
+               const std::vector<MappedComponent>& mapped,
+               std::vector<LostImage> lost) {
+  std::vector<AssessedModel> assessed;
+  for (const MappedComponent& component : mapped) {
+    assessed.push_back(
+        {&component.component->data, &component.summary, &component.model});
+  }
+  Verdict verdict =
+      AssessModels(assessed, coarse.rest, ReadEarlierWarnings(request));
+  verdict.lost_images = std::move(lost);
+  return verdict;
+}
+
+// Moves the coarse poses into the frame of the scene's positions; positions
+// that do not fit them are left out.
+void AlignCoarseModel(double final_loss_scale, ComponentToMap* component,
+                      std::vector<std::string>* warnings) {
+  SceneData& data = component->data;
+  if (data.positions.empty()) return;
+  const CoarsePoseMap& coarse = component->coarse;
+  const bool is_metric = std::any_of(data.priors.begin(), data.priors.end(),
+                                     [&coarse](const RelativePosePrior& prior) {
+                                       return prior.HasLength() &&
+                                              coarse.count(prior.image_id1) &&
+                                              coarse.count(prior.image_id2);
+                                     });
+  const PositionAlignment alignment =
+      AlignSceneToPositions(data, coarse, is_metric);
+  component->initial_position_loss_scale =
+      PositionLossScale(alignment, final_loss_scale, 0, 2);
+  if (alignment.success) {
+    component->coarse =
+        TransformCamsFromWorld(alignment.enu_from_world, coarse);
+    return;
+  }
+  warnings->push_back("the positions are not used for coarse model " +
+                      std::to_string(component->coarse_index) + ": " +
+                      alignment.failure);
+  data.positions.clear();
+}
+
+Status AssessAndWrite(const MapRequest& request, const CoarseModels& coarse,
+                      const std::vector<MappedComponent>& mapped,
+                      const DatabaseFrames& frames, MapReport* report) {
+  std::vector<const colmap::Reconstruction*> models;
+  for (const MappedComponent& component : mapped) {
+    if (component.model.NumRegImages() == 0) continue;
+    models.push_back(&component.model);
+    report->models.push_back(
+        {component.component->coarse_index, component.summary,
+         AssessModel(component.component->data, component.summary, {},
+                     component.model)});
+  }
+  StatusOr<std::vector<LostImage>> lost = FindLost(request, coarse, mapped);
+  if (!lost.ok()) return lost.status();
+  report->verdict = Assess(request, coarse, mapped, std::move(*lost));
+  Status status = WriteModelFolder(request.output_path, models, frames.frames);
+  if (status.ok()) {
+    const bool is_georeferenced = std::any_of(
+        mapped.begin(), mapped.end(), [](const MappedComponent& component) {
+          return component.summary.is_georeferenced;
+        });
+    status = UpdateGeoreference(is_georeferenced,
+                                mapped.front().component->data.position_origin,
+                                request.output_path);
+  }
+  if (status.ok()) {
+    status = WriteTextFile(request.output_path + "/summary.json",
+                           FormatMappingJson(report->models, *report->verdict));
+  }
+  if (!status.ok()) return status;
+  return RemoveSurplusCheckpoints(request.output_path,
+                                  coarse.components.size());
+}
+
+}  // namespace
+
+bool MapOptions::IsValid(std::string* error) const {
+  const std::pair<const char*, int> choices[] = {
+      {"refine_focal_length", refine_focal_length},
+      {"refine_extra_params", refine_extra_params}};
+  for (const auto& [name, value] : choices) {
+    if (value >= -1 && value <= 1) continue;
+    *error = std::string("AdaSfmMapper.") + name + " = " +
+             std::to_string(value) + " must be -1, 0 or 1";
+    return false;
+  }
+  return stage.IsValid(error);
+}
+
+StatusOr<MapReport> MapParts(const MapOptions& options,
+                             const MapRequest& request,
+                             const ProgressCallback& progress) {
+  Status status = CheckOptions(options);
+  if (status.ok()) status = CheckMapPaths(request);
+  if (!status.ok()) return status;
+  const auto locks = LockMapFolder(request);
+  if (!locks.ok()) return locks.status();
+  StatusOr<SceneData> scene = ReadSceneData(request.database_path, {});
+  if (!scene.ok()) return scene.status();
+  status = CheckHasMatches(request.database_path, *scene);
+  if (!status.ok()) return status;
+  MapReport report;
+  const MapperStageOptions stage_options = ResolveOptions(options, *scene);
+  const bool has_priors = !scene->priors.empty() || !scene->positions.empty();
+  StatusOr<CoarseModels> coarse =
+      ReadCoarseModels(request.input_path, std::move(*scene));
+  if (!coarse.ok()) return coarse.status();
+  for (ComponentToMap& component : coarse->components) {
+    AlignCoarseModel(stage_options.refine.position_loss_scale, &component,
+                     &coarse->warnings);
+  }
+  report.warnings = coarse->warnings;
+  if (!has_priors) report.warnings.push_back(kNoPriorsWarning);
+  const StatusOr<DatabaseFrames> frames =
+      ReadDatabaseFrames(request.database_path);
+  if (!frames.ok()) return frames.status();
+  if (frames->has_camera_rigs) report.warnings.push_back(kCameraRigsWarning);
+  const StatusOr<std::vector<MappedComponent>> mapped =
+      MapComponents(stage_options, coarse->components, request.output_path,
+                    request.steps, request.part_index, progress);
+  if (!mapped.ok()) return mapped.status();
+  if (mapped->empty()) return report;
+  status = AssessAndWrite(request, *coarse, *mapped, *frames, &report);
+  if (!status.ok()) return status;
+  return report;
+}
+
+}  // namespace adasfm

@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "colmap_ext/mapper_stage/mapper_stage.h"
+#include "colmap_ext/scene/scene_data.h"
+#include "core/status.h"
+
+namespace adasfm {
+
+// A component of the scene, with the coarse model that it is mapped from.
+struct ComponentToMap {
+  // In adasfm_global's folder.
+  int coarse_index = 0;
+  // In the frame of the data's positions, if there are any.
+  CoarsePoseMap coarse;
+  SceneData data;
+  // Of RefineModelOptions: how far the coarse model is bent.
+  std::optional<double> initial_position_loss_scale;
+};
+
+struct MappedComponent {
+  const ComponentToMap* component = nullptr;
+  MapperStageSummary summary;
+  // Empty when no image could be reconstructed.
+  colmap::Reconstruction model;
+};
+
+// One component's checkpoints lie in output_path, those of the k-th in
+// output_path/component_<k>.
+std::string ComponentOutputPath(const std::string& output_path, size_t k);
+
+// Runs the mapper stage's steps on all components, one after another. The steps
+// plan and part give no models; the parts of the components are numbered one
+// after another. Otherwise the models, most images first. An error when no
+// component gave any. Components must outlive the result.
+StatusOr<std::vector<MappedComponent>> MapComponents(
+    const MapperStageOptions& options,
+    const std::vector<ComponentToMap>& components,
+    const std::string& output_path, MapperSteps steps, int part_index,
+    const MapperProgress& progress);
+
+// Before any work: an error when another's files lie where checkpoints go.
+Status CheckComponentCheckpoints(const std::string& output_path);
+
+// Removes the checkpoints of components beyond the first num_components.
+Status RemoveSurplusCheckpoints(const std::string& output_path,
+                                size_t num_components);
+
+}  // namespace adasfm

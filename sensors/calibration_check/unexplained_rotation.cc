@@ -1,0 +1,176 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "sensors/calibration_check/unexplained_rotation.h"
+
+#include <Eigen/Core>
+#include <Eigen/SVD>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <map>
+#include <optional>
+#include <utility>
+
+#include "core/median.h"
+#include "core/so3.h"
+
+namespace adasfm {
+namespace {
+
+constexpr double kMaxShiftS = 0.3;
+constexpr double kShiftStepS = 0.01;
+constexpr int kNumMountingRounds = 5;
+
+using Rates = std::vector<Eigen::Vector3d>;
+
+// Per interval, about the median of each axis: the bias and what turns all the
+// time say nothing.
+Rates CenterRates(const std::vector<Eigen::Vector3d>& turns,
+                  const std::vector<double>& dt_s) {
+  Rates rates(turns.size());
+  for (size_t i = 0; i < turns.size(); ++i) rates[i] = turns[i] / dt_s[i];
+  std::vector<double> values(rates.size());
+  for (int axis = 0; axis < 3; ++axis) {
+    for (size_t i = 0; i < rates.size(); ++i) values[i] = rates[i][axis];
+    const double median = UpperMedian(&values);
+    for (Eigen::Vector3d& rate : rates) rate[axis] -= median;
+  }
+  return rates;
+}
+
+std::vector<double> Distances(const Rates& visual, const Rates& gyro,
+                              const Eigen::Matrix3d& map) {
+  std::vector<double> distances(visual.size());
+  for (size_t i = 0; i < visual.size(); ++i) {
+    distances[i] = (visual[i] - map * gyro[i]).norm();
+  }
+  return distances;
+}
+
+// Weights that bound the pull of each interval.
+std::vector<double> BoundedWeights(const std::vector<double>& distances) {
+  const double least = 0.1 * Median(distances) + 1e-9;
+  std::vector<double> weights(distances.size());
+  for (size_t i = 0; i < weights.size(); ++i) {
+    weights[i] = 1.0 / std::max(distances[i], least);
+  }
+  return weights;
+}
+
+Eigen::Matrix3d FitRotation(const Rates& visual, const Rates& gyro,
+                            const std::vector<double>& weights) {
+  Eigen::Matrix3d sum = Eigen::Matrix3d::Zero();
+  for (size_t i = 0; i < visual.size(); ++i) {
+    sum += weights[i] * visual[i] * gyro[i].transpose();
+  }
+  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(
+      sum, Eigen::ComputeFullU | Eigen::ComputeFullV);
+  Eigen::Matrix3d sign = Eigen::Matrix3d::Identity();
+  sign(2, 2) = (svd.matrixU() * svd.matrixV().transpose()).determinant();
+  return svd.matrixU() * sign * svd.matrixV().transpose();
+}
+
+double FitScale(const Rates& visual, const Rates& gyro,
+                const Eigen::Matrix3d& map,
+                const std::vector<double>& weights) {
+  double both = 0.0, square = 0.0;
+  for (size_t i = 0; i < visual.size(); ++i) {
+    both += weights[i] * visual[i].dot(map * gyro[i]);
+    square += weights[i] * gyro[i].squaredNorm();
+  }
+  return square > 0.0 ? both / square : 0.0;
+}
+
+// The least median distances, rad/s, that a rotation of the gyroscope's rates
+// leaves, and one that may scale them too.
+struct MountingFit {
+  double residual = std::numeric_limits<double>::infinity();
+  double scaled_residual = std::numeric_limits<double>::infinity();
+};
+
+MountingFit FitMounting(const Rates& visual, const Rates& gyro) {
+  MountingFit fit;
+  std::vector<double> weights(visual.size(), 1.0);
+  std::vector<double> scaled_weights = weights;
+  for (int round = 0; round < kNumMountingRounds; ++round) {
+    const Eigen::Matrix3d map = FitRotation(visual, gyro, weights);
+    const std::vector<double> distances = Distances(visual, gyro, map);
+    fit.residual = std::min(fit.residual, Median(distances));
+    weights = BoundedWeights(distances);
+    const Eigen::Matrix3d scaled_map =
+        FitScale(visual, gyro, map, scaled_weights) * map;
+    const std::vector<double> scaled = Distances(visual, gyro, scaled_map);
+    fit.scaled_residual = std::min(fit.scaled_residual, Median(scaled));
+    scaled_weights = BoundedWeights(scaled);
+  }
+  return fit;
+}
+
+double MedianLength(const Rates& rates) {
+  std::vector<double> lengths;
+  for (const Eigen::Vector3d& rate : rates) lengths.push_back(rate.norm());
+  return Median(std::move(lengths));
+}
+
+// How far three images are from closing: the error of one rotation, rad, as the
+// median length of a vector; none without enough triangles.
+std::optional<double> MeasureVisualError(
+    const std::vector<TimedRotation>& rotations, size_t min_num) {
+  std::map<timestamp_t, std::map<timestamp_t, Eigen::Quaterniond>> by_time;
+  for (const TimedRotation& rotation : rotations) {
+    by_time[rotation.start_ns][rotation.end_ns] = rotation.cam2_from_cam1;
+  }
+  std::vector<double> errors;
+  for (const auto& [start, from_start] : by_time) {
+    for (const auto& [middle, middle_from_start] : from_start) {
+      const auto from_middle = by_time.find(middle);
+      if (from_middle == by_time.end()) continue;
+      for (const auto& [end, end_from_middle] : from_middle->second) {
+        const auto direct = from_start.find(end);
+        if (direct == from_start.end()) continue;
+        errors.push_back(LogSo3(direct->second.conjugate() *
+                                (end_from_middle * middle_from_start))
+                             .norm() /
+                         std::sqrt(3.0));
+      }
+    }
+  }
+  if (errors.size() < min_num) return std::nullopt;
+  return Median(std::move(errors));
+}
+
+}  // namespace
+
+UnexplainedRotation FindUnexplainedRotation(
+    const std::vector<TimedRotation>& rotations, const ShiftSearch& search,
+    double shift_s, const VisionCheckOptions& options) {
+  UnexplainedRotation result;
+  const size_t min_num = options.min_num_rotations;
+  const std::optional<double> visual_error =
+      MeasureVisualError(rotations, min_num);
+  if (!visual_error) return result;
+  result.visual_error_deg = RadToDeg(*visual_error);
+  double least = std::numeric_limits<double>::infinity();
+  const int num_steps = static_cast<int>(std::round(kMaxShiftS / kShiftStepS));
+  const auto compare_at = [&](double shift) {
+    const RotationComparison data = search.CompareShortest(shift);
+    if (data.visual.size() < min_num) return;
+    const Rates gyro = CenterRates(data.gyro, data.dt_s);
+    const Rates visual = CenterRates(data.visual, data.dt_s);
+    const MountingFit fit = FitMounting(visual, gyro);
+    if (fit.residual >= least) return;
+    least = fit.residual;
+    const double interval_s = Median(data.dt_s);
+    result.is_conclusive = true;
+    result.residual_deg = RadToDeg(fit.residual * interval_s);
+    result.turning_deg = RadToDeg(MedianLength(gyro) * interval_s);
+    result.scaled_residual_deg = RadToDeg(fit.scaled_residual * interval_s);
+    result.visual_turning_deg = RadToDeg(MedianLength(visual) * interval_s);
+  };
+  compare_at(shift_s);
+  for (int step = -num_steps; step <= num_steps; ++step) {
+    compare_at(step * kShiftStepS);
+  }
+  return result;
+}
+
+}  // namespace adasfm
