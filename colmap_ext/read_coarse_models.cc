@@ -158,8 +158,11 @@ StatusOr<CoarseModels> ReadCoarseModels(const std::string& input_path,
   models.rest = std::move(split.rest);
   for (size_t k = 0; k < large.size(); ++k) {
     TakeCameras(*large[k], &split.components[k], &models.warnings);
-    models.components.push_back({large[k]->coarse_index, std::move(poses[k]),
-                                 std::move(split.components[k])});
+    ComponentToMap component;
+    component.coarse_index = large[k]->coarse_index;
+    component.coarse = std::move(poses[k]);
+    component.data = std::move(split.components[k]);
+    models.components.push_back(std::move(component));
   }
   return models;
 }

@@ -1,11 +1,13 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "colmap_ext/bundle_adjustment/estimate_keypoint_sigma.h"
 
-#include <base/projection.h>
-
 #include <algorithm>
 #include <cmath>
+#include <limits>
+#include <map>
 #include <vector>
+
+#include "colmap_ext/host/pose_conversion.h"
 
 namespace adasfm {
 namespace {
@@ -20,10 +22,24 @@ double MedianOfChi2PerDof(double num_dof) {
   return root * root * root;
 }
 
+// Infinite for a point behind the camera.
+double SquaredError(const colmap::Reconstruction& reconstruction,
+                    const Rigid3d& cam_from_world,
+                    const colmap::TrackElement& element,
+                    const Eigen::Vector3d& point) {
+  const colmap::Image& image = reconstruction.Image(element.image_id);
+  const Eigen::Vector3d in_cam = cam_from_world * point;
+  if (!(in_cam.z() > 0.0)) return std::numeric_limits<double>::infinity();
+  const Eigen::Vector2d projected = reconstruction.Camera(image.CameraId())
+                                        .WorldToImage(in_cam.hnormalized());
+  return (projected - image.Point2D(element.point2D_idx).XY()).squaredNorm();
+}
+
 }  // namespace
 
 std::optional<double> EstimateKeypointSigma(
     const colmap::Reconstruction& reconstruction) {
+  const std::map<image_t, Rigid3d> poses = CamsFromWorld(reconstruction);
   std::vector<double> variances;
   double num_dof_of_points = 0.0;
   for (const auto& [point_id, point] : reconstruction.Points3D()) {
@@ -33,14 +49,12 @@ std::optional<double> EstimateKeypointSigma(
     if (length < kMinTrackLength) continue;
     double sum = 0.0;
     for (const colmap::TrackElement& element : point.Track().Elements()) {
-      const colmap::Image& image = reconstruction.Image(element.image_id);
-      sum += colmap::CalculateSquaredReprojectionError(
-          image.Point2D(element.point2D_idx).XY(), point.XYZ(), image.Qvec(),
-          image.Tvec(), reconstruction.Camera(image.CameraId()));
+      sum += SquaredError(reconstruction, poses.at(element.image_id), element,
+                          point.XYZ());
     }
-    // A point behind a camera has no residual.
-    if (sum < 1e12)
+    if (std::isfinite(sum)) {
       variances.push_back(sum / (num_dof * MedianOfChi2PerDof(num_dof)));
+    }
   }
   const double num_dof_of_poses = 6.0 * reconstruction.NumRegImages();
   if (variances.size() < kMinNumPoints ||

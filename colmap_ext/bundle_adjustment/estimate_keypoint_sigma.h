@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <base/reconstruction.h>
-
 #include <optional>
+
+#include "colmap_ext/bundle_adjustment/bundle_adjustment.h"
 
 namespace adasfm {
 

@@ -19,7 +19,7 @@ struct ComponentToMap {
   CoarsePoseMap coarse;
   SceneData data;
   // Of RefineModelOptions: how far the coarse model is bent.
-  std::optional<double> initial_position_loss_scale;
+  std::optional<double> initial_position_loss_scale = std::nullopt;
 };
 
 struct MappedComponent {

@@ -37,7 +37,12 @@ class SplitSceneTest : public testing::Test {
       prior.image_id1 = image_id;
       prior.image_id2 = image_id + 1;
       scene_.priors.push_back(prior);
+      PositionPrior position;
+      position.image_id1 = image_id;
+      position.image_id2 = image_id + image_id % 2;
+      scene_.positions.push_back(position);
     }
+    scene_.position_origin = GeodeticPosition();
     coarse_ = {{{1, {}}, {2, {}}, {3, {}}}, {{5, {}}, {6, {}}}};
   }
 
@@ -74,6 +79,11 @@ TEST_F(SplitSceneTest, EveryImageHasOneComponent) {
   EXPECT_EQ(split.components[0].priors.size(), 2);
   EXPECT_EQ(split.components[1].priors.size(), 3);
   EXPECT_EQ(split.rest.priors.size(), 2);
+  // Positions of 1-2, 2, 3-4, 4, 5-6, 6, 7-8, 8, 9-10.
+  EXPECT_EQ(split.components[0].positions.size(), 2);
+  EXPECT_EQ(split.components[1].positions.size(), 3);
+  EXPECT_EQ(split.rest.positions.size(), 2);
+  EXPECT_TRUE(split.components[1].position_origin.has_value());
   EXPECT_EQ(split.components[0].cameras.size(), 1);
 }
 
