@@ -123,39 +123,38 @@ PriorBundleAdjustmentSummary AdjustBundleInBalance(
         kMinKeypointSigmaPx,
         EstimateKeypointSigma(*reconstruction).value_or(keypoint_sigma_px));
   }
+  const bool may_search = balance.enabled && !problem.priors.empty();
+  // The search needs no last digits.
+  if (may_search) {
+    adjusted.function_tolerance =
+        std::max(options.function_tolerance, kSearchFunctionTolerance);
+  }
   int num_iterations = 0;
-  const auto adjust = [&] {
+  while (true) {
     adjusted.keypoint_sigma_px = keypoint_sigma_px * *keypoint_sigma_factor;
     summary = AdjustBundle(adjusted, problem, reconstruction);
     num_iterations += summary.num_iterations;
     summary.num_iterations = num_iterations;
-  };
-  // The search needs no last digits.
-  adjusted.function_tolerance =
-      std::max(options.function_tolerance, kSearchFunctionTolerance);
-  while (balance.enabled && !problem.priors.empty() &&
-         *keypoint_sigma_factor < balance.max_sigma_factor) {
-    adjust();
     if (!summary.success) return summary;
-    const double chi2 = ComputePriorChi2PerDof(
-        CorrectSharedErrors(options.shared_errors, summary.shared_errors,
-                            problem.priors),
-        *reconstruction);
-    if (chi2 <= balance.max_chi2_per_dof) {
-      if (adjusted.function_tolerance <= options.function_tolerance) {
-        return summary;
-      }
-      break;
+    double chi2 = 0.0;
+    if (may_search && *keypoint_sigma_factor < balance.max_sigma_factor) {
+      chi2 = ComputePriorChi2PerDof(
+          CorrectSharedErrors(options.shared_errors, summary.shared_errors,
+                              problem.priors),
+          *reconstruction);
     }
-    *keypoint_sigma_factor =
-        std::min(balance.max_sigma_factor,
-                 *keypoint_sigma_factor *
-                     std::clamp(std::sqrt(chi2 / balance.max_chi2_per_dof),
-                                kMinStep, kMaxStep));
+    if (chi2 > balance.max_chi2_per_dof) {
+      *keypoint_sigma_factor =
+          std::min(balance.max_sigma_factor,
+                   *keypoint_sigma_factor *
+                       std::clamp(std::sqrt(chi2 / balance.max_chi2_per_dof),
+                                  kMinStep, kMaxStep));
+    } else if (adjusted.function_tolerance > options.function_tolerance) {
+      adjusted.function_tolerance = options.function_tolerance;
+    } else {
+      return summary;
+    }
   }
-  adjusted.function_tolerance = options.function_tolerance;
-  adjust();
-  return summary;
 }
 
 }  // namespace adasfm

@@ -25,6 +25,8 @@ struct CoarseStructureOptions {
   TrackOptions tracks;
   TrackTriangulationOptions triangulation;
   PriorBundleAdjustmentOptions bundle;
+  // Vision that needs more than eight times its own noise to agree with the
+  // sensors contradicts them, which is to be said (priors_agree).
   PriorBalanceOptions balance;
   // The rounds before the last see points in keyframes only.
   KeyframeOptions keyframes;
@@ -46,6 +48,7 @@ struct CoarseStructureOptions {
   // FindFocalLengthError finds them wrong; known ones are only reported.
   bool refine_unknown_focal_length = true;
 
+  CoarseStructureOptions() { balance.max_sigma_factor = 8.0; }
   bool IsValid(std::string* error) const;
 };
 

@@ -39,7 +39,8 @@ std::string FormatMappingJson(const std::vector<ModelSummary>& models,
   for (size_t k = 0; k < models.size(); ++k) {
     json["models"].push_back(ModelAsJson(models[k]));
     if (k > 0) AddTimes(models[k].stage, &json);
-    for (nlohmann::json& part : MapperSummaryToJson(models[k].stage)["parts"]) {
+    const nlohmann::json stage = MapperSummaryToJson(models[k].stage);
+    for (nlohmann::json part : stage.at("parts")) {
       part["model"] = k;
       parts.push_back(std::move(part));
     }

@@ -28,6 +28,14 @@ struct OverlapPredictionOptions {
   double min_overlap = 0.15;
   OdometryChainOptions chain;
 
+  // What the smoother does not know of the mounting is in the sigmas of its
+  // steps, which persist along the chain: here it does not count once more. The
+  // gate of loops, which must not refuse a true one, is more careful.
+  OverlapPredictionOptions() {
+    chain.extrinsic_rotation_sigma_rad = 0.0;
+    chain.driving_direction_sigma_rad = 0.0;
+  }
+
   bool IsValid(std::string* error) const;
 };
 

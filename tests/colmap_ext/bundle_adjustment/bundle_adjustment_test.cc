@@ -217,8 +217,8 @@ TEST(AdjustBundleTest, FindsTheErrorsThatAllPriorsShare) {
 std::vector<PosePriorEdge> DriftingPriors(const BundleWorldOptions& options,
                                           Random* random) {
   constexpr double kDt = 0.3;
-  constexpr double kSigma = 8e-3;
-  const double decay = std::exp(-kDt / 5.0);
+  constexpr double kSigma = 4e-3;
+  const double decay = std::exp(-kDt / 10.0);
   Eigen::Vector3d drift = random->GaussianVector(kSigma);
   std::vector<PosePriorEdge> edges = TruePriors(options);
   for (PosePriorEdge& edge : edges) {
@@ -240,7 +240,7 @@ std::vector<PosePriorEdge> DriftingPriors(const BundleWorldOptions& options,
 TEST(AdjustBundleTest, DirectionsThatErrTogetherDoNotOutvoteVision) {
   BundleWorldOptions world;
   world.num_images = 200;
-  world.num_keypoints_per_image = 60;
+  world.num_keypoints_per_image = 150;
   world.pixel_noise_px = 0.3;
   double with_drift = 0.0;
   double without_drift = 0.0;
