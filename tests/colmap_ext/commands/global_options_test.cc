@@ -89,7 +89,7 @@ const std::vector<OptionCase>& Cases() {
       OPTION("ba_estimate_keypoint_sigma", 0,
              structure.balance.estimate_keypoint_sigma),
       OPTION("write_pose_priors", 1, write_pose_priors),
-      OPTION("pose_prior_sigma", 0.5, pose_prior_sigma),
+      OPTION("pose_prior_sigma", 0.7, pose_prior_sigma),
       OPTION("ba_refine_focal_length", 1, structure.bundle.refine_focal_length),
       OPTION("refine_unknown_focal_length", 0,
              structure.refine_unknown_focal_length),
