@@ -16,6 +16,8 @@ struct Drive {
   PositionAlignmentInput input;
   Sim3d enu_from_world;
   std::map<image_t, Rigid3d> cams_from_enu;
+  // What an alignment that knows the wrong positions would be given.
+  std::vector<PositionPrior> right_positions;
 };
 
 struct DriveOptions {
@@ -61,12 +63,14 @@ Drive MakeDrive(const DriveOptions& options, uint64_t seed) {
     prior.position = center +
                      pose.rotation.conjugate() * options.antenna_in_cam +
                      random.GaussianVector(options.sigma_m);
+    prior.covariance = std::max(1e-6, options.sigma_m * options.sigma_m) *
+                       Eigen::Matrix3d::Identity();
     if (i >= first_wrong &&
         i < first_wrong + options.share_wrong * kNumImages) {
       prior.position += jump;
+    } else {
+      drive.right_positions.push_back(prior);
     }
-    prior.covariance = std::max(1e-6, options.sigma_m * options.sigma_m) *
-                       Eigen::Matrix3d::Identity();
     drive.input.positions.push_back(prior);
   }
   drive.input.is_metric = options.is_metric;
@@ -110,10 +114,10 @@ TEST(AlignToPositions, IsExactWithoutNoise) {
   }
 }
 
-// Of 60 positions of 1 m a third may be wrong at one end: the rest give the
-// heading to 1 m / (sqrt(39) * 57 m) = 0.16 deg, so the far end, 200 m from
-// their middle, errs by 0.6 m sideways, as much in height and along: four
-// sigmas of all together are 4 m.
+// As the alignment that knows which positions are wrong: 15 m are so far beyond
+// where Tukey's loss ends that they weigh nothing. 60 positions of 1 m, a third
+// of them wrong at one end: the far end, 200 m from the middle of the rest,
+// errs by 0.6 m in each of three directions, 2 m are two such sigmas of all.
 TEST(AlignToPositions, BridgesJumpsAndReflections) {
   for (const double share_wrong : {0.1, 0.35}) {
     for (uint64_t seed = 1; seed <= 20; ++seed) {
@@ -124,7 +128,20 @@ TEST(AlignToPositions, BridgesJumpsAndReflections) {
       const Drive drive = MakeDrive(options, seed);
       const PositionAlignment alignment = AlignToPositions(drive.input);
       ASSERT_TRUE(alignment.success) << alignment.failure;
-      EXPECT_LT(MaxError(drive, alignment), 4.0) << seed << " " << share_wrong;
+      PositionAlignmentInput right = drive.input;
+      right.positions = drive.right_positions;
+      const PositionAlignment expected = AlignToPositions(right);
+      ASSERT_TRUE(expected.success) << expected.failure;
+      double max_difference = 0.0;
+      for (const auto& [image_id, pose] : drive.input.cams_from_world) {
+        const Eigen::Vector3d center = pose.TargetOriginInSource();
+        max_difference =
+            std::max(max_difference, (alignment.enu_from_world * center -
+                                      expected.enu_from_world * center)
+                                         .norm());
+      }
+      EXPECT_LT(MaxError(drive, alignment), 2.0) << seed << " " << share_wrong;
+      EXPECT_LT(max_difference, 0.01) << seed << " " << share_wrong;
     }
   }
 }
