@@ -199,6 +199,7 @@ void VisionComparer::CheckTimeShift(VisionCheck* check) const {
                          search_.Evidence(as_is_, calibrated()) >= kMinEvidence;
   check->is_clock_shift =
       is_better && has_unshifted_ &&
+      std::abs(calibrated().shift_s) >= options_.min_clock_shift_s &&
       std::abs(calibrated().shift_s) <= options_.max_clock_shift_s;
   if (std::abs(calibrated().shift_s) > options_.max_accepted_shift_s &&
       (is_better || !has_unshifted_)) {
@@ -261,8 +262,9 @@ bool VisionCheckOptions::IsValid(std::string* error) const {
   if (max_time_shift_s > 0.0 && min_rotation_rms_deg > 0.0 &&
       min_contradicting_rms_deg > 0.0 && min_num_rotations > 1 &&
       min_correlation > 0.0 && min_correlation < 1.0 &&
-      max_accepted_shift_s > 0.0 && max_clock_shift_s > 0.0 &&
-      max_unexplained_ratio > 0.0 && max_visual_error_ratio > 0.0) {
+      max_accepted_shift_s > 0.0 && max_clock_shift_s >= min_clock_shift_s &&
+      min_clock_shift_s >= 0.0 && max_unexplained_ratio > 0.0 &&
+      max_visual_error_ratio > 0.0) {
     return true;
   }
   *error =
