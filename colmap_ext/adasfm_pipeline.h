@@ -27,7 +27,7 @@ namespace adasfm {
 //   2  EstimateCoarseModel  adasfm_global              global/
 //      view graph + priors -> coarse model, cleaned matches
 //        2.1 view graph                     2.5 sensor translations
-//        2.2 loop closures, rotations         2.6 camera positions
+//        2.2 loop closures, rotations       2.6 camera positions
 //        2.3 edges off the rotations        2.7 tracks, points, adjustment
 //        2.4 directions                     2.8 match refinement
 //

@@ -52,9 +52,9 @@ PosePriorEdge PosePriorEdgeFromPrior(const RelativePosePrior& prior);
 
 struct PriorBundleAdjustmentOptions {
   // 1 sigma of a keypoint's position; the unit in which priors and keypoints
-  // are compared. Half a pixel is the noise of one keypoint. More, to be safe,
-  // bends long drives: the errors of priors persist, which the adjustment does
-  // not know, while balance_priors.h finds what keypoints have in common.
+  // are compared. Half a pixel is the noise of one keypoint where residuals do
+  // not tell it yet; balance_priors.h finds it, and what keypoints have in
+  // common.
   double keypoint_sigma_px = 0.5;
   // Where the robust loss on reprojection errors (soft L1) takes over, in px;
   // <= 0: plain squares.
@@ -99,8 +99,8 @@ struct PriorBundleAdjustmentProblem {
   std::set<image_t> images;
   // Registered images that take part with fixed poses.
   std::set<image_t> constant_images;
-  // Those of sensors in order of time: a window of the gyroscope's bias ends
-  // where a prior does not begin with the image that the last one ended with.
+  // Those of sensors in order of time: a window of the shared errors ends where
+  // a prior does not begin with the image that the last one ended with.
   std::vector<PosePriorEdge> priors;
   // Positions in the reconstruction's world, which then has no free degrees of
   // freedom; those of images that do not take part are passed over.

@@ -10,6 +10,7 @@
 
 #include "colmap_ext/bundle_adjustment/create_reprojection_cost.h"
 #include "colmap_ext/host/pose_conversion.h"
+#include "core/median.h"
 
 namespace adasfm {
 namespace {
@@ -49,10 +50,7 @@ double MedianDirectionSigma(const std::vector<PosePriorEdge>& edges) {
       sigmas.push_back(edge.direction_sigma_rad);
     }
   }
-  if (sigmas.empty()) return 0.0;
-  const auto median = sigmas.begin() + sigmas.size() / 2;
-  std::nth_element(sigmas.begin(), median, sigmas.end());
-  return *median;
+  return UpperMedian(&sigmas);
 }
 
 }  // namespace

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "colmap_ext/bundle_adjustment/estimate_keypoint_sigma.h"
 
-#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <map>
 #include <vector>
 
 #include "colmap_ext/host/pose_conversion.h"
+#include "core/median.h"
 
 namespace adasfm {
 namespace {
@@ -61,9 +61,8 @@ std::optional<double> EstimateKeypointSigma(
       num_dof_of_poses >= 0.5 * num_dof_of_points) {
     return std::nullopt;
   }
-  const auto median = variances.begin() + variances.size() / 2;
-  std::nth_element(variances.begin(), median, variances.end());
-  return std::sqrt(*median / (1.0 - num_dof_of_poses / num_dof_of_points));
+  return std::sqrt(UpperMedian(&variances) /
+                   (1.0 - num_dof_of_poses / num_dof_of_points));
 }
 
 }  // namespace adasfm

@@ -29,8 +29,7 @@ struct SharedErrorOptions {
   // Within the drive the direction drifts with the tilt and the velocity that
   // the smoother found: a Gauss-Markov process of this correlation time, with
   // one value for each window and the sigma that the motions state (the
-  // median). Measured on four drives: the errors of direction correlate by 0.8
-  // to 0.99 from step to step and fall off within 1 to 6 s.
+  // median). docs/reference/math.md has what was measured.
   double direction_drift_time_s = 3.0;
   double direction_window_s = 2.0;
 

@@ -33,7 +33,7 @@ constexpr double kLargeChi2 = 16.27;
 constexpr double kGoodChi2Ratio = 2.0;
 constexpr double kGoodShareContradicting = 0.05;
 constexpr double kMaxShareContradicting = 0.5;
-// At eight the search for a keypoint sigma that fits the priors gives up.
+// Of the keypoint sigma that fits the priors, over that of the residuals.
 constexpr double kGoodSigmaFactor = 4.0;
 // Of the registered images.
 constexpr double kGoodSharePutBack = 0.02;

@@ -3,19 +3,16 @@
 
 #include <gtest/gtest.h>
 
-#include "colmap_ext/bundle_adjustment/bundle_adjustment.h"
 #include "core/random.h"
-#include "tests/testing/colmap_ext/bundle_world.h"
+#include "tests/testing/colmap_ext/bundle_world_problem.h"
 
 namespace adasfm {
 namespace {
 
 colmap::Reconstruction AdjustedWorld(const BundleWorldOptions& options) {
   colmap::Reconstruction reconstruction = BuildBundleWorld(options);
-  PriorBundleAdjustmentProblem problem;
-  problem.images = {reconstruction.RegImageIds().begin(),
-                    reconstruction.RegImageIds().end()};
-  EXPECT_TRUE(AdjustBundle({}, problem, &reconstruction).success);
+  EXPECT_TRUE(
+      AdjustBundle({}, ProblemOfAll(reconstruction), &reconstruction).success);
   return reconstruction;
 }
 
