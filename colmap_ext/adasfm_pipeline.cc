@@ -219,7 +219,7 @@ StatusOr<CoarseModelReport> EstimateCoarseModel(
   scene_options.read_raw_matches = options.refinement.enabled;
   scene_options.use_original_two_view_geometries = true;
   scene_options.min_num_matches = options.poses.min_num_inliers;
-  const StatusOr<SceneData> scene = ReadSceneData(database_path, scene_options);
+  StatusOr<SceneData> scene = ReadSceneData(database_path, scene_options);
   if (!scene.ok()) return scene.status();
   const StatusOr<DatabaseFrames> frames = ReadDatabaseFrames(database_path);
   if (!frames.ok()) return frames.status();
@@ -232,6 +232,10 @@ StatusOr<CoarseModelReport> EstimateCoarseModel(
 
   CoarseModelReport report;
   report.warnings = scene->warnings;
+  for (const CalibratedFocalLength& calibrated :
+       CalibrateFocalLengths(options.focal_lengths, &*scene)) {
+    report.warnings.push_back(DescribeFocalLength(calibrated));
+  }
   if (frames->has_camera_rigs) report.warnings.push_back(kCameraRigsWarning);
   if (scene->priors.empty() && scene->positions.empty()) {
     report.warnings.push_back(kNoPriorsWarning);

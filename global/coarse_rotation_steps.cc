@@ -29,6 +29,12 @@ std::string DescribeRotationRates(const RotationRateReport& rates) {
   return text;
 }
 
+bool AnyLength(const std::vector<RelativePosePrior>& priors) {
+  return std::any_of(
+      priors.begin(), priors.end(),
+      [](const RelativePosePrior& prior) { return prior.HasLength(); });
+}
+
 }  // namespace
 
 void CoarsePoseEstimator::RefinePairs() {
@@ -147,11 +153,11 @@ DriveOdometry CoarsePoseEstimator::BuildDriveOdometry(
   VisualSteps steps = CompleteSteps();
   if (!steps.priors.empty()) {
     OdometryChainOptions options = options_.chain;
-    if (priors_.empty()) {
+    if (!AnyLength(priors_)) {
       options.scale_drift_ratio = options_.visual_steps.scale_drift_ratio;
-      options.extrinsic_rotation_sigma_rad = 0.0;
       options.driving_direction_sigma_rad = 0.0;
     }
+    if (priors_.empty()) options.extrinsic_rotation_sigma_rad = 0.0;
     const int num_dropped =
         DropContradictedSteps(options_.visual_steps, options_.loops, options,
                               graph_, priors_.size(), &steps);

@@ -47,6 +47,15 @@ bool Correct(double by, double min_factor, double* factor) {
   return true;
 }
 
+// The time between the images errs, and with it the turn about its axis.
+void AddIntervalTimeError(const UnexplainedRotation& unexplained,
+                          RelativePosePrior* prior) {
+  const Eigen::Vector3d error = unexplained.interval_time_sigma_s /
+                                SecondsFromNs(prior->dt_ns) *
+                                LogSo3(prior->cam2_from_cam1.rotation);
+  prior->covariance.topLeftCorner<3, 3>() += error * error.transpose();
+}
+
 // The stages of EstimatePriors with what they share.
 class PriorEstimator {
  public:
@@ -371,6 +380,7 @@ void PriorEstimator::BuildPriors() {
     prior.image_id1 = images_[i].image_id;
     prior.image_id2 = images_[i + 1].image_id;
     prior.dt_ns = images_[i + 1].timestamp_ns - images_[i].timestamp_ns;
+    AddIntervalTimeError(estimate_.summary.unexplained_rotation, &prior);
     if (prior.flags != 0) estimate_.priors.push_back(prior);
   }
 }

@@ -133,8 +133,9 @@ bool GlobalStageOptions::IsValid(std::string* error) const {
         " must be positive";
     return false;
   }
-  return two_view.IsValid(error) && poses.IsValid(error) &&
-         structure.IsValid(error) && refinement.IsValid(error);
+  return focal_lengths.IsValid(error) && two_view.IsValid(error) &&
+         poses.IsValid(error) && structure.IsValid(error) &&
+         refinement.IsValid(error);
 }
 
 StatusOr<GlobalStageResult> RunGlobalStage(

@@ -7,6 +7,7 @@
 
 #include "colmap_ext/coarse/coarse_structure.h"
 #include "colmap_ext/host/database.h"
+#include "colmap_ext/scene/calibrate_focal_lengths.h"
 #include "colmap_ext/scene/scene_data.h"
 #include "colmap_ext/scene/two_view_poses.h"
 #include "core/status.h"
@@ -17,6 +18,8 @@ namespace adasfm {
 
 // Nested by step, in order of their use (design 7.2).
 struct GlobalStageOptions {
+  // Before step 1, by the caller, in the scene that the steps get.
+  FocalLengthCalibrationOptions focal_lengths;
   TwoViewPoseOptions two_view;
   CoarsePoseOptions poses;
   CoarseStructureOptions structure;

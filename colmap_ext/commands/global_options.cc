@@ -157,6 +157,9 @@ void GlobalOptionAdder::AddStructure() {
       "the last round takes the keypoint sigma from the residuals");
   Add("ba_refine_focal_length", &stage_->structure.bundle.refine_focal_length,
       "adjust focal lengths too");
+  Add("calibrate_focal_lengths", &stage_->focal_lengths.enabled,
+      "find focal lengths that the database does not mark as known from the "
+      "verified pairs before anything else");
   Add("refine_unknown_focal_length",
       &stage_->structure.refine_unknown_focal_length,
       "adjust focal lengths that the database does not mark as known, when "

@@ -81,7 +81,9 @@ std::string FormatPriorImport(const PriorImport& import) {
     const UnexplainedRotation& rotation = summary.unexplained_rotation;
     text << "gyroscope, vision   turn by " << rotation.turning_deg
          << " deg a photo, differ by " << rotation.residual_deg
-         << ", vision errs by " << rotation.visual_error_deg << "\n";
+         << ", vision errs by " << rotation.visual_error_deg
+         << "; times between photos err by " << rotation.interval_time_sigma_s
+         << " s\n";
   }
   if (summary.imu_rate_hz > 0.0) text << ImuLines(summary);
   text << "noise / stated      gyroscope " << summary.gyroscope_noise_factor
@@ -131,6 +133,8 @@ std::string PriorImportToJson(const PriorImport& import) {
       {"rotation_residual_deg", summary.unexplained_rotation.residual_deg},
       {"rotation_visual_error_deg",
        summary.unexplained_rotation.visual_error_deg},
+      {"interval_time_sigma_s",
+       summary.unexplained_rotation.interval_time_sigma_s},
       {"gyroscope_lag_s", summary.gyroscope_lag_s},
       {"gyroscope_delay_s", summary.gyroscope_delay_s},
       {"num_visual_links", summary.num_visual_links},

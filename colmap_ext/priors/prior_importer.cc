@@ -17,6 +17,7 @@
 #include "colmap_ext/host/pose_conversion.h"
 #include "colmap_ext/priors/import_positions.h"
 #include "colmap_ext/priors/read_sensor_logs.h"
+#include "colmap_ext/scene/calibrate_focal_lengths.h"
 #include "colmap_ext/scene/image_finder.h"
 #include "colmap_ext/scene/scene_data.h"
 #include "colmap_ext/scene/two_view_poses.h"
@@ -405,6 +406,10 @@ StatusOr<PriorImport> ComputePriorImport(const PriorImportPaths& given_paths,
   if (!status.ok()) return status;
   std::map<image_t, std::string> names;
   for (const ImageStamp& stamp : *stamps) names[stamp.image_id] = stamp.name;
+  for (const CalibratedFocalLength& calibrated :
+       CalibrateFocalLengths(FocalLengthCalibrationOptions(), &*scene)) {
+    import.warnings.push_back(DescribeFocalLength(calibrated));
+  }
   KeepNearPairs(*stamps, options.max_visual_gap, &scene->pairs);
   const std::vector<VisualRotation> rotations =
       ComputeVisualRotations(std::move(scene).value());

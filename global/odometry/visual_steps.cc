@@ -246,8 +246,11 @@ VisualSteps AddVisualSteps(const VisualStepOptions& options,
                    sigma * sigma * Eigen::Matrix3d::Identity(), prior);
     ++steps.num_by_vision;
   }
-  // 2. Steps that nothing sees.
-  steps.num_coasting = Coast(options, InOrder(chain, &steps.priors));
+  // 2. Steps that nothing sees. Without metres the unit behind them is another
+  // one than before.
+  if (lengths.metric) {
+    steps.num_coasting = Coast(options, InOrder(chain, &steps.priors));
+  }
 
   if (!lengths.metric) steps.unit_m = MedianLength(steps.priors);
   steps.lengths = EstimateEdgeLengths(length_options, graph, known_lengths,

@@ -39,7 +39,7 @@ colmap_ext/matching            core
 colmap_ext/host                core colmap_ext/io colmap_ext/matching
 colmap_ext/database            core colmap_ext/io colmap_ext/host global/calibration
 colmap_ext/bundle_adjustment   core colmap_ext/host
-colmap_ext/scene               core colmap_ext/io colmap_ext/host colmap_ext/database global/view_graph
+colmap_ext/scene               core colmap_ext/io colmap_ext/host colmap_ext/database global/view_graph global/two_view
 colmap_ext/priors              core colmap_ext/host colmap_ext/database colmap_ext/scene sensors sensors/... global/two_view
 colmap_ext/coarse              core colmap_ext/host colmap_ext/bundle_adjustment colmap_ext/scene global global/...
 colmap_ext/mapper              core colmap_ext/host colmap_ext/bundle_adjustment colmap_ext/scene partition

@@ -43,6 +43,7 @@ class VisionComparer {
         search_(rotations, imu, calibration.timeshift_cam_imu_s, options),
         cam_from_imu_(calibration.cam_from_imu.rotation.toRotationMatrix()),
         timeshift_s_(calibration.timeshift_cam_imu_s),
+        gyroscope_noise_density_(calibration.imu_noise.gyroscope_noise_density),
         options_(options) {}
 
   // Numbered steps; see there.
@@ -67,6 +68,7 @@ class VisionComparer {
   ShiftSearch search_;
   Eigen::Matrix3d cam_from_imu_;
   double timeshift_s_;
+  double gyroscope_noise_density_;
   VisionCheckOptions options_;
   // Each at its best time shift; the first one is the calibrated one.
   std::vector<Explanation> explanations_;
@@ -138,8 +140,9 @@ bool VisionComparer::NameMistake(VisionCheck* check) const {
 }
 
 bool VisionComparer::FindOtherMotion(VisionCheck* check) const {
-  const UnexplainedRotation found = FindUnexplainedRotation(
-      rotations_, search_, calibrated().shift_s, options_);
+  const UnexplainedRotation found =
+      FindUnexplainedRotation(rotations_, search_, calibrated().shift_s,
+                              gyroscope_noise_density_, options_);
   check->unexplained = found;
   if (!found.is_conclusive ||
       found.turning_deg < options_.min_rotation_rms_deg ||

@@ -64,6 +64,11 @@ struct UnexplainedRotation {
   // scale too.
   double visual_turning_deg = 0.0;
   double scaled_residual_deg = 0.0;
+  // 1 sigma of the time between two images that makes up for the rest: photos
+  // whose times jitter, or whose rows are exposed one after another, turn by it
+  // times the turning rate. 0 where vision's and the gyroscope's noise explain
+  // the rest.
+  double interval_time_sigma_s = 0.0;
 };
 
 struct VisionCheck {

@@ -5,16 +5,20 @@
 #include <cmath>
 
 #include "core/median.h"
+#include "core/so3.h"
 
 namespace adasfm {
+
 RateIntegral::RateIntegral(const std::vector<ImuSample>& imu) : imu_(imu) {
   integral_.resize(imu.size(), Eigen::Vector3d::Zero());
+  first_from_body_.resize(imu.size(), Eigen::Quaterniond::Identity());
   for (size_t i = 1; i < imu.size(); ++i) {
     const double dt =
         SecondsFromNs(imu[i].timestamp_ns - imu[i - 1].timestamp_ns);
-    integral_[i] =
-        integral_[i - 1] +
+    const Eigen::Vector3d step =
         0.5 * dt * (imu[i - 1].angular_velocity + imu[i].angular_velocity);
+    integral_[i] = integral_[i - 1] + step;
+    first_from_body_[i] = (first_from_body_[i - 1] * ExpSo3(step)).normalized();
   }
 }
 
@@ -23,20 +27,37 @@ bool RateIntegral::Covers(timestamp_t time_ns) const {
          time_ns <= imu_.back().timestamp_ns;
 }
 
-Eigen::Vector3d RateIntegral::At(timestamp_t time_ns) const {
+size_t RateIntegral::Sample(timestamp_t time_ns) const {
   const auto next = std::upper_bound(imu_.begin(), imu_.end(), time_ns,
                                      [](timestamp_t time, const ImuSample& s) {
                                        return time < s.timestamp_ns;
                                      });
-  const size_t i = next - imu_.begin();
-  if (i == imu_.size()) return integral_.back();
-  const ImuSample& a = imu_[i - 1];
-  const ImuSample& b = imu_[i];
+  return next - imu_.begin() - 1;
+}
+
+Eigen::Vector3d RateIntegral::Rest(size_t sample, timestamp_t time_ns) const {
+  if (sample + 1 == imu_.size()) return Eigen::Vector3d::Zero();
+  const ImuSample& a = imu_[sample];
+  const ImuSample& b = imu_[sample + 1];
   const double dt = SecondsFromNs(time_ns - a.timestamp_ns);
   const double ratio = dt / SecondsFromNs(b.timestamp_ns - a.timestamp_ns);
-  return integral_[i - 1] +
-         dt * (a.angular_velocity +
+  return dt * (a.angular_velocity +
                0.5 * ratio * (b.angular_velocity - a.angular_velocity));
+}
+
+Eigen::Vector3d RateIntegral::At(timestamp_t time_ns) const {
+  const size_t sample = Sample(time_ns);
+  return integral_[sample] + Rest(sample, time_ns);
+}
+
+Eigen::Quaterniond RateIntegral::FirstFromBody(timestamp_t time_ns) const {
+  const size_t sample = Sample(time_ns);
+  return first_from_body_[sample] * ExpSo3(Rest(sample, time_ns));
+}
+
+Eigen::Vector3d RateIntegral::Turn(timestamp_t start_ns,
+                                   timestamp_t end_ns) const {
+  return LogSo3(FirstFromBody(start_ns).conjugate() * FirstFromBody(end_ns));
 }
 
 Eigen::Vector3d RateIntegral::MeanRate(timestamp_t time_ns) const {

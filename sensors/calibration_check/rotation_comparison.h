@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <Eigen/Core>
+#include <Eigen/Geometry>
 #include <limits>
 #include <vector>
 
@@ -10,8 +10,8 @@
 
 namespace adasfm {
 
-// The integral of the angular velocity at any time. Keeps a reference to the
-// samples.
+// The integrals of the angular velocity, and of the turn, at any time. Keeps a
+// reference to the samples.
 class RateIntegral {
  public:
   explicit RateIntegral(const std::vector<ImuSample>& imu);
@@ -19,12 +19,21 @@ class RateIntegral {
   bool Covers(timestamp_t time_ns) const;
   // Linear between samples; undefined outside of the log.
   Eigen::Vector3d At(timestamp_t time_ns) const;
+  // The rotation vector of start_from_end, bodies at these times. The integral
+  // above differs from it where the axis changes.
+  Eigen::Vector3d Turn(timestamp_t start_ns, timestamp_t end_ns) const;
   // Mean angular velocity over 20 ms about a time, as far as the log reaches.
   Eigen::Vector3d MeanRate(timestamp_t time_ns) const;
 
  private:
+  // The last sample up to a time, and the integral from there on.
+  size_t Sample(timestamp_t time_ns) const;
+  Eigen::Vector3d Rest(size_t sample, timestamp_t time_ns) const;
+  Eigen::Quaterniond FirstFromBody(timestamp_t time_ns) const;
+
   const std::vector<ImuSample>& imu_;
   std::vector<Eigen::Vector3d> integral_;
+  std::vector<Eigen::Quaterniond> first_from_body_;
 };
 
 // Rotation vectors of both sides over the same intervals.

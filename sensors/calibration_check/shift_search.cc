@@ -9,8 +9,7 @@
 namespace adasfm {
 namespace {
 
-// Only rotations over short times: the gyroscope's drift and the order of
-// turns do not matter there.
+// Only rotations over short times: the gyroscope's drift does not matter there.
 constexpr double kMaxIntervalS = 1.0;
 constexpr double kMaxAngleRad = 1.0;
 // That many suffice; more would only take time.
@@ -103,9 +102,11 @@ RotationComparison ShiftSearch::Compare(
     const std::vector<TimedRotation>& rotations, double shift_s,
     double lag_s) const {
   const timestamp_t shift = std::llround(1e9 * (timeshift_s_ + shift_s));
-  const auto turn_until = [&](timestamp_t time) -> Eigen::Vector3d {
-    if (lag_s == 0.0) return integral_.At(time);
-    return integral_.At(time) + lag_s * integral_.MeanRate(time);
+  const auto turn = [&](timestamp_t start, timestamp_t end) -> Eigen::Vector3d {
+    const Eigen::Vector3d without_lag = integral_.Turn(start, end);
+    if (lag_s == 0.0) return without_lag;
+    return without_lag +
+           lag_s * (integral_.MeanRate(end) - integral_.MeanRate(start));
   };
   RotationComparison data;
   for (const TimedRotation& rotation : rotations) {
@@ -114,7 +115,7 @@ RotationComparison ShiftSearch::Compare(
     const timestamp_t end = rotation.end_ns + shift;
     data.visual.push_back(LogSo3(rotation.cam2_from_cam1));
     // cam2_from_cam1 turns against the body's motion.
-    data.gyro.push_back(turn_until(start) - turn_until(end));
+    data.gyro.push_back(-turn(start, end));
     data.dt_s.push_back(SecondsFromNs(end - start));
   }
   return data;

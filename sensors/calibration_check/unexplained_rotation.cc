@@ -22,28 +22,40 @@ constexpr int kNumMountingRounds = 5;
 
 using Rates = std::vector<Eigen::Vector3d>;
 
-// Per interval, about the median of each axis: the bias and what turns all the
-// time say nothing.
+// Takes the median of each axis off: the bias and what turns all the time say
+// nothing.
+void Center(Rates* rates) {
+  std::vector<double> values(rates->size());
+  for (int axis = 0; axis < 3; ++axis) {
+    for (size_t i = 0; i < rates->size(); ++i) values[i] = (*rates)[i][axis];
+    const double median = UpperMedian(&values);
+    for (Eigen::Vector3d& rate : *rates) rate[axis] -= median;
+  }
+}
+
 Rates CenterRates(const std::vector<Eigen::Vector3d>& turns,
                   const std::vector<double>& dt_s) {
   Rates rates(turns.size());
   for (size_t i = 0; i < turns.size(); ++i) rates[i] = turns[i] / dt_s[i];
-  std::vector<double> values(rates.size());
-  for (int axis = 0; axis < 3; ++axis) {
-    for (size_t i = 0; i < rates.size(); ++i) values[i] = rates[i][axis];
-    const double median = UpperMedian(&values);
-    for (Eigen::Vector3d& rate : rates) rate[axis] -= median;
-  }
+  Center(&rates);
   return rates;
 }
 
-std::vector<double> Distances(const Rates& visual, const Rates& gyro,
-                              const Eigen::Matrix3d& map) {
-  std::vector<double> distances(visual.size());
+// Centered once more: medians in two frames are those of two points.
+Rates Residuals(const Rates& visual, const Rates& gyro,
+                const Eigen::Matrix3d& map) {
+  Rates residuals(visual.size());
   for (size_t i = 0; i < visual.size(); ++i) {
-    distances[i] = (visual[i] - map * gyro[i]).norm();
+    residuals[i] = visual[i] - map * gyro[i];
   }
-  return distances;
+  Center(&residuals);
+  return residuals;
+}
+
+std::vector<double> Lengths(const Rates& rates) {
+  std::vector<double> lengths;
+  for (const Eigen::Vector3d& rate : rates) lengths.push_back(rate.norm());
+  return lengths;
 }
 
 // Weights that bound the pull of each interval.
@@ -85,6 +97,7 @@ double FitScale(const Rates& visual, const Rates& gyro,
 struct MountingFit {
   double residual = std::numeric_limits<double>::infinity();
   double scaled_residual = std::numeric_limits<double>::infinity();
+  Rates residuals;  // without scale
 };
 
 MountingFit FitMounting(const Rates& visual, const Rates& gyro) {
@@ -93,33 +106,38 @@ MountingFit FitMounting(const Rates& visual, const Rates& gyro) {
   std::vector<double> scaled_weights = weights;
   for (int round = 0; round < kNumMountingRounds; ++round) {
     const Eigen::Matrix3d map = FitRotation(visual, gyro, weights);
-    const std::vector<double> distances = Distances(visual, gyro, map);
-    fit.residual = std::min(fit.residual, Median(distances));
+    Rates residuals = Residuals(visual, gyro, map);
+    const std::vector<double> distances = Lengths(residuals);
+    const double residual = Median(distances);
     weights = BoundedWeights(distances);
+    if (residual < fit.residual) {
+      fit.residual = residual;
+      fit.residuals = std::move(residuals);
+    }
     const Eigen::Matrix3d scaled_map =
         FitScale(visual, gyro, map, scaled_weights) * map;
-    const std::vector<double> scaled = Distances(visual, gyro, scaled_map);
+    const std::vector<double> scaled =
+        Lengths(Residuals(visual, gyro, scaled_map));
     fit.scaled_residual = std::min(fit.scaled_residual, Median(scaled));
     scaled_weights = BoundedWeights(scaled);
   }
   return fit;
 }
 
-double MedianLength(const Rates& rates) {
-  std::vector<double> lengths;
-  for (const Eigen::Vector3d& rate : rates) lengths.push_back(rate.norm());
-  return Median(std::move(lengths));
-}
+// Of one rotation, rad.
+struct VisualError {
+  double length = 0.0;  // median of a vector's
+  double along = 0.0;   // about the axis of the turn, median
+};
 
-// How far three images are from closing: the error of one rotation, rad, as the
-// median length of a vector; none without enough triangles.
-std::optional<double> MeasureVisualError(
+// How far three images are from closing; none without enough triangles.
+std::optional<VisualError> MeasureVisualError(
     const std::vector<TimedRotation>& rotations, size_t min_num) {
   std::map<timestamp_t, std::map<timestamp_t, Eigen::Quaterniond>> by_time;
   for (const TimedRotation& rotation : rotations) {
     by_time[rotation.start_ns][rotation.end_ns] = rotation.cam2_from_cam1;
   }
-  std::vector<double> errors;
+  std::vector<double> lengths, along;
   for (const auto& [start, from_start] : by_time) {
     for (const auto& [middle, middle_from_start] : from_start) {
       const auto from_middle = by_time.find(middle);
@@ -127,30 +145,70 @@ std::optional<double> MeasureVisualError(
       for (const auto& [end, end_from_middle] : from_middle->second) {
         const auto direct = from_start.find(end);
         if (direct == from_start.end()) continue;
-        errors.push_back(LogSo3(direct->second.conjugate() *
-                                (end_from_middle * middle_from_start))
-                             .norm() /
-                         std::sqrt(3.0));
+        const Eigen::Vector3d error = LogSo3(
+            direct->second.conjugate() * (end_from_middle * middle_from_start));
+        const Eigen::Vector3d axis = LogSo3(direct->second).normalized();
+        lengths.push_back(error.norm() / std::sqrt(3.0));
+        along.push_back(std::abs(error.dot(axis)) / std::sqrt(3.0));
       }
     }
   }
-  if (errors.size() < min_num) return std::nullopt;
-  return Median(std::move(errors));
+  if (lengths.size() < min_num) return std::nullopt;
+  return VisualError{Median(std::move(lengths)), Median(std::move(along))};
+}
+
+// Of intervals: what is left of their rotations about the axis of the turn,
+// their turning rates, and the sigmas of vision and gyroscope together.
+struct RotationRest {
+  std::vector<double> angles;
+  std::vector<double> rates;
+  std::vector<double> sigmas;
+};
+
+// The median of angle^2 / (sigma^2 + (time sigma * rate)^2) would be that of a
+// chi-square with one degree of freedom.
+double FindIntervalTimeSigma(const RotationRest& rest) {
+  // Readout and exposure last no longer: more is not a matter of times.
+  constexpr double kMaxSigmaS = 0.03;
+  constexpr double kNormalMedian = 0.455;
+  // Noise figures and errors of the mounting leave less than this.
+  constexpr double kMinExcess = 2.0;
+  std::vector<double> ratios(rest.angles.size());
+  const auto median_ratio = [&](double sigma_s) {
+    for (size_t i = 0; i < ratios.size(); ++i) {
+      ratios[i] = std::pow(rest.angles[i], 2) /
+                  (std::pow(rest.sigmas[i], 2) +
+                   std::pow(sigma_s * rest.rates[i], 2) + 1e-18);
+    }
+    return Median(ratios);
+  };
+  if (median_ratio(0.0) < kMinExcess * kNormalMedian) return 0.0;
+  if (median_ratio(kMaxSigmaS) > kNormalMedian) return 0.0;
+  double low = 0.0, high = kMaxSigmaS;
+  for (int i = 0; i < 30; ++i) {
+    const double middle = 0.5 * (low + high);
+    (median_ratio(middle) > kNormalMedian ? low : high) = middle;
+  }
+  return high;
 }
 
 }  // namespace
 
 UnexplainedRotation FindUnexplainedRotation(
     const std::vector<TimedRotation>& rotations, const ShiftSearch& search,
-    double shift_s, const VisionCheckOptions& options) {
+    double shift_s, double gyroscope_noise_density,
+    const VisionCheckOptions& options) {
   UnexplainedRotation result;
   const size_t min_num = options.min_num_rotations;
-  const std::optional<double> visual_error =
+  const std::optional<VisualError> visual_error =
       MeasureVisualError(rotations, min_num);
   if (!visual_error) return result;
-  result.visual_error_deg = RadToDeg(*visual_error);
+  result.visual_error_deg = RadToDeg(visual_error->length);
   double least = std::numeric_limits<double>::infinity();
   const int num_steps = static_cast<int>(std::round(kMaxShiftS / kShiftStepS));
+  constexpr double kNormalMedian = 0.6745;
+  const double visual_sigma = visual_error->along / kNormalMedian;
+  RotationRest rest;
   const auto compare_at = [&](double shift) {
     const RotationComparison data = search.CompareShortest(shift);
     if (data.visual.size() < min_num) return;
@@ -159,16 +217,27 @@ UnexplainedRotation FindUnexplainedRotation(
     const MountingFit fit = FitMounting(visual, gyro);
     if (fit.residual >= least) return;
     least = fit.residual;
+    rest = RotationRest();
+    for (size_t i = 0; i < data.dt_s.size(); ++i) {
+      rest.angles.push_back(data.dt_s[i] *
+                            data.visual[i].normalized().dot(fit.residuals[i]));
+      rest.rates.push_back(data.visual[i].norm() / data.dt_s[i]);
+      rest.sigmas.push_back(std::hypot(
+          visual_sigma, gyroscope_noise_density * std::sqrt(data.dt_s[i])));
+    }
     const double interval_s = Median(data.dt_s);
     result.is_conclusive = true;
     result.residual_deg = RadToDeg(fit.residual * interval_s);
-    result.turning_deg = RadToDeg(MedianLength(gyro) * interval_s);
+    result.turning_deg = RadToDeg(Median(Lengths(gyro)) * interval_s);
     result.scaled_residual_deg = RadToDeg(fit.scaled_residual * interval_s);
-    result.visual_turning_deg = RadToDeg(MedianLength(visual) * interval_s);
+    result.visual_turning_deg = RadToDeg(Median(Lengths(visual)) * interval_s);
   };
   compare_at(shift_s);
   for (int step = -num_steps; step <= num_steps; ++step) {
     compare_at(step * kShiftStepS);
+  }
+  if (result.is_conclusive) {
+    result.interval_time_sigma_s = FindIntervalTimeSigma(rest);
   }
   return result;
 }

@@ -18,10 +18,12 @@ namespace adasfm {
 // the mounting as calibrated, each with the mounting that suits it best (the
 // rotation between two sets of vectors, Kabsch 1976, with weights that bound
 // the pull of wrong two-view geometries). What vision errs by itself is seen
-// where three images close a triangle. On failure: not conclusive with too few
-// intervals or triangles.
+// where three images close a triangle. What this and the gyroscope's noise
+// (rad/s/sqrt(Hz)) leave is put down to the times of the images. On failure:
+// not conclusive with too few intervals or triangles.
 UnexplainedRotation FindUnexplainedRotation(
     const std::vector<TimedRotation>& rotations, const ShiftSearch& search,
-    double shift_s, const VisionCheckOptions& options);
+    double shift_s, double gyroscope_noise_density,
+    const VisionCheckOptions& options);
 
 }  // namespace adasfm

@@ -91,6 +91,7 @@ const std::vector<OptionCase>& Cases() {
       OPTION("write_pose_priors", 1, write_pose_priors),
       OPTION("pose_prior_sigma", 0.7, pose_prior_sigma),
       OPTION("ba_refine_focal_length", 1, structure.bundle.refine_focal_length),
+      OPTION("calibrate_focal_lengths", 0, focal_lengths.enabled),
       OPTION("refine_unknown_focal_length", 0,
              structure.refine_unknown_focal_length),
       OPTION("min_num_matches", 30, refinement.min_num_matches),

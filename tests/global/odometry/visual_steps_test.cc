@@ -129,6 +129,19 @@ TEST(AddVisualSteps, GoesOnWhereNothingSees) {
   EXPECT_EQ(Complete(problem, options).num_coasting, 0);
 }
 
+// An IMU alone: the unit behind the hole is not that before it.
+TEST(AddVisualSteps, WithoutMetresNothingGoesOnThroughAHole) {
+  StepProblem problem = BuildProblem(1, [](int) { return false; });
+  for (ViewGraphEdge& edge : problem.scene.graph.edges) {
+    if (edge.image_id1 <= 7 && edge.image_id2 >= 6) {
+      edge.removal = EdgeRemoval::kFewInliers;
+    }
+  }
+  const VisualSteps steps = Complete(problem);
+  EXPECT_EQ(steps.num_coasting, 0);
+  EXPECT_LT(steps.num_by_vision, kNumImages - 1);
+}
+
 TEST(AddVisualSteps, ContinuesAnInterruptedChain) {
   StepProblem problem = BuildProblem(1, [](int) { return true; });
   problem.priors.erase(problem.priors.begin() + 5);

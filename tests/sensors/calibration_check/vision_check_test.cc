@@ -194,9 +194,9 @@ std::map<image_t, Eigen::Quaterniond> ShownRotations(const Dataset& data,
 
 // A hand-held camera: each image turned by some degrees, and the gyroscope's
 // log turned with it.
-void Shake(double amplitude_rad, Dataset* data) {
-  const auto turn_at = [amplitude_rad](timestamp_t time_ns) -> Eigen::Vector3d {
-    const double t = SecondsFromNs(time_ns % 1'000'000'000'000);
+void Shake(double amplitude_rad, double speed, Dataset* data) {
+  const auto turn_at = [=](timestamp_t time_ns) -> Eigen::Vector3d {
+    const double t = speed * SecondsFromNs(time_ns % 1'000'000'000'000);
     return amplitude_rad * Eigen::Vector3d(std::sin(9.0 * t + 1.0),
                                            std::sin(11.0 * t),
                                            std::sin(7.0 * t + 2.0));
@@ -231,7 +231,7 @@ TEST(VisionCheck, StabilizedVideoLeavesTheImuOut) {
     Dataset data = ToDataset(world);
     data.logs.wheel.clear();
     data.calibration.has_wheel = false;
-    Shake(DegToRad(2.0), &data);
+    Shake(DegToRad(2.0), 1.0, &data);
     Random random(seed);
     const PriorEstimate estimate =
         EstimateFrom(data, Film(data, ShownRotations(data, true), &random));
@@ -247,6 +247,57 @@ TEST(VisionCheck, StabilizedVideoLeavesTheImuOut) {
         EstimateFrom(data, Film(data, ShownRotations(data, false), &random));
     EXPECT_FALSE(honest.summary.imu_was_left_out);
     EXPECT_EQ(honest.priors.size(), data.images.size() - 1);
+  }
+}
+
+// The camera's poses some time after those of the log of its images.
+std::map<image_t, Eigen::Quaterniond> RotationsAtJitteredTimes(
+    const Dataset& data, double sigma_s, Random* random) {
+  std::map<image_t, Eigen::Quaterniond> shown = ShownRotations(data, false);
+  const std::vector<ImageStamp>& images = data.images;
+  for (size_t i = 0; i + 1 < images.size(); ++i) {
+    const Rigid3d& pose = data.cams_from_world.at(images[i].image_id);
+    const Rigid3d& next = data.cams_from_world.at(images[i + 1].image_id);
+    const double dt_s =
+        SecondsFromNs(images[i + 1].timestamp_ns - images[i].timestamp_ns);
+    const Eigen::Vector3d rate =
+        LogSo3(next.rotation * pose.rotation.conjugate()) / dt_s;
+    shown[images[i].image_id] =
+        ExpSo3(random->Gaussian(sigma_s) * rate) * pose.rotation;
+  }
+  return shown;
+}
+
+// Times that jitter by 10 ms: between two images by sqrt(2) of that. Exact
+// times show none.
+TEST(VisionCheck, JitterOfTheImagesWidensThePriors) {
+  constexpr double kSigmaS = 0.01;
+  for (const uint64_t seed : {1, 2, 3}) {
+    const SyntheticWorld world = BuildSyntheticWorld(SmallWorld(seed, 200));
+    Dataset data = ToDataset(world);
+    Shake(DegToRad(10.0), 0.2, &data);
+    Random random(seed);
+    const PriorEstimate exact =
+        EstimateFrom(data, Film(data, ShownRotations(data, false), &random));
+    EXPECT_EQ(exact.summary.unexplained_rotation.interval_time_sigma_s, 0.0);
+    const PriorEstimate jittered = EstimateFrom(
+        data,
+        Film(data, RotationsAtJitteredTimes(data, kSigmaS, &random), &random));
+    const double expected = std::sqrt(2.0) * kSigmaS;
+    EXPECT_NEAR(jittered.summary.unexplained_rotation.interval_time_sigma_s,
+                expected, 0.25 * expected);
+    const auto rotation_variance = [](const RelativePosePrior& prior) {
+      return prior.covariance.topLeftCorner<3, 3>().trace();
+    };
+    double wider = 0.0, turns = 0.0;
+    for (size_t i = 0; i < exact.priors.size(); ++i) {
+      wider += rotation_variance(jittered.priors[i]) -
+               rotation_variance(exact.priors[i]);
+      turns += LogSo3(exact.priors[i].cam2_from_cam1.rotation).squaredNorm() /
+               std::pow(SecondsFromNs(exact.priors[i].dt_ns), 2);
+    }
+    EXPECT_NEAR(wider, expected * expected * turns,
+                0.6 * expected * expected * turns);
   }
 }
 

@@ -1,0 +1,91 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "colmap_ext/scene/calibrate_focal_lengths.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "tests/testing/colmap_ext/synthetic_scene.h"
+
+namespace adasfm {
+namespace {
+
+SyntheticWorldOptions Drive(uint64_t seed) {
+  SyntheticWorldOptions options;
+  options.seed = seed;
+  options.num_images = 80;
+  return options;
+}
+
+SceneData SceneWithFocalLength(const SyntheticWorld& world, double factor) {
+  SyntheticPriorOptions priors;
+  priors.enabled = false;
+  SceneData scene = BuildSyntheticScene(world, priors);
+  colmap::Camera& camera = scene.cameras.at(1);
+  for (const size_t index : camera.FocalLengthIdxs()) {
+    camera.Params(index) *= factor;
+  }
+  return scene;
+}
+
+// What COLMAP guesses is half too long for phones, and too short for others.
+TEST(CalibrateFocalLengths, FindsTheTruthWithinItsSigma) {
+  for (const uint64_t seed : {1, 2, 3, 4}) {
+    const SyntheticWorld world = BuildSyntheticWorld(Drive(seed));
+    for (const double factor : {0.7, 1.6}) {
+      SceneData scene = SceneWithFocalLength(world, factor);
+      const auto found =
+          CalibrateFocalLengths(FocalLengthCalibrationOptions(), &scene);
+      ASSERT_EQ(found.size(), 1) << seed << ", " << factor;
+      EXPECT_DOUBLE_EQ(found[0].given_px, factor * world.camera.focal_px);
+      EXPECT_LT(found[0].relative_sigma, 0.03);
+      EXPECT_NEAR(std::log(found[0].found_px / world.camera.focal_px), 0.0,
+                  4.0 * found[0].relative_sigma);
+      EXPECT_EQ(scene.cameras.at(1).MeanFocalLength(), found[0].found_px);
+      EXPECT_EQ(scene.cameras.at(1).PrincipalPointX(),
+                world.camera.principal_x_px);
+    }
+  }
+}
+
+TEST(CalibrateFocalLengths, KnownAndRightOnesStay) {
+  const SyntheticWorld world = BuildSyntheticWorld(Drive(1));
+  SceneData known = SceneWithFocalLength(world, 1.6);
+  known.cameras.at(1).SetPriorFocalLength(true);
+  EXPECT_TRUE(
+      CalibrateFocalLengths(FocalLengthCalibrationOptions(), &known).empty());
+  EXPECT_EQ(known.cameras.at(1).MeanFocalLength(), 1.6 * world.camera.focal_px);
+  FocalLengthCalibrationOptions off;
+  off.enabled = false;
+  SceneData unknown = SceneWithFocalLength(world, 1.6);
+  EXPECT_TRUE(CalibrateFocalLengths(off, &unknown).empty());
+}
+
+// Pairs straight on say nothing: no focal length is made up from them.
+TEST(CalibrateFocalLengths, StraightOnNothingIsTaken) {
+  const SyntheticWorld world = BuildSyntheticWorld(Drive(2));
+  SceneData scene = SceneWithFocalLength(world, 1.6);
+  std::vector<ScenePair> straight;
+  for (const ScenePair& pair : scene.pairs) {
+    const auto pose = [&world](image_t image_id) {
+      return world.images.at(image_id - 1).cam_from_world;
+    };
+    const Rigid3d motion =
+        ComputeCam2FromCam1(pose(pair.image_id1), pose(pair.image_id2));
+    if (LogSo3(motion.rotation).norm() < DegToRad(1.0)) {
+      straight.push_back(pair);
+    }
+  }
+  ASSERT_GT(straight.size(), 20);
+  scene.pairs = straight;
+  const auto found =
+      CalibrateFocalLengths(FocalLengthCalibrationOptions(), &scene);
+  // Where it is sure all the same, it is right.
+  for (const CalibratedFocalLength& calibrated : found) {
+    EXPECT_NEAR(std::log(calibrated.found_px / world.camera.focal_px), 0.0,
+                4.0 * calibrated.relative_sigma);
+  }
+}
+
+}  // namespace
+}  // namespace adasfm
