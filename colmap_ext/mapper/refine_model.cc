@@ -8,7 +8,6 @@
 
 #include "colmap_ext/bundle_adjustment/bundle_adjustment.h"
 #include "colmap_ext/host/pose_conversion.h"
-#include "colmap_ext/host/triangulation.h"
 #include "colmap_ext/mapper/local_mapper.h"
 #include "colmap_ext/mapper/part_adjuster.h"
 #include "colmap_ext/mapper/prior_support.h"
@@ -39,8 +38,6 @@ class ModelRefiner {
       : options_(options),
         scene_(*scene),
         reconstruction_(scene->reconstruction),
-        triangulator_(&scene->graph, &scene->reconstruction,
-                      options.min_triangulation_angle_deg),
         summary_(*summary) {}
 
   void JoinParts() {
@@ -48,18 +45,18 @@ class ModelRefiner {
     const double loose_px = 3.0 * options_.filter_max_reproj_error_px;
     AdjustTentatively(10);
     Filter(loose_px);
-    triangulator_.CompleteAndMergeTracks(loose_px);
+    scene_.mapper.CompleteAndMergeTracks(loose_px);
   }
 
   void AdjustRoughly() {
-    TriangulateWeakImages();
+    scene_.mapper.Retriangulate(options_.min_triangulation_angle_deg);
     AdjustTentatively(15);
     Filter(options_.filter_max_reproj_error_px);
     if (PutBackContradictedImages()) AdjustTentatively(10);
   }
 
   void AdjustFinely() {
-    triangulator_.CompleteAndMergeTracks(options_.filter_max_reproj_error_px);
+    scene_.mapper.CompleteAndMergeTracks(options_.filter_max_reproj_error_px);
     summary_.keypoint_sigma_factor = 1.0;
     Adjust(25, 1e-6, FindPriors(), &summary_.keypoint_sigma_factor);
     Filter(options_.filter_max_reproj_error_px);
@@ -73,17 +70,8 @@ class ModelRefiner {
   }
 
   void Filter(double max_reproj_error_px) {
-    reconstruction_.FilterAllPoints3D(max_reproj_error_px,
-                                      options_.min_triangulation_angle_deg);
-  }
-
-  void TriangulateWeakImages() {
-    for (const image_t image_id : RegisteredImages()) {
-      const colmap::Image& image = reconstruction_.Image(image_id);
-      if (2 * image.NumPoints3D() < image.NumPoints2D()) {
-        triangulator_.TriangulateImage(image_id);
-      }
-    }
+    scene_.mapper.FilterPoints(max_reproj_error_px,
+                               options_.min_triangulation_angle_deg);
   }
 
   // For images on few points, the coarse motion to registered neighbours.
@@ -259,7 +247,6 @@ class ModelRefiner {
   const RefineModelOptions& options_;
   MapperScene& scene_;
   colmap::Reconstruction& reconstruction_;
-  Triangulator triangulator_;
   RefineModelSummary& summary_;
 };
 

@@ -8,6 +8,7 @@
 #include <sstream>
 #include <stdexcept>
 
+#include "colmap_ext/io/capture_output.h"
 #include "colmap_ext/io/output_files.h"
 #include "colmap_ext/mapper_stage/mapper_fingerprint.h"
 #include "colmap_ext/mapper_stage/mapper_steps.h"
@@ -22,6 +23,8 @@ namespace fs = std::filesystem;
 
 // The rest is for the scene itself, the system and what else runs.
 constexpr double kShareOfAvailableMemory = 0.7;
+// COLMAP reports on std::cout every image that it registers (host_mapper.h).
+constexpr char kNowhere[] = "/dev/null";
 
 // For a part that threw: fewer wrong poses and points to stumble over.
 LocalMapperOptions StricterOptions(LocalMapperOptions options) {
@@ -148,6 +151,7 @@ Status MapperStage::RunPart(int part_index) {
         "AdaSfmMapper.part_index = " + std::to_string(part_index) +
         ", but the plan has the parts 0 to " + std::to_string(*num_parts - 1));
   }
+  const CaptureOutput capture(kNowhere, "");
   return RunPartWithThreads(part_index,
                             EffectiveNumThreads(options_.num_threads));
 }
@@ -257,6 +261,7 @@ Status MapperStage::RunAllParts() {
   std::atomic<size_t> next{0};
   std::atomic<size_t> num_images_done{0};
   std::atomic<size_t> num_parts_done{0};
+  const CaptureOutput capture(kNowhere, "");
   // One worker takes one part after another, the biggest first.
   ParallelFor(num_parallel, num_parallel, [&](size_t) {
     for (size_t i = next++; i < parts.size(); i = next++) {

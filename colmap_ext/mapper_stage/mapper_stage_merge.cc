@@ -195,8 +195,8 @@ StatusOr<colmap::Reconstruction> MapperStage::Merge(bool require_all_parts) {
   const StepTimer refine_timer;
   status = RefineMerged(fingerprint, *num_done, &scene);
   if (!status.ok()) return status;
+  scene->mapper.End();
   colmap::Reconstruction& model = scene->reconstruction;
-  model.TearDown();
   summary_.is_level =
       summary_.is_georeferenced || AlignToGravity(data_, &model);
   summary_.refine_seconds = refine_timer.Seconds();

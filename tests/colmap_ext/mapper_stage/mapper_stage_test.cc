@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <iostream>
 
 #include "tests/testing/colmap_ext/mapper_stage_fixture.h"
 
@@ -168,7 +169,16 @@ TEST_F(MapperStageTest, ThreadsDoNotChangeTheResult) {
   }
 }
 
-// Stopped in the second round of the refinement, after the first was saved.
+// COLMAP's mapper reports each image that it registers; users get our progress.
+TEST_F(MapperStageTest, PrintsNothing) {
+  MapperWorldOptions options;
+  options.world.num_images = 80;
+  testing::internal::CaptureStdout();
+  Run(BuildMapperWorld(options));
+  std::cout.flush();
+  EXPECT_EQ(testing::internal::GetCapturedStdout(), "");
+}
+
 // Photos whose camera nobody has calibrated. Without noise: the focal length of
 // a drive mostly straight ahead is weakly seen.
 TEST_F(MapperStageTest, UnknownFocalLengthIsRefined) {
