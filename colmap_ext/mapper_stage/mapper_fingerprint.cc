@@ -1,37 +1,22 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "colmap_ext/mapper_stage/mapper_fingerprint.h"
 
-#include <sstream>
+#include "core/hash.h"
 
 namespace adasfm {
 namespace {
 
-// FNV-1a over bytes.
-class Hash {
+class Hash : public Fnv1aHash {
  public:
-  template <typename T>
-  void Add(const T& value) {
-    const auto* bytes = reinterpret_cast<const unsigned char*>(&value);
-    for (size_t i = 0; i < sizeof(T); ++i) {
-      hash_ = (hash_ ^ bytes[i]) * 1099511628211ull;
-    }
-  }
+  using Fnv1aHash::Add;
   void Add(const std::string& text) {
     Add(text.size());
-    for (const char c : text) Add(c);
+    AddBytes(text.data(), text.size());
   }
   void Add(const Rigid3d& pose) {
     for (int i = 0; i < 4; ++i) Add(pose.rotation.coeffs()(i));
     for (int i = 0; i < 3; ++i) Add(pose.translation(i));
   }
-  std::string Text() const {
-    std::ostringstream text;
-    text << std::hex << hash_;
-    return text.str();
-  }
-
- private:
-  uint64_t hash_ = 14695981039346656037ull;
 };
 
 void AddScene(const SceneData& data, Hash* hash) {

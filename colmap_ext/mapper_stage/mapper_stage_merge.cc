@@ -11,6 +11,7 @@
 #include "colmap_ext/mapper_stage/mapper_steps.h"
 #include "colmap_ext/mapper_stage/merge_checkpoint.h"
 #include "colmap_ext/scene/align_to_gravity.h"
+#include "core/median.h"
 
 namespace adasfm {
 namespace {
@@ -36,9 +37,7 @@ double ComputeNeighborDistance(const SceneData& data,
                          coarse.at(neighbor.second).TargetOriginInSource())
                             .norm());
   }
-  if (distances.empty()) return 1.0;
-  std::sort(distances.begin(), distances.end());
-  const double median = distances[distances.size() / 2];
+  const double median = UpperMedian(&distances);
   return median > 0.0 ? median : 1.0;
 }
 
