@@ -12,6 +12,7 @@
 #include "colmap_ext/mapper/part_adjuster.h"
 #include "colmap_ext/mapper/prior_support.h"
 #include "core/interruption.h"
+#include "core/option_checker.h"
 
 namespace adasfm {
 namespace {
@@ -223,27 +224,18 @@ class LocalMapper {
 }  // namespace
 
 bool LocalMapperOptions::IsValid(std::string* error) const {
-  const auto check = [error](bool holds, const std::string& name, double value,
-                             const std::string& rule) {
-    if (!holds) {
-      *error =
-          "AdaSfmMapper." + name + " = " + std::to_string(value) + " " + rule;
-    }
-    return holds;
-  };
-  return check(registration.min_num_visible_points >= 4,
-               "min_num_visible_points", registration.min_num_visible_points,
-               "must be at least 4") &&
-         check(registration.max_reproj_error_px > 0.0, "max_reproj_error_px",
-               registration.max_reproj_error_px, "must be positive") &&
-         check(filter_max_reproj_error_px > 0.0, "filter_max_reproj_error_px",
-               filter_max_reproj_error_px, "must be positive") &&
-         check(min_triangulation_angle_deg > 0.0, "min_triangulation_angle_deg",
-               min_triangulation_angle_deg, "must be positive") &&
-         check(global_adjustment_growth > 1.0, "global_adjustment_growth",
-               global_adjustment_growth, "must be above 1") &&
-         check(keypoint_sigma_px > 0.0, "keypoint_sigma_px", keypoint_sigma_px,
-               "must be positive") &&
+  return OptionChecker("AdaSfmMapper", error)
+             .AtLeast(4, "min_num_visible_points",
+                      registration.min_num_visible_points)
+             .Positive("max_reproj_error_px", registration.max_reproj_error_px)
+             .Positive("filter_max_reproj_error_px", filter_max_reproj_error_px)
+             .Positive("min_triangulation_angle_deg",
+                       min_triangulation_angle_deg)
+             .Require(global_adjustment_growth > 1.0,
+                      "global_adjustment_growth", global_adjustment_growth,
+                      "must be above 1")
+             .Positive("keypoint_sigma_px", keypoint_sigma_px)
+             .AllHold() &&
          balance.IsValid(error);
 }
 

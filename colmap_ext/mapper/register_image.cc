@@ -15,6 +15,8 @@ namespace {
 
 // More co-visible images hardly move a median.
 constexpr size_t kMaxNumNeighbors = 15;
+// P3P needs more points than v_p to be believed: no other pose confirms it.
+constexpr int kMinNumP3pInliers = 15;
 // Of the visible points: a coarse candidate that explains as much is refined on
 // the points that P3P would be refined on, too.
 constexpr double kEnoughInlierRatio = 0.9;
@@ -189,7 +191,7 @@ RegisteredBy RegisterImage(const RegisterImageOptions& options,
   const size_t num_coarse_inliers = CountInliers(coarse_mask);
   if (num_coarse_inliers < kEnoughInlierRatio * points.pixels.size() &&
       scene->mapper.RegisterNextImage(image_id, options.max_reproj_error_px,
-                                      options.min_num_p3p_inliers)) {
+                                      kMinNumP3pInliers)) {
     const size_t num_inliers = CountInliers(FindInliers(
         points, camera, CamFromWorld(image), options.max_reproj_error_px));
     if (num_inliers > num_coarse_inliers && num_inliers >= min_num_inliers) {

@@ -17,9 +17,6 @@ struct RegisterImageOptions {
   double max_reproj_error_px = 8.0;
   // Of the visible points; below it wrong matches explain as much.
   double min_inlier_ratio = 0.25;
-  // P3P needs more points than v_p to be believed when no other pose confirms
-  // it.
-  int min_num_p3p_inliers = 15;
   // Whether the coarse poses give a second candidate.
   bool use_global_candidate = true;
 };

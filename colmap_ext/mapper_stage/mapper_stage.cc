@@ -14,6 +14,7 @@
 #include "colmap_ext/mapper_stage/mapper_steps.h"
 #include "colmap_ext/mapper_stage/model_checkpoint.h"
 #include "colmap_ext/mapper_stage/part_memory.h"
+#include "core/option_checker.h"
 #include "core/parallel.h"
 
 namespace adasfm {
@@ -65,13 +66,12 @@ std::string PartCheckpointPath(const std::string& checkpoint_path,
 }
 
 bool MapperStageOptions::IsValid(std::string* error) const {
-  if (max_memory_gb == 0.0 || !(max_memory_gb >= -1.0)) {
-    *error = "AdaSfmMapper.max_memory_gb = " + std::to_string(max_memory_gb) +
-             " must be positive, or -1";
-    return false;
-  }
-  return partition.IsValid(error) && local.IsValid(error) &&
-         align.IsValid(error) && refine.IsValid(error);
+  return OptionChecker("AdaSfmMapper", error)
+             .Require(max_memory_gb > 0.0 || max_memory_gb == -1.0,
+                      "max_memory_gb", max_memory_gb, "must be positive, or -1")
+             .AllHold() &&
+         partition.IsValid(error) && local.IsValid(error) &&
+         align.IsValid(error);
 }
 
 MapperStage::MapperStage(const MapperStageOptions& options,

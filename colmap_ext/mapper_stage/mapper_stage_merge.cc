@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Steps 3 and 4 of the mapper stage.
+// Steps 3.3 and 3.4 of the mapper stage.
 #include <algorithm>
 #include <map>
 #include <optional>
@@ -117,7 +117,7 @@ Status MapperStage::MergePartModels(const std::string& fingerprint) {
 }
 
 void MapperStage::FallBackToCoarsePoses(std::unique_ptr<MapperScene>* scene) {
-  if (!options_.refine.use_priors_in_adjustment) return;
+  if (!options_.local.use_priors_in_adjustment) return;
   const int num_torn = CountTorn(**scene);
   if (num_torn == 0) return;
   auto coarse_scene = BuildMapperScene(data_, coarse_, (*scene)->images);
@@ -129,7 +129,7 @@ void MapperStage::FallBackToCoarsePoses(std::unique_ptr<MapperScene>* scene) {
   options.join_parts = false;
   RefineModelSummary refined;
   for (int round = 1; round <= kNumRefinementRounds; ++round) {
-    RefineModel(options, round, coarse_scene.get(), &refined);
+    RefineModel(options, options_.local, round, coarse_scene.get(), &refined);
   }
   if (CountTorn(*coarse_scene) >= num_torn) return;
   summary_.refine = refined;
@@ -148,7 +148,7 @@ Status MapperStage::RefineMerged(const std::string& fingerprint, int num_done,
                " images, round " + std::to_string(round) + " of " +
                std::to_string(kNumRefinementRounds),
            0.65 + 0.3 * (round - 1) / kNumRefinementRounds);
-    RefineModel(options, round, scene->get(), &summary_.refine);
+    RefineModel(options, options_.local, round, scene->get(), &summary_.refine);
     if (round == kNumRefinementRounds) FallBackToCoarsePoses(scene);
     const Status status = WriteMergeCheckpoint(checkpoint_path_, fingerprint,
                                                round, summary_, **scene);
