@@ -9,19 +9,6 @@
 #include <utility>
 
 namespace adasfm {
-namespace {
-
-colmap::IncrementalTriangulator::Options TriangulationOptions(
-    double min_angle_deg) {
-  colmap::IncrementalTriangulator::Options options;
-  options.min_angle = min_angle_deg;
-  // A straight drive has many tracks of two views; the adjustment weighs them,
-  // and verified matches made them.
-  options.ignore_two_view_tracks = false;
-  return options;
-}
-
-}  // namespace
 
 HostMapper::HostMapper(colmap::Reconstruction* reconstruction)
     : reconstruction_(*reconstruction),
@@ -61,6 +48,10 @@ void HostMapper::AddMatches(image_t image_id1, image_t image_id2,
 void HostMapper::Begin() {
   mapper_ = std::make_unique<colmap::IncrementalMapper>(cache_.get());
   mapper_->BeginReconstruction(&reconstruction_);
+  // The reconstruction has its own copy of the keypoints.
+  for (const auto& [image_id, image] : reconstruction_.Images()) {
+    cache_->Image(image_id) = colmap::Image();
+  }
 }
 
 void HostMapper::End() { mapper_->EndReconstruction(/*discard=*/false); }
@@ -91,11 +82,12 @@ bool HostMapper::RegisterNextImage(image_t image_id, double max_reproj_error_px,
 }
 
 void HostMapper::TriangulateImage(image_t image_id, double min_angle_deg) {
-  mapper_->TriangulateImage(TriangulationOptions(min_angle_deg), image_id);
-}
-
-void HostMapper::Retriangulate(double min_angle_deg) {
-  mapper_->Retriangulate(TriangulationOptions(min_angle_deg));
+  colmap::IncrementalTriangulator::Options options;
+  options.min_angle = min_angle_deg;
+  // A straight drive has many tracks of two views; the adjustment weighs them,
+  // and verified matches made them.
+  options.ignore_two_view_tracks = false;
+  mapper_->TriangulateImage(options, image_id);
 }
 
 void HostMapper::CompleteAndMergeTracks(double max_reproj_error_px) {

@@ -62,9 +62,6 @@ class HostMapper {
                          int min_num_inliers);
   // Continues and creates the tracks of a registered image.
   void TriangulateImage(image_t image_id, double min_angle_deg);
-  // Triangulates again between registered images that share far fewer points
-  // than matches, each pair once.
-  void Retriangulate(double min_angle_deg);
   // Adds the observations that tracks miss, then joins tracks that matches
   // connect, both within max_reproj_error_px.
   void CompleteAndMergeTracks(double max_reproj_error_px);

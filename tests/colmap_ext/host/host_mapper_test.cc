@@ -66,7 +66,6 @@ class HostMapperTest : public testing::Test {
     }
     mapper.TriangulateImage(kLonely, 0.1);
     mapper.CompleteAndMergeTracks(4.0);
-    mapper.Retriangulate(0.1);
     mapper.FilterPoints(4.0, 0.1);
     EXPECT_EQ(model.NumImages(), 21);
     mapper.End();
