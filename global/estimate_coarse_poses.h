@@ -111,7 +111,7 @@ struct CoarsePoses {
 // Steps 2.1 to 2.6 of the coarse stage (design 7.2), from an initial view
 // graph (relative poses of verified pairs) to camera poses. Priors may be
 // empty. Throws std::invalid_argument for invalid options or an inconsistent
-// graph. Below, step 1 is 2.1:
+// graph. Numbered steps:
 //   1 least-squares relative poses            RefineRelativePoses
 //     the camera's mount                      CorrectCameraMount
 //     odometry's rotation rates               CorrectRotationRates
