@@ -26,15 +26,18 @@ namespace adasfm {
 //
 //   2  EstimateCoarseModel  adasfm_global              global/
 //      view graph + priors -> coarse model, cleaned matches
-//        2.1 view graph                     2.5 sensor translations
-//        2.2 loop closures, rotations       2.6 camera positions
-//        2.3 edges off the rotations        2.7 tracks, points, adjustment
-//        2.4 directions                     2.8 match refinement
+//        2.1 view graph, calibration        2.5 directions, sensor edges
+//        2.2 odometry, loop closures        2.6 camera positions
+//        2.3 camera rotations               2.7 tracks, points, adjustment
+//        2.4 edges off the rotations        2.8 match refinement
 //
 //   3  MapParts             adasfm_mapper              partition/, colmap_ext/
 //      coarse models + cleaned matches -> a model each
-//        3.1 cut into overlapping parts     3.3 align to the coarse frame
-//        3.2 incremental SfM per part       3.4 merge and refine the whole
+//        3.1 cut into overlapping parts     3.3 align and merge the parts
+//        3.2 incremental SfM per part       3.4 refine the whole
+//
+// The sources and docs/reference/{sensors,global,mapper}.md number their steps
+// in this way.
 //
 // The equations stand in docs/reference/math.md, the files in
 // docs/reference/formats.md. Around them adasfm_pair_generator chooses the

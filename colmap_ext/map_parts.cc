@@ -84,8 +84,7 @@ std::vector<std::string> ReadEarlierWarnings(const MapRequest& request) {
   return warnings;
 }
 
-// The stage's options for this scene's cameras, with the thresholds that local
-// mapping and refinement share.
+// The stage's options for this scene's cameras.
 MapperStageOptions ResolveOptions(const MapOptions& options,
                                   const SceneData& scene) {
   const bool is_calibrated = std::all_of(
@@ -97,12 +96,6 @@ MapperStageOptions ResolveOptions(const MapOptions& options,
   MapperStageOptions stage = options.stage;
   stage.refine.refine_focal_length = resolve(options.refine_focal_length);
   stage.refine.refine_extra_params = resolve(options.refine_extra_params);
-  const LocalMapperOptions& local = stage.local;
-  stage.refine.use_priors_in_adjustment = local.use_priors_in_adjustment;
-  stage.refine.filter_max_reproj_error_px = local.filter_max_reproj_error_px;
-  stage.refine.min_triangulation_angle_deg = local.min_triangulation_angle_deg;
-  stage.refine.keypoint_sigma_px = local.keypoint_sigma_px;
-  stage.refine.balance = local.balance;
   return stage;
 }
 
@@ -159,7 +152,7 @@ Verdict Assess(const MapRequest& request, const CoarseModels& coarse,
 
 // Moves the coarse poses into the frame of the scene's positions; positions
 // that do not fit them are left out.
-void AlignCoarseModel(double final_loss_scale, ComponentToMap* component,
+void AlignCoarseModel(ComponentToMap* component,
                       std::vector<std::string>* warnings) {
   SceneData& data = component->data;
   if (data.positions.empty()) return;
@@ -172,8 +165,8 @@ void AlignCoarseModel(double final_loss_scale, ComponentToMap* component,
                                      });
   const PositionAlignment alignment =
       AlignSceneToPositions(data, coarse, is_metric);
-  component->initial_position_loss_scale =
-      PositionLossScale(alignment, final_loss_scale, 0, 2);
+  component->initial_position_loss_scale = PositionLossScale(
+      alignment, PriorBundleAdjustmentOptions().position_loss_scale, 0, 2);
   if (alignment.success) {
     component->coarse =
         TransformCamsFromWorld(alignment.enu_from_world, coarse);
@@ -253,8 +246,7 @@ StatusOr<MapReport> MapParts(const MapOptions& options,
       ReadCoarseModels(request.input_path, std::move(*scene));
   if (!coarse.ok()) return coarse.status();
   for (ComponentToMap& component : coarse->components) {
-    AlignCoarseModel(stage_options.refine.position_loss_scale, &component,
-                     &coarse->warnings);
+    AlignCoarseModel(&component, &coarse->warnings);
   }
   report.warnings = coarse->warnings;
   if (!has_priors) report.warnings.push_back(kNoPriorsWarning);

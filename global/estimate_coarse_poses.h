@@ -108,7 +108,7 @@ struct CoarsePoses {
   std::vector<CoarseStep> steps;
 };
 
-// Steps 2 to 6 of the coarse global stage (design 7.2), from an initial view
+// Steps 2.1 to 2.6 of the coarse stage (design 7.2), from an initial view
 // graph (relative poses of verified pairs) to camera poses. Priors may be
 // empty. Throws std::invalid_argument for invalid options or an inconsistent
 // graph. Numbered steps:

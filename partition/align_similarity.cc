@@ -7,6 +7,7 @@
 #include <stdexcept>
 
 #include "core/nearest_rotation.h"
+#include "core/option_checker.h"
 #include "core/random.h"
 #include "core/so3.h"
 
@@ -16,6 +17,10 @@ namespace {
 // Orientations weigh as if they were known to this angle when centres are known
 // to the threshold.
 constexpr double kOrientationSigmaRad = 0.1;
+// Samples of three images for each threshold: with r_min = 0.7 of inliers the
+// chance that all 100 hold an outlier is 1e-18.
+constexpr int kNumTrials = 100;
+constexpr uint64_t kSeed = 1;
 
 // The distance between the first and the last decile of the target's centres
 // along their longest axis.
@@ -58,8 +63,8 @@ class Attempt {
     // All images first: most parts fit, and then the result has no chance in
     // it. RANSAC's samples follow.
     Consider(std::vector<char>(poses_.size(), 1));
-    Random random(options_.seed);
-    for (int trial = 0; trial < options_.num_trials; ++trial) {
+    Random random(kSeed);
+    for (int trial = 0; trial < kNumTrials; ++trial) {
       std::vector<char> mask(poses_.size(), 0);
       for (const int i : random.Sample(3, static_cast<int>(poses_.size()))) {
         mask[i] = 1;
@@ -127,41 +132,24 @@ class Attempt {
   AlignSimilarityResult result_;
 };
 
-bool CheckRule(bool holds, const std::string& name, double value,
-               const std::string& rule, std::string* error) {
-  if (!holds) {
-    *error = "AdaSfmAlign." + name + " = " + std::to_string(value) + " " + rule;
-  }
-  return holds;
-}
-
 }  // namespace
 
 bool AlignSimilarityOptions::IsValid(std::string* error) const {
-  return CheckRule(min_threshold > 0.0, "min_threshold", min_threshold,
-                   "must be positive", error) &&
-         CheckRule(initial_threshold >= min_threshold, "initial_threshold",
-                   initial_threshold, "must not be below min_threshold",
-                   error) &&
-         CheckRule(threshold_increase > 0.0, "threshold_increase",
-                   threshold_increase, "must be positive", error) &&
-         CheckRule(threshold_decrease > 0.0, "threshold_decrease",
-                   threshold_decrease, "must be positive", error) &&
-         CheckRule(min_inlier_ratio > 0.0 && min_inlier_ratio <= 1.0,
-                   "min_inlier_ratio", min_inlier_ratio, "must be in (0, 1]",
-                   error) &&
-         CheckRule(max_inlier_ratio >= min_inlier_ratio, "max_inlier_ratio",
-                   max_inlier_ratio, "must not be below min_inlier_ratio",
-                   error) &&
-         CheckRule(max_num_iterations > 0, "max_num_iterations",
-                   max_num_iterations, "must be positive", error) &&
-         CheckRule(max_threshold_to_extent > 0.0, "max_threshold_to_extent",
-                   max_threshold_to_extent, "must be positive", error) &&
-         CheckRule(max_rotation_error_deg > 0.0, "max_rotation_error_deg",
-                   max_rotation_error_deg, "must be positive", error) &&
-         CheckRule(unit > 0.0, "unit", unit, "must be positive", error) &&
-         CheckRule(num_trials >= 0, "num_trials", num_trials,
-                   "must not be negative", error);
+  return OptionChecker("AdaSfmAlign", error)
+      .Positive("min_threshold", min_threshold)
+      .Require(initial_threshold >= min_threshold, "initial_threshold",
+               initial_threshold, "must not be below min_threshold")
+      .Positive("threshold_increase", threshold_increase)
+      .Positive("threshold_decrease", threshold_decrease)
+      .Require(min_inlier_ratio > 0.0 && min_inlier_ratio <= 1.0,
+               "min_inlier_ratio", min_inlier_ratio, "must be in (0, 1]")
+      .Require(max_inlier_ratio >= min_inlier_ratio, "max_inlier_ratio",
+               max_inlier_ratio, "must not be below min_inlier_ratio")
+      .AtLeast(1, "max_num_iterations", max_num_iterations)
+      .Positive("max_threshold_to_extent", max_threshold_to_extent)
+      .Positive("max_rotation_error_deg", max_rotation_error_deg)
+      .Positive("unit", unit)
+      .AllHold();
 }
 
 AlignSimilarityResult AlignSimilarity(const AlignSimilarityOptions& options,

@@ -39,9 +39,6 @@ struct AlignSimilarityOptions {
   // Off: tau_init is used as it is (the paper's ablation).
   bool adapt_threshold = true;
   double unit = 1.0;
-  // Samples of three images that RANSAC draws for each threshold.
-  int num_trials = 100;
-  uint64_t seed = 1;
 
   bool IsValid(std::string* error) const;
 };

@@ -7,6 +7,8 @@
 #include <stdexcept>
 #include <utility>
 
+#include "core/option_checker.h"
+
 namespace adasfm {
 namespace {
 
@@ -118,10 +120,10 @@ std::vector<Part> AsSets(const std::vector<std::vector<image_t>>& parts) {
 }  // namespace
 
 bool FloodFillOptions::IsValid(std::string* error) const {
-  if (min_overlap_ratio >= 0.0 && min_overlap_ratio < 1.0) return true;
-  *error = "AdaSfmPartition.min_overlap_ratio = " +
-           std::to_string(min_overlap_ratio) + " must be in [0, 1)";
-  return false;
+  return OptionChecker("AdaSfmPartition", error)
+      .Require(min_overlap_ratio >= 0.0 && min_overlap_ratio < 1.0,
+               "min_overlap_ratio", min_overlap_ratio, "must be in [0, 1)")
+      .AllHold();
 }
 
 FloodFillResult ExpandByFloodFill(

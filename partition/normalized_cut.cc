@@ -9,6 +9,8 @@
 #include <set>
 #include <stdexcept>
 
+#include "core/option_checker.h"
+
 namespace adasfm {
 namespace {
 
@@ -144,20 +146,12 @@ std::vector<Part> CutComponent(const NormalizedCutOptions& options,
 }  // namespace
 
 bool NormalizedCutOptions::IsValid(std::string* error) const {
-  if (min_part_size < 1) {
-    *error =
-        "AdaSfmPartition.min_part_size = " + std::to_string(min_part_size) +
-        " must be at least 1";
-    return false;
-  }
-  if (max_part_size < 2 * min_part_size) {
-    *error =
-        "AdaSfmPartition.max_part_size = " + std::to_string(max_part_size) +
-        " must be at least twice AdaSfmPartition.min_part_size = " +
-        std::to_string(min_part_size);
-    return false;
-  }
-  return true;
+  return OptionChecker("AdaSfmPartition", error)
+      .AtLeast(1, "min_part_size", min_part_size)
+      .Require(max_part_size >= 2 * min_part_size, "max_part_size",
+               max_part_size,
+               "must be at least twice AdaSfmPartition.min_part_size")
+      .AllHold();
 }
 
 std::vector<std::vector<image_t>> ComputeNormalizedCut(

@@ -150,7 +150,7 @@ StatusOr<GlobalStageResult> RunGlobalStage(
   };
   GlobalStageResult result;
 
-  // 1. View graph.
+  // 2.1 View graph.
   Stopwatch watch = begin("view graph", 0.0);
   const GlobalCorrespondences correspondences =
       FindCorrespondences(scene, options.num_threads);
@@ -159,14 +159,14 @@ StatusOr<GlobalStageResult> RunGlobalStage(
   result.steps.push_back(
       {"view graph", watch.Seconds(), DescribeViewGraph(initial)});
 
-  // 2-6. Coarse poses.
+  // 2.1-2.6 Coarse poses.
   begin("coarse poses", 0.1);
   result.poses = EstimateCoarsePoses(options.poses, initial.graph,
                                      correspondences, scene.priors);
   AppendSteps(result.poses.steps, &result.steps);
   if (result.poses.components.empty()) return NothingHoldsTogether();
 
-  // 7. Structure and adjustment.
+  // 2.7 Structure and adjustment.
   for (const CoarseComponent& component : result.poses.components) {
     const CoarseModelInput input =
         CreateModelInput(component, result.poses, correspondences);
@@ -177,7 +177,7 @@ StatusOr<GlobalStageResult> RunGlobalStage(
         {"structure", watch.Seconds(), DescribeModel(result.models.back())});
   }
 
-  // 8. Match refinement.
+  // 2.8 Match refinement.
   if (options.refinement.enabled) {
     watch = begin("match refinement", 0.9);
     RefineStageMatches(options, scene, correspondences.bearings, &result);

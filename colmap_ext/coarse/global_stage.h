@@ -63,10 +63,10 @@ struct GlobalStageResult {
 using StageProgress = std::function<void(const std::string&, double)>;
 
 // The coarse global stage in memory (design 7.2):
-//   1    view graph                     BuildInitialViewGraph
-//   2-6  coarse poses                   EstimateCoarsePoses
-//   7    tracks, points, adjustment     BuildCoarseModel, per component
-//   8    match refinement               RefineMatches
+//   2.1      view graph                  BuildInitialViewGraph
+//   2.1-2.6  coarse poses                EstimateCoarsePoses
+//   2.7      tracks, points, adjustment  BuildCoarseModel, per component
+//   2.8      match refinement            RefineMatches
 // The scene is read with raw matches and original two-view geometries. An error
 // when the scene has no two images that hold together. Throws
 // std::invalid_argument for invalid options.

@@ -8,6 +8,7 @@
 
 #include "colmap_ext/database/prior_tables.h"
 #include "colmap_ext/host/database_schema.h"
+#include "core/hash.h"
 
 namespace adasfm {
 namespace {
@@ -40,21 +41,6 @@ std::string CommonColumns(SqliteConnection* database) {
   return list;
 }
 
-// FNV-1a, 64 bits.
-class Digest {
- public:
-  void Add(const void* data, size_t num_bytes) {
-    const auto* bytes = static_cast<const unsigned char*>(data);
-    for (size_t i = 0; i < num_bytes; ++i) {
-      value_ = (value_ ^ bytes[i]) * 0x100000001b3ull;
-    }
-  }
-  int64_t Value() const { return static_cast<int64_t>(value_); }
-
- private:
-  uint64_t value_ = 0xcbf29ce484222325ull;
-};
-
 // Digests of the present two_view_geometries. A matrix or pose that is missing
 // counts as zeros: COLMAP 4 replaces the zeros of an older file by NULL when it
 // opens it.
@@ -72,23 +58,23 @@ class RowDigester {
     statement_.Reset();
     statement_.BindInt(1, pair_id);
     if (!statement_.Step()) return std::nullopt;
-    Digest digest;
+    Fnv1aHash digest;
     for (const int column : {1, 2, 4}) {
       const int64_t value = statement_.Int(column);
-      digest.Add(&value, sizeof(value));
+      digest.AddBytes(&value, sizeof(value));
     }
     for (const auto& [column, full_num_bytes] : kBlobs) {
       const int64_t num_bytes = statement_.NumBytes(column);
       if (num_bytes > 0) {
-        digest.Add(&num_bytes, sizeof(num_bytes));
-        digest.Add(statement_.Blob(column), num_bytes);
+        digest.AddBytes(&num_bytes, sizeof(num_bytes));
+        digest.AddBytes(statement_.Blob(column), num_bytes);
       } else {
         const std::string zeros(full_num_bytes, '\0');
-        digest.Add(&full_num_bytes, sizeof(full_num_bytes));
-        digest.Add(zeros.data(), zeros.size());
+        digest.AddBytes(&full_num_bytes, sizeof(full_num_bytes));
+        digest.AddBytes(zeros.data(), zeros.size());
       }
     }
-    return digest.Value();
+    return static_cast<int64_t>(digest.Value());
   }
 
  private:

@@ -2,39 +2,21 @@
 #include "colmap_ext/io/digest.h"
 
 #include <algorithm>
-#include <cstdint>
 #include <filesystem>
 #include <fstream>
-#include <sstream>
+
+#include "core/hash.h"
 
 namespace adasfm {
 namespace {
 
 namespace fs = std::filesystem;
 
-// FNV-1a.
-class Hash {
- public:
-  void Add(const char* bytes, size_t size) {
-    for (size_t i = 0; i < size; ++i) {
-      hash_ = (hash_ ^ static_cast<unsigned char>(bytes[i])) * 1099511628211ull;
-    }
-  }
-  std::string Text() const {
-    std::ostringstream text;
-    text << std::hex << hash_;
-    return text.str();
-  }
-
- private:
-  uint64_t hash_ = 14695981039346656037ull;
-};
-
 }  // namespace
 
 std::string DigestText(const std::string& text) {
-  Hash hash;
-  hash.Add(text.data(), text.size());
+  Fnv1aHash hash;
+  hash.AddBytes(text.data(), text.size());
   return hash.Text();
 }
 
@@ -50,10 +32,10 @@ StatusOr<std::string> DigestPath(const std::string& path) {
   if (!file) {
     return Status::Error("cannot read " + path + "; check the path");
   }
-  Hash hash;
+  Fnv1aHash hash;
   std::vector<char> block(1 << 20);
   while (file.read(block.data(), block.size()) || file.gcount() > 0) {
-    hash.Add(block.data(), file.gcount());
+    hash.AddBytes(block.data(), file.gcount());
   }
   return hash.Text();
 }
@@ -71,13 +53,13 @@ StatusOr<std::map<std::string, std::string>> DigestPaths(
 
 std::string DigestFiles(const std::string& folder,
                         const std::vector<std::string>& names) {
-  Hash hash;
+  Fnv1aHash hash;
   for (const std::string& name : names) {
     std::error_code error;
     const std::string size =
         std::to_string(fs::file_size(fs::path(folder) / name, error));
-    hash.Add(name.c_str(), name.size() + 1);
-    hash.Add(size.c_str(), size.size() + 1);
+    hash.AddBytes(name.c_str(), name.size() + 1);
+    hash.AddBytes(size.c_str(), size.size() + 1);
   }
   return std::to_string(names.size()) + " files, " + hash.Text();
 }

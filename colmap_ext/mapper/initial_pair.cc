@@ -10,6 +10,11 @@
 namespace adasfm {
 namespace {
 
+// Parallaxes to ask for; the first one that any pair reaches is taken. The
+// coarse poses tell the parallax of every match, so a drive straight ahead,
+// with little of it, begins with the best pair there is.
+constexpr double kMinParallaxesDeg[] = {6.0, 3.0, 1.5, 0.75};
+
 using Directions = std::vector<Eigen::Vector3d>;
 
 Directions ComputeDirections(const SceneData& data, image_t image_id) {
@@ -138,7 +143,7 @@ std::vector<InitialPair> FindInitialPairs(const InitialPairOptions& options,
   CandidateBuilder builder(options, scene);
   std::vector<Candidate> candidates;
   for (const ScenePair& pair : scene.data->pairs) {
-    if (pair.inlier_matches.size() < options.min_num_points ||
+    if (pair.inlier_matches.size() < InitialPairOptions::kMinNumPoints ||
         !IsFree(scene, pair.image_id1) || !IsFree(scene, pair.image_id2)) {
       continue;
     }
@@ -147,12 +152,12 @@ std::vector<InitialPair> FindInitialPairs(const InitialPairOptions& options,
       candidates.push_back(std::move(candidate));
     }
   }
-  for (const double min_parallax_deg : options.min_parallaxes_deg) {
+  for (const double min_parallax_deg : kMinParallaxesDeg) {
     std::vector<InitialPair> pairs;
     for (Candidate& candidate : candidates) {
       candidate.pair.num_points =
           CountAbove(candidate.parallaxes, DegToRad(min_parallax_deg));
-      if (candidate.pair.num_points >= options.min_num_points) {
+      if (candidate.pair.num_points >= InitialPairOptions::kMinNumPoints) {
         pairs.push_back(candidate.pair);
       }
     }

@@ -20,12 +20,8 @@ struct InitialPair {
 };
 
 struct InitialPairOptions {
-  // Parallaxes to ask for, the first one that any pair reaches is taken. The
-  // coarse poses tell the parallax of every match, so a drive straight ahead,
-  // with little of it, begins with the best pair there is.
-  std::vector<double> min_parallaxes_deg = {6.0, 3.0, 1.5, 0.75};
-  // A pair needs this many matches with that parallax.
-  int min_num_points = 30;
+  // A pair needs this many matches with the parallax asked for.
+  static constexpr int kMinNumPoints = 30;
   // Of a match to its epipolar line under the poses.
   double max_epipolar_error_px = 4.0;
 };

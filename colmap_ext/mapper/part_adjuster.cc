@@ -30,11 +30,10 @@ std::vector<PosePriorEdge> FindPriorEdges(const MapperScene& scene,
 }
 
 PartAdjuster::PartAdjuster(const LocalMapperOptions& options,
-                           MapperScene* scene, Triangulator* triangulator)
+                           MapperScene* scene)
     : options_(options),
       scene_(*scene),
-      reconstruction_(scene->reconstruction),
-      triangulator_(*triangulator) {}
+      reconstruction_(scene->reconstruction) {}
 
 void PartAdjuster::AdjustPair(image_t image_id1, image_t image_id2) {
   const std::set<image_t> images = {image_id1, image_id2};
@@ -101,12 +100,12 @@ void PartAdjuster::AdjustImages(const std::set<image_t>& images,
 
 void PartAdjuster::AdjustAll(int max_num_iterations) {
   ++num_global_adjustments_;
-  triangulator_.CompleteAndMergeTracks(options_.filter_max_reproj_error_px);
+  scene_.mapper.CompleteAndMergeTracks(options_.filter_max_reproj_error_px);
   AdjustImages({reconstruction_.RegImageIds().begin(),
                 reconstruction_.RegImageIds().end()},
                {}, max_num_iterations);
-  reconstruction_.FilterAllPoints3D(options_.filter_max_reproj_error_px,
-                                    options_.min_triangulation_angle_deg);
+  scene_.mapper.FilterPoints(options_.filter_max_reproj_error_px,
+                             options_.min_triangulation_angle_deg);
 }
 
 void PartAdjuster::Filter(const std::set<image_t>& images) {

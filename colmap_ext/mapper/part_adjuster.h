@@ -7,7 +7,6 @@
 #include <vector>
 
 #include "colmap_ext/bundle_adjustment/bundle_adjustment.h"
-#include "colmap_ext/host/triangulation.h"
 #include "colmap_ext/mapper/local_mapper.h"
 #include "colmap_ext/mapper/local_mapper_scene.h"
 
@@ -22,8 +21,7 @@ std::vector<PosePriorEdge> FindPriorEdges(const MapperScene& scene,
 // the next. The arguments must outlive it.
 class PartAdjuster {
  public:
-  PartAdjuster(const LocalMapperOptions& options, MapperScene* scene,
-               Triangulator* triangulator);
+  PartAdjuster(const LocalMapperOptions& options, MapperScene* scene);
 
   // The first two images.
   void AdjustPair(image_t image_id1, image_t image_id2);
@@ -45,9 +43,8 @@ class PartAdjuster {
   void Filter(const std::set<image_t>& images);
 
   const LocalMapperOptions& options_;
-  const MapperScene& scene_;
+  MapperScene& scene_;
   colmap::Reconstruction& reconstruction_;
-  Triangulator& triangulator_;
   double keypoint_sigma_factor_ = 1.0;
   int num_global_adjustments_ = 0;
 };

@@ -8,8 +8,6 @@
 
 #include "colmap_ext/bundle_adjustment/bundle_adjustment.h"
 #include "colmap_ext/host/pose_conversion.h"
-#include "colmap_ext/host/triangulation.h"
-#include "colmap_ext/mapper/local_mapper.h"
 #include "colmap_ext/mapper/part_adjuster.h"
 #include "colmap_ext/mapper/prior_support.h"
 #include "colmap_ext/mapper/register_image.h"
@@ -34,35 +32,35 @@ constexpr double kContradictionTranslationM = 0.5;
 
 class ModelRefiner {
  public:
-  ModelRefiner(const RefineModelOptions& options, MapperScene* scene,
+  ModelRefiner(const RefineModelOptions& options,
+               const LocalMapperOptions& local, MapperScene* scene,
                RefineModelSummary* summary)
       : options_(options),
+        local_(local),
         scene_(*scene),
         reconstruction_(scene->reconstruction),
-        triangulator_(&scene->graph, &scene->reconstruction,
-                      options.min_triangulation_angle_deg),
         summary_(*summary) {}
 
   void JoinParts() {
     if (!options_.join_parts) return;
-    const double loose_px = 3.0 * options_.filter_max_reproj_error_px;
+    const double loose_px = 3.0 * local_.filter_max_reproj_error_px;
     AdjustTentatively(10);
     Filter(loose_px);
-    triangulator_.CompleteAndMergeTracks(loose_px);
+    scene_.mapper.CompleteAndMergeTracks(loose_px);
   }
 
   void AdjustRoughly() {
     TriangulateWeakImages();
     AdjustTentatively(15);
-    Filter(options_.filter_max_reproj_error_px);
+    Filter(local_.filter_max_reproj_error_px);
     if (PutBackContradictedImages()) AdjustTentatively(10);
   }
 
   void AdjustFinely() {
-    triangulator_.CompleteAndMergeTracks(options_.filter_max_reproj_error_px);
+    scene_.mapper.CompleteAndMergeTracks(local_.filter_max_reproj_error_px);
     summary_.keypoint_sigma_factor = 1.0;
     Adjust(25, 1e-6, FindPriors(), &summary_.keypoint_sigma_factor);
-    Filter(options_.filter_max_reproj_error_px);
+    Filter(local_.filter_max_reproj_error_px);
     LeaveOutUnsupportedImages();
   }
 
@@ -73,15 +71,18 @@ class ModelRefiner {
   }
 
   void Filter(double max_reproj_error_px) {
-    reconstruction_.FilterAllPoints3D(max_reproj_error_px,
-                                      options_.min_triangulation_angle_deg);
+    scene_.mapper.FilterPoints(max_reproj_error_px,
+                               local_.min_triangulation_angle_deg);
   }
 
+  // COLMAP's Retriangulate, pair by pair, gives the same model but takes 5 %
+  // more of the mapper's time on kitti07-160.
   void TriangulateWeakImages() {
     for (const image_t image_id : RegisteredImages()) {
       const colmap::Image& image = reconstruction_.Image(image_id);
       if (2 * image.NumPoints3D() < image.NumPoints2D()) {
-        triangulator_.TriangulateImage(image_id);
+        scene_.mapper.TriangulateImage(image_id,
+                                       local_.min_triangulation_angle_deg);
       }
     }
   }
@@ -93,7 +94,7 @@ class ModelRefiner {
       if (coarse == scene_.coarse->end() ||
           reconstruction_.Image(image_id).NumPoints3D() >=
               kMinNumPointsToHold ||
-          (options_.use_priors_in_adjustment &&
+          (local_.use_priors_in_adjustment &&
            scene_.priors_of_image.count(image_id))) {
         continue;
       }
@@ -134,7 +135,7 @@ class ModelRefiner {
   }
 
   std::vector<PosePriorEdge> FindPriors() const {
-    if (!options_.use_priors_in_adjustment) return {};
+    if (!local_.use_priors_in_adjustment) return {};
     return FindPriorEdges(scene_, RegisteredImages());
   }
 
@@ -157,11 +158,11 @@ class ModelRefiner {
     problem.priors = std::move(priors);
     AddCoarseEdges(&problem.priors);
     PriorBundleAdjustmentOptions options;
-    options.keypoint_sigma_px = options_.keypoint_sigma_px;
+    options.keypoint_sigma_px = local_.keypoint_sigma_px;
     options.shared_errors.enabled = !is_tentative;
-    options.position_loss_scale = is_tentative
-                                      ? options_.initial_position_loss_scale
-                                      : options_.position_loss_scale;
+    if (is_tentative) {
+      options.position_loss_scale = options_.initial_position_loss_scale;
+    }
     AddPositions(&problem);
     options.refine_focal_length = options_.refine_focal_length;
     options.refine_principal_point = options_.refine_principal_point;
@@ -169,7 +170,7 @@ class ModelRefiner {
     options.max_num_iterations = max_num_iterations;
     options.function_tolerance = function_tolerance;
     options.num_threads = options_.num_threads;
-    PriorBalanceOptions balance = options_.balance;
+    PriorBalanceOptions balance = local_.balance;
     if (is_tentative) balance.estimate_keypoint_sigma = false;
     const PriorBundleAdjustmentSummary adjustment = AdjustBundleInBalance(
         balance, options, problem, &reconstruction_, keypoint_sigma_factor);
@@ -228,7 +229,7 @@ class ModelRefiner {
   }
 
   bool PutBackContradictedImages() {
-    if (!options_.use_priors_in_adjustment) return false;
+    if (!local_.use_priors_in_adjustment) return false;
     const std::set<image_t> images = FindContradictedImages();
     for (const image_t image_id : images) {
       reconstruction_.DeRegisterImage(image_id);
@@ -257,28 +258,18 @@ class ModelRefiner {
   }
 
   const RefineModelOptions& options_;
+  const LocalMapperOptions& local_;
   MapperScene& scene_;
   colmap::Reconstruction& reconstruction_;
-  Triangulator triangulator_;
   RefineModelSummary& summary_;
 };
 
 }  // namespace
 
-bool RefineModelOptions::IsValid(std::string* error) const {
-  if (filter_max_reproj_error_px > 0.0 && min_triangulation_angle_deg > 0.0 &&
-      keypoint_sigma_px > 0.0) {
-    return balance.IsValid(error);
-  }
-  *error =
-      "AdaSfmMapper.filter_max_reproj_error_px, min_triangulation_angle_deg "
-      "and keypoint_sigma_px must be positive";
-  return false;
-}
-
-void RefineModel(const RefineModelOptions& options, int round,
-                 MapperScene* scene, RefineModelSummary* summary) {
-  ModelRefiner refiner(options, scene, summary);
+void RefineModel(const RefineModelOptions& options,
+                 const LocalMapperOptions& local, int round, MapperScene* scene,
+                 RefineModelSummary* summary) {
+  ModelRefiner refiner(options, local, scene, summary);
   switch (round) {
     case 1:
       return refiner.JoinParts();

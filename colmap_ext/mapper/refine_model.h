@@ -1,23 +1,13 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <set>
-#include <string>
-
-#include "colmap_ext/bundle_adjustment/balance_priors.h"
+#include "colmap_ext/mapper/local_mapper.h"
 #include "colmap_ext/mapper/local_mapper_scene.h"
 #include "core/types.h"
 
 namespace adasfm {
 
 struct RefineModelOptions {
-  bool use_priors_in_adjustment = true;
-  double filter_max_reproj_error_px = 4.0;
-  double min_triangulation_angle_deg = 1.5;
-  double keypoint_sigma_px = 0.5;
-  // As in LocalMapperOptions. The last round alone estimates the noise of
-  // keypoints: before it, parts and gaps are not in place.
-  PriorBalanceOptions balance;
   // Intrinsics are adjusted here and nowhere else, so that all parts agree
   // about them.
   bool refine_focal_length = false;
@@ -26,13 +16,11 @@ struct RefineModelOptions {
   // Parts that were put together need a round with loose thresholds, in which
   // tracks of different parts find each other.
   bool join_parts = true;
-  // Where the robust loss on positions takes over, in sigmas: in the rounds
-  // before the last, as far as the coarse model is bent, and in the last.
-  double initial_position_loss_scale = 3.0;
-  double position_loss_scale = 3.0;
+  // Where the robust loss on positions takes over in the rounds before the
+  // last, in sigmas: as far as the coarse model is bent.
+  double initial_position_loss_scale =
+      PriorBundleAdjustmentOptions().position_loss_scale;
   int num_threads = -1;
-
-  bool IsValid(std::string* error) const;
 };
 
 struct RefineModelSummary {
@@ -52,16 +40,18 @@ struct RefineModelSummary {
 
 inline constexpr int kNumRefinementRounds = 3;
 
-// Refines the whole model, in rounds from 1 to kNumRefinementRounds that follow
-// each other on the same summary; between them the model can be saved. Joining
-// of tracks, triangulation of what is still missing, filters, and bundle
-// adjustments with priors. Images that hold on few points are tied by weak
-// coarse motions. An image whose motion contradicts the priors on all sides is
-// put back to where the coarse model has it, without its points, so that the
-// result is not worse than the priors. An image that neither points nor priors
-// hold is left out in the end.
-void RefineModel(const RefineModelOptions& options, int round,
-                 MapperScene* scene, RefineModelSummary* summary);
+// Refines the whole model by the thresholds, the noise of keypoints and the
+// balance that local mapping had, in rounds from 1 to kNumRefinementRounds that
+// follow each other on the same summary; between them the model can be saved.
+// Joining of tracks, triangulation of what is still missing, filters, and
+// bundle adjustments with priors. Images that hold on few points are tied by
+// weak coarse motions. An image whose motion contradicts the priors on all
+// sides is put back to where the coarse model has it, without its points, so
+// that the result is not worse than the priors. An image that neither points
+// nor priors hold is left out in the end.
+void RefineModel(const RefineModelOptions& options,
+                 const LocalMapperOptions& local, int round, MapperScene* scene,
+                 RefineModelSummary* summary);
 
 // Registers the scene's images where the coarse model has them, without points.
 void RegisterAtCoarsePoses(MapperScene* scene);

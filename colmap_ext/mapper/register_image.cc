@@ -15,6 +15,11 @@ namespace {
 
 // More co-visible images hardly move a median.
 constexpr size_t kMaxNumNeighbors = 15;
+// P3P needs more points than v_p to be believed: no other pose confirms it.
+constexpr int kMinNumP3pInliers = 15;
+// Of the visible points: a coarse candidate that explains as much is refined on
+// the points that P3P would be refined on, too.
+constexpr double kEnoughInlierRatio = 0.9;
 
 // The registered images, with coarse poses, that image_id is matched or tied
 // to, strongest first.
@@ -87,27 +92,35 @@ Eigen::Quaterniond L1MeanRotation(
   return mean;
 }
 
+// Each keypoint with the points that its matches see.
 PointsInImage CollectPoints(const MapperScene& scene, image_t image_id) {
   PointsInImage points;
   const colmap::Image& image = scene.reconstruction.Image(image_id);
-  for (const VisiblePoint& visible : FindVisiblePoints(scene, image_id)) {
-    points.pixels.push_back(image.Point2D(visible.point2D_idx).XY());
-    points.points_in_world.push_back(
-        scene.reconstruction.Point3D(visible.point3D_id).XYZ());
+  std::vector<colmap::point3D_t> seen;
+  for (point2D_t idx = 0; idx < image.NumPoints2D(); ++idx) {
+    seen.clear();
+    for (const auto& match :
+         scene.mapper.Graph().FindCorrespondences(image_id, idx)) {
+      const colmap::Point2D& other =
+          scene.reconstruction.Image(match.image_id).Point2D(match.point2D_idx);
+      if (!other.HasPoint3D() || std::find(seen.begin(), seen.end(),
+                                           other.Point3DId()) != seen.end()) {
+        continue;
+      }
+      seen.push_back(other.Point3DId());
+      points.pixels.push_back(image.Point2D(idx).XY());
+      points.points_in_world.push_back(
+          scene.reconstruction.Point3D(other.Point3DId()).XYZ());
+    }
   }
   return points;
 }
 
-int CountInliers(const std::vector<char>& mask) {
-  return static_cast<int>(std::count(mask.begin(), mask.end(), 1));
-}
-
-}  // namespace
-
-std::vector<char> FindReprojectionInliers(const PointsInImage& points,
-                                          const colmap::Camera& camera,
-                                          const Rigid3d& cam_from_world,
-                                          double max_error_px) {
+// True where the point projects within max_error_px of its keypoint.
+std::vector<char> FindInliers(const PointsInImage& points,
+                              const colmap::Camera& camera,
+                              const Rigid3d& cam_from_world,
+                              double max_error_px) {
   const Eigen::Matrix3d rotation = cam_from_world.rotation.toRotationMatrix();
   std::vector<char> mask(points.pixels.size(), 0);
   for (size_t i = 0; i < mask.size(); ++i) {
@@ -120,6 +133,12 @@ std::vector<char> FindReprojectionInliers(const PointsInImage& points,
   }
   return mask;
 }
+
+size_t CountInliers(const std::vector<char>& mask) {
+  return std::count(mask.begin(), mask.end(), 1);
+}
+
+}  // namespace
 
 std::optional<Rigid3d> ComputeGlobalCandidate(const MapperScene& scene,
                                               image_t image_id) {
@@ -152,45 +171,42 @@ std::optional<Rigid3d> ComputeGlobalCandidate(const MapperScene& scene,
                       Median(coordinates[2])));
 }
 
-RegisterImageResult EstimateImagePose(const RegisterImageOptions& options,
-                                      const MapperScene& scene,
-                                      image_t image_id) {
-  RegisterImageResult result;
-  const PointsInImage points = CollectPoints(scene, image_id);
-  result.num_visible_points = static_cast<int>(points.pixels.size());
-  if (result.num_visible_points < options.min_num_visible_points) return result;
-  const colmap::Camera& camera = scene.reconstruction.Camera(
-      scene.reconstruction.Image(image_id).CameraId());
-  std::vector<char> best_mask;
-  const auto consider = [&](const std::optional<Rigid3d>& candidate,
-                            RegisteredBy registered_by) {
-    if (!candidate) return;
-    std::vector<char> mask = FindReprojectionInliers(
-        points, camera, *candidate, options.max_reproj_error_px);
-    const int num_inliers = CountInliers(mask);
-    if (num_inliers <= result.num_inliers) return;
-    result.num_inliers = num_inliers;
-    result.registered_by = registered_by;
-    result.cam_from_world = *candidate;
-    best_mask = std::move(mask);
-  };
+RegisteredBy RegisterImage(const RegisterImageOptions& options,
+                           image_t image_id, MapperScene* scene) {
+  colmap::Reconstruction& reconstruction = scene->reconstruction;
+  colmap::Image& image = reconstruction.Image(image_id);
+  const colmap::Camera& camera = reconstruction.Camera(image.CameraId());
+  const PointsInImage points = CollectPoints(*scene, image_id);
+  const size_t min_num_inliers = static_cast<size_t>(
+      std::ceil(options.min_inlier_ratio * points.pixels.size()));
+  std::optional<Rigid3d> coarse;
+  std::vector<char> coarse_mask;
   if (options.use_global_candidate) {
-    consider(ComputeGlobalCandidate(scene, image_id),
-             RegisteredBy::kGlobalPose);
+    coarse = ComputeGlobalCandidate(*scene, image_id);
   }
-  consider(EstimatePoseByP3p(points, camera, options.max_reproj_error_px),
-           RegisteredBy::kP3p);
-  const int min_num_inliers = result.registered_by == RegisteredBy::kP3p
-                                  ? options.min_num_p3p_inliers
-                                  : options.min_num_visible_points;
-  if (result.num_inliers <
-      std::max(1.0 * min_num_inliers,
-               options.min_inlier_ratio * result.num_visible_points)) {
-    result.registered_by = RegisteredBy::kNone;
-    return result;
+  if (coarse) {
+    coarse_mask =
+        FindInliers(points, camera, *coarse, options.max_reproj_error_px);
   }
-  RefinePose(points, best_mask, camera, &result.cam_from_world);
-  return result;
+  const size_t num_coarse_inliers = CountInliers(coarse_mask);
+  if (num_coarse_inliers < kEnoughInlierRatio * points.pixels.size() &&
+      scene->mapper.RegisterNextImage(image_id, options.max_reproj_error_px,
+                                      kMinNumP3pInliers)) {
+    const size_t num_inliers = CountInliers(FindInliers(
+        points, camera, CamFromWorld(image), options.max_reproj_error_px));
+    if (num_inliers > num_coarse_inliers && num_inliers >= min_num_inliers) {
+      return RegisteredBy::kP3p;
+    }
+    reconstruction.DeRegisterImage(image_id);
+  }
+  if (num_coarse_inliers <
+      std::max<size_t>(options.min_num_visible_points, min_num_inliers)) {
+    return RegisteredBy::kNone;
+  }
+  RefinePose(points, coarse_mask, camera, &*coarse);
+  SetCamFromWorld(*coarse, &image);
+  reconstruction.RegisterImage(image_id);
+  return RegisteredBy::kGlobalPose;
 }
 
 }  // namespace adasfm

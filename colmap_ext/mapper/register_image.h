@@ -3,7 +3,7 @@
 
 #include <optional>
 
-#include "colmap_ext/host/absolute_pose.h"
+#include "colmap_ext/host/host_mapper.h"
 #include "colmap_ext/mapper/local_mapper_scene.h"
 #include "core/rigid3d.h"
 #include "core/types.h"
@@ -17,28 +17,17 @@ struct RegisterImageOptions {
   double max_reproj_error_px = 8.0;
   // Of the visible points; below it wrong matches explain as much.
   double min_inlier_ratio = 0.25;
-  // P3P needs more points than v_p to be believed when no other pose confirms
-  // it.
-  int min_num_p3p_inliers = 15;
   // Whether the coarse poses give a second candidate.
   bool use_global_candidate = true;
 };
 
 enum class RegisteredBy { kNone, kP3p, kGlobalPose };
 
-struct RegisterImageResult {
-  RegisteredBy registered_by = RegisteredBy::kNone;
-  Rigid3d cam_from_world;
-  int num_visible_points = 0;
-  int num_inliers = 0;
-};
-
-// The pose of an image among the registered ones (paper, section on image
-// registration): the candidates are P3P and P_gb, the pose that explains more
-// of the visible points wins and is refined on them. Nothing is changed.
-RegisterImageResult EstimateImagePose(const RegisterImageOptions& options,
-                                      const MapperScene& scene,
-                                      image_t image_id);
+// Registers an image (paper, section on image registration): the candidates are
+// COLMAP's P3P and P_gb; the pose that explains more of the visible points
+// wins. kNone when neither explains enough: the image then stays unregistered.
+RegisteredBy RegisterImage(const RegisterImageOptions& options,
+                           image_t image_id, MapperScene* scene);
 
 // P_gb: the coarse motion from the registered co-visible images k, and from
 // those that priors tie to the image. Rotation: the L1 mean (Weiszfeld; Hartley
@@ -49,11 +38,5 @@ RegisterImageResult EstimateImagePose(const RegisterImageOptions& options,
 // where the origin lies. None when no such image is registered.
 std::optional<Rigid3d> ComputeGlobalCandidate(const MapperScene& scene,
                                               image_t image_id);
-
-// True where the point projects within max_error_px of its keypoint.
-std::vector<char> FindReprojectionInliers(const PointsInImage& points,
-                                          const colmap::Camera& camera,
-                                          const Rigid3d& cam_from_world,
-                                          double max_error_px);
 
 }  // namespace adasfm

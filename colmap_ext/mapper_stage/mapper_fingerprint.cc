@@ -1,37 +1,22 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "colmap_ext/mapper_stage/mapper_fingerprint.h"
 
-#include <sstream>
+#include "core/hash.h"
 
 namespace adasfm {
 namespace {
 
-// FNV-1a over bytes.
-class Hash {
+class Hash : public Fnv1aHash {
  public:
-  template <typename T>
-  void Add(const T& value) {
-    const auto* bytes = reinterpret_cast<const unsigned char*>(&value);
-    for (size_t i = 0; i < sizeof(T); ++i) {
-      hash_ = (hash_ ^ bytes[i]) * 1099511628211ull;
-    }
-  }
+  using Fnv1aHash::Add;
   void Add(const std::string& text) {
     Add(text.size());
-    for (const char c : text) Add(c);
+    AddBytes(text.data(), text.size());
   }
   void Add(const Rigid3d& pose) {
     for (int i = 0; i < 4; ++i) Add(pose.rotation.coeffs()(i));
     for (int i = 0; i < 3; ++i) Add(pose.translation(i));
   }
-  std::string Text() const {
-    std::ostringstream text;
-    text << std::hex << hash_;
-    return text.str();
-  }
-
- private:
-  uint64_t hash_ = 14695981039346656037ull;
 };
 
 void AddScene(const SceneData& data, Hash* hash) {
@@ -95,12 +80,7 @@ void AddLocalOptions(const LocalMapperOptions& local, Hash* hash) {
   hash->Add(local.registration.min_num_visible_points);
   hash->Add(local.registration.max_reproj_error_px);
   hash->Add(local.registration.min_inlier_ratio);
-  hash->Add(local.registration.min_num_p3p_inliers);
   hash->Add(local.registration.use_global_candidate);
-  for (const double parallax_deg : local.initial_pair.min_parallaxes_deg) {
-    hash->Add(parallax_deg);
-  }
-  hash->Add(local.initial_pair.min_num_points);
   hash->Add(local.initial_pair.max_epipolar_error_px);
   hash->Add(local.use_priors_in_adjustment);
   hash->Add(local.filter_max_reproj_error_px);
@@ -121,21 +101,13 @@ void AddAlignOptions(const AlignSimilarityOptions& align, Hash* hash) {
   hash->Add(align.max_threshold_to_extent);
   hash->Add(align.max_rotation_error_deg);
   hash->Add(align.adapt_threshold);
-  hash->Add(align.num_trials);
-  hash->Add(align.seed);
 }
 
 void AddRefineOptions(const RefineModelOptions& refine, Hash* hash) {
-  hash->Add(refine.use_priors_in_adjustment);
-  hash->Add(refine.filter_max_reproj_error_px);
-  hash->Add(refine.min_triangulation_angle_deg);
-  hash->Add(refine.keypoint_sigma_px);
-  AddBalance(refine.balance, hash);
   hash->Add(refine.refine_focal_length);
   hash->Add(refine.refine_principal_point);
   hash->Add(refine.refine_extra_params);
   hash->Add(refine.initial_position_loss_scale);
-  hash->Add(refine.position_loss_scale);
 }
 
 }  // namespace

@@ -8,11 +8,13 @@
 #include <sstream>
 #include <stdexcept>
 
+#include "colmap_ext/io/capture_output.h"
 #include "colmap_ext/io/output_files.h"
 #include "colmap_ext/mapper_stage/mapper_fingerprint.h"
 #include "colmap_ext/mapper_stage/mapper_steps.h"
 #include "colmap_ext/mapper_stage/model_checkpoint.h"
 #include "colmap_ext/mapper_stage/part_memory.h"
+#include "core/option_checker.h"
 #include "core/parallel.h"
 
 namespace adasfm {
@@ -22,6 +24,8 @@ namespace fs = std::filesystem;
 
 // The rest is for the scene itself, the system and what else runs.
 constexpr double kShareOfAvailableMemory = 0.7;
+// COLMAP reports on std::cout every image that it registers (host_mapper.h).
+constexpr char kNowhere[] = "/dev/null";
 
 // For a part that threw: fewer wrong poses and points to stumble over.
 LocalMapperOptions StricterOptions(LocalMapperOptions options) {
@@ -62,13 +66,12 @@ std::string PartCheckpointPath(const std::string& checkpoint_path,
 }
 
 bool MapperStageOptions::IsValid(std::string* error) const {
-  if (max_memory_gb == 0.0 || !(max_memory_gb >= -1.0)) {
-    *error = "AdaSfmMapper.max_memory_gb = " + std::to_string(max_memory_gb) +
-             " must be positive, or -1";
-    return false;
-  }
-  return partition.IsValid(error) && local.IsValid(error) &&
-         align.IsValid(error) && refine.IsValid(error);
+  return OptionChecker("AdaSfmMapper", error)
+             .Require(max_memory_gb > 0.0 || max_memory_gb == -1.0,
+                      "max_memory_gb", max_memory_gb, "must be positive, or -1")
+             .AllHold() &&
+         partition.IsValid(error) && local.IsValid(error) &&
+         align.IsValid(error);
 }
 
 MapperStage::MapperStage(const MapperStageOptions& options,
@@ -148,6 +151,7 @@ Status MapperStage::RunPart(int part_index) {
         "AdaSfmMapper.part_index = " + std::to_string(part_index) +
         ", but the plan has the parts 0 to " + std::to_string(*num_parts - 1));
   }
+  const CaptureOutput capture(kNowhere, "");
   return RunPartWithThreads(part_index,
                             EffectiveNumThreads(options_.num_threads));
 }
@@ -257,6 +261,7 @@ Status MapperStage::RunAllParts() {
   std::atomic<size_t> next{0};
   std::atomic<size_t> num_images_done{0};
   std::atomic<size_t> num_parts_done{0};
+  const CaptureOutput capture(kNowhere, "");
   // One worker takes one part after another, the biggest first.
   ParallelFor(num_parallel, num_parallel, [&](size_t) {
     for (size_t i = next++; i < parts.size(); i = next++) {

@@ -78,11 +78,12 @@ using PartMapper = std::function<LocalMapResult(
 // The mapper stage on a folder (design 7.3 to 7.5, 10). Every step leaves its
 // result in output_path/checkpoints, complete or not at all, with a fingerprint
 // of what it was made from; a step whose result is there is not done again.
-//   1  plan     partition of the view graph      checkpoints/plan.json
-//   2  part k   local reconstruction             checkpoints/part_k/
-//   3  merge    alignment, merge                 checkpoints/refine_0/
-//   4           round r of the refinement        checkpoints/refine_r/
-// Steps 3 and 4 give the model returned; only the last of their folders stays.
+//   3.1  plan     partition of the view graph      checkpoints/plan.json
+//   3.2  part k   local reconstruction             checkpoints/part_k/
+//   3.3  merge    alignment, merge                 checkpoints/refine_0/
+//   3.4           round r of the refinement        checkpoints/refine_r/
+// Steps 3.3 and 3.4 give the model returned; only the last of their folders
+// stays.
 class MapperStage {
  public:
   // `data` and `coarse` must outlive the stage. If the data has positions, the

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Steps 3 and 4 of the mapper stage.
+// Steps 3.3 and 3.4 of the mapper stage.
 #include <algorithm>
 #include <map>
 #include <optional>
@@ -11,6 +11,7 @@
 #include "colmap_ext/mapper_stage/mapper_steps.h"
 #include "colmap_ext/mapper_stage/merge_checkpoint.h"
 #include "colmap_ext/scene/align_to_gravity.h"
+#include "core/median.h"
 
 namespace adasfm {
 namespace {
@@ -36,9 +37,7 @@ double ComputeNeighborDistance(const SceneData& data,
                          coarse.at(neighbor.second).TargetOriginInSource())
                             .norm());
   }
-  if (distances.empty()) return 1.0;
-  std::sort(distances.begin(), distances.end());
-  const double median = distances[distances.size() / 2];
+  const double median = UpperMedian(&distances);
   return median > 0.0 ? median : 1.0;
 }
 
@@ -118,7 +117,7 @@ Status MapperStage::MergePartModels(const std::string& fingerprint) {
 }
 
 void MapperStage::FallBackToCoarsePoses(std::unique_ptr<MapperScene>* scene) {
-  if (!options_.refine.use_priors_in_adjustment) return;
+  if (!options_.local.use_priors_in_adjustment) return;
   const int num_torn = CountTorn(**scene);
   if (num_torn == 0) return;
   auto coarse_scene = BuildMapperScene(data_, coarse_, (*scene)->images);
@@ -130,7 +129,7 @@ void MapperStage::FallBackToCoarsePoses(std::unique_ptr<MapperScene>* scene) {
   options.join_parts = false;
   RefineModelSummary refined;
   for (int round = 1; round <= kNumRefinementRounds; ++round) {
-    RefineModel(options, round, coarse_scene.get(), &refined);
+    RefineModel(options, options_.local, round, coarse_scene.get(), &refined);
   }
   if (CountTorn(*coarse_scene) >= num_torn) return;
   summary_.refine = refined;
@@ -149,7 +148,7 @@ Status MapperStage::RefineMerged(const std::string& fingerprint, int num_done,
                " images, round " + std::to_string(round) + " of " +
                std::to_string(kNumRefinementRounds),
            0.65 + 0.3 * (round - 1) / kNumRefinementRounds);
-    RefineModel(options, round, scene->get(), &summary_.refine);
+    RefineModel(options, options_.local, round, scene->get(), &summary_.refine);
     if (round == kNumRefinementRounds) FallBackToCoarsePoses(scene);
     const Status status = WriteMergeCheckpoint(checkpoint_path_, fingerprint,
                                                round, summary_, **scene);
@@ -195,8 +194,8 @@ StatusOr<colmap::Reconstruction> MapperStage::Merge(bool require_all_parts) {
   const StepTimer refine_timer;
   status = RefineMerged(fingerprint, *num_done, &scene);
   if (!status.ok()) return status;
+  scene->mapper.End();
   colmap::Reconstruction& model = scene->reconstruction;
-  model.TearDown();
   summary_.is_level =
       summary_.is_georeferenced || AlignToGravity(data_, &model);
   summary_.refine_seconds = refine_timer.Seconds();

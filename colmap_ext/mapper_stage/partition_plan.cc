@@ -3,6 +3,8 @@
 
 #include <nlohmann/json.hpp>
 
+#include "core/option_checker.h"
+
 namespace adasfm {
 namespace {
 
@@ -13,12 +15,10 @@ constexpr double kPriorWeight = 30.0;
 }  // namespace
 
 bool PartitionPlanOptions::IsValid(std::string* error) const {
-  if (max_num_images_undivided < 2) {
-    *error = "AdaSfmPartition.max_num_images_undivided = " +
-             std::to_string(max_num_images_undivided) + " must be at least 2";
-    return false;
-  }
-  return cut.IsValid(error) && flood_fill.IsValid(error);
+  return OptionChecker("AdaSfmPartition", error)
+             .AtLeast(2, "max_num_images_undivided", max_num_images_undivided)
+             .AllHold() &&
+         cut.IsValid(error) && flood_fill.IsValid(error);
 }
 
 ImageGraph BuildImageGraph(const SceneData& data, const CoarsePoseMap& coarse) {

@@ -10,6 +10,7 @@
 #include <sstream>
 
 #include "colmap_ext/host/pose_conversion.h"
+#include "core/median.h"
 #include "core/so3.h"
 
 namespace adasfm {
@@ -77,8 +78,7 @@ PriorAgreement Summarize(const std::string& kind, std::vector<double> chi2) {
       std::count_if(chi2.begin(), chi2.end(),
                     [](double value) { return value > kLargeChi2; }) /
       chi2.size();
-  std::nth_element(chi2.begin(), chi2.begin() + chi2.size() / 2, chi2.end());
-  agreement.chi2_ratio = chi2[chi2.size() / 2] / kMedianChi2;
+  agreement.chi2_ratio = UpperMedian(&chi2) / kMedianChi2;
   return agreement;
 }
 
@@ -144,10 +144,7 @@ void CountImages(const std::vector<AssessedModel>& models,
     verdict->num_points += static_cast<int>(model.model->NumPoints3D());
   }
   verdict->num_images = static_cast<int>(counts.size());
-  if (counts.empty()) return;
-  std::nth_element(counts.begin(), counts.begin() + counts.size() / 2,
-                   counts.end());
-  verdict->median_points_per_image = counts[counts.size() / 2];
+  verdict->median_points_per_image = UpperMedian(&counts);
 }
 
 // Collects reasons; the worst result counts.

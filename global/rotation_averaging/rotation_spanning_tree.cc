@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <numeric>
 
+#include "core/disjoint_sets.h"
+
 namespace adasfm {
 namespace {
 
@@ -16,18 +18,11 @@ std::vector<std::vector<int>> BuildTree(const std::vector<RotationEdge>& edges,
   std::stable_sort(order.begin(), order.end(), [&edges](int a, int b) {
     return edges[a].sigma_rad < edges[b].sigma_rad;
   });
-  std::vector<int> parent(num_nodes);
-  std::iota(parent.begin(), parent.end(), 0);
-  const auto find = [&parent](int i) {
-    while (parent[i] != i) i = parent[i] = parent[parent[i]];
-    return i;
-  };
+  DisjointSets sets(num_nodes);
   std::vector<std::vector<int>> tree(num_nodes);
   for (const int e : order) {
-    const int a = find(edges[e].i);
-    const int b = find(edges[e].j);
-    if (a == b) continue;
-    parent[a] = b;
+    if (sets.Find(edges[e].i) == sets.Find(edges[e].j)) continue;
+    sets.Join(edges[e].i, edges[e].j);
     tree[edges[e].i].push_back(e);
     tree[edges[e].j].push_back(e);
   }

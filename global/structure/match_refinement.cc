@@ -6,6 +6,7 @@
 #include <set>
 #include <utility>
 
+#include "core/option_checker.h"
 #include "core/parallel.h"
 #include "global/view_graph/epipolar.h"
 
@@ -96,18 +97,10 @@ void RefinePair(const MatchRefinementOptions& options,
 }  // namespace
 
 bool MatchRefinementOptions::IsValid(std::string* error) const {
-  if (!(max_epipolar_error_px > 0.0)) {
-    *error =
-        "max_epipolar_error_px = " + std::to_string(max_epipolar_error_px) +
-        " must be > 0";
-    return false;
-  }
-  if (min_num_matches < 0) {
-    *error = "min_num_matches = " + std::to_string(min_num_matches) +
-             " must be >= 0";
-    return false;
-  }
-  return true;
+  return OptionChecker("AdaSfmGlobal", error)
+      .Positive("max_epipolar_error_px", max_epipolar_error_px)
+      .AtLeast(0, "min_num_matches", min_num_matches)
+      .AllHold();
 }
 
 MatchRefinementReport RefineMatches(

@@ -4,8 +4,14 @@
 #include <algorithm>
 #include <map>
 
+#include "core/option_checker.h"
+
 namespace adasfm {
 namespace {
+
+// An image is passed over only if its neighbours have this many tracks in
+// common.
+constexpr int kMinNumSharedTracks = 40;
 
 // The images one after the other, as far as complete priors tie them.
 class Chain {
@@ -67,21 +73,10 @@ class SharedTracks {
 }  // namespace
 
 bool KeyframeOptions::IsValid(std::string* error) const {
-  if (min_num_images < 1) {
-    *error = "keyframe_min_num_images is " + std::to_string(min_num_images) +
-             ", but must be at least 1";
-    return false;
-  }
-  if (stride < 1) {
-    *error = "keyframe_stride is " + std::to_string(stride) +
-             ", but must be at least 1";
-    return false;
-  }
-  if (min_num_shared_tracks < 0) {
-    *error = "min_num_shared_tracks must not be negative";
-    return false;
-  }
-  return true;
+  return OptionChecker("AdaSfmGlobal", error)
+      .AtLeast(1, "keyframe_min_num_images", min_num_images)
+      .AtLeast(1, "keyframe_stride", stride)
+      .AllHold();
 }
 
 std::set<image_t> SelectKeyframes(
@@ -105,7 +100,7 @@ std::set<image_t> SelectKeyframes(
       const bool is_passed_over =
           id != first && next != kInvalidImageId &&
           num_passed_over + 1 < options.stride &&
-          shared.Count(last_keyframe, next) >= options.min_num_shared_tracks;
+          shared.Count(last_keyframe, next) >= kMinNumSharedTracks;
       if (is_passed_over) {
         keyframes.erase(id);
         ++num_passed_over;

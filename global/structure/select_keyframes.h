@@ -21,9 +21,6 @@ struct KeyframeOptions {
   int min_num_images = 600;
   // One image of so many is a keyframe; 1: all are.
   int stride = 3;
-  // An image is passed over only if its neighbours have this many tracks in
-  // common.
-  int min_num_shared_tracks = 40;
 
   bool IsValid(std::string* error) const;
 };

@@ -2,8 +2,9 @@
 #include "global/structure/tracks.h"
 
 #include <algorithm>
-#include <numeric>
 #include <utility>
+
+#include "core/disjoint_sets.h"
 
 namespace adasfm {
 namespace {
@@ -14,9 +15,8 @@ class KeypointSets {
  public:
   explicit KeypointSets(std::vector<TrackElement> keypoints)
       : keypoints_(std::move(keypoints)),
-        parent_(keypoints_.size()),
+        sets_(keypoints_.size()),
         images_(keypoints_.size()) {
-    std::iota(parent_.begin(), parent_.end(), 0);
     for (size_t k = 0; k < keypoints_.size(); ++k) {
       images_[k] = {keypoints_[k].image_id};
     }
@@ -28,11 +28,11 @@ class KeypointSets {
   }
 
   void JoinIfConsistent(int a, int b) {
-    a = Find(a);
-    b = Find(b);
+    a = sets_.Find(a);
+    b = sets_.Find(b);
     if (a == b || ShareImage(images_[a], images_[b])) return;
     if (images_[a].size() < images_[b].size()) std::swap(a, b);
-    parent_[b] = a;
+    sets_.Join(b, a);
     std::vector<image_t> merged;
     merged.reserve(images_[a].size() + images_[b].size());
     std::merge(images_[a].begin(), images_[a].end(), images_[b].begin(),
@@ -46,7 +46,7 @@ class KeypointSets {
     std::vector<int> track_of(keypoints_.size(), -1);
     std::vector<Track> tracks;
     for (size_t k = 0; k < keypoints_.size(); ++k) {
-      const int root = Find(k);
+      const int root = sets_.Find(k);
       if (images_[root].size() < min_length) continue;
       if (track_of[root] < 0) {
         track_of[root] = tracks.size();
@@ -58,11 +58,6 @@ class KeypointSets {
   }
 
  private:
-  int Find(int k) {
-    while (parent_[k] != k) k = parent_[k] = parent_[parent_[k]];
-    return k;
-  }
-
   static bool ShareImage(const std::vector<image_t>& a,
                          const std::vector<image_t>& b) {
     auto i = a.begin();
@@ -79,7 +74,7 @@ class KeypointSets {
   }
 
   std::vector<TrackElement> keypoints_;  // sorted
-  std::vector<int> parent_;
+  DisjointSets sets_;
   std::vector<std::vector<image_t>> images_;  // sorted; of roots
 };
 

@@ -6,6 +6,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/median.h"
+
 namespace adasfm {
 namespace {
 
@@ -112,9 +114,7 @@ bool RefinePositions(const TranslationAveragingOptions& options,
   for (const PositionEdge& edge : edges) {
     lengths.push_back((centers->row(edge.j) - centers->row(edge.i)).norm());
   }
-  std::nth_element(lengths.begin(), lengths.begin() + lengths.size() / 2,
-                   lengths.end());
-  const double unit = lengths[lengths.size() / 2];
+  const double unit = UpperMedian(&lengths);
   if (!(unit > 0.0)) return false;
 
   RefinementSystem system(num_nodes);

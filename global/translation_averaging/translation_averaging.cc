@@ -4,8 +4,8 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <numeric>
 
+#include "core/disjoint_sets.h"
 #include "core/median.h"
 #include "core/so3.h"
 #include "global/translation_averaging/refine_positions.h"
@@ -20,18 +20,13 @@ using Vectors = LaplacianSolver::Vectors;
 // points was derived from theirs: counting it again, with errors that all such
 // edges share, would let many weak lengths outvote the sensors' scale.
 void MarkRedundantLengths(int num_nodes, std::vector<PositionEdge>* edges) {
-  std::vector<int> parent(num_nodes);
-  std::iota(parent.begin(), parent.end(), 0);
-  const auto find = [&parent](int i) {
-    while (parent[i] != i) i = parent[i] = parent[parent[i]];
-    return i;
-  };
+  DisjointSets sets(num_nodes);
   for (const PositionEdge& edge : *edges) {
-    if (edge.kind == PositionEdge::kFixed) parent[find(edge.i)] = find(edge.j);
+    if (edge.kind == PositionEdge::kFixed) sets.Join(edge.i, edge.j);
   }
   for (PositionEdge& edge : *edges) {
-    edge.is_redundant =
-        edge.kind == PositionEdge::kSoft && find(edge.i) == find(edge.j);
+    edge.is_redundant = edge.kind == PositionEdge::kSoft &&
+                        sets.Find(edge.i) == sets.Find(edge.j);
   }
 }
 

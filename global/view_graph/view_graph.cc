@@ -2,9 +2,10 @@
 #include "global/view_graph/view_graph.h"
 
 #include <algorithm>
-#include <numeric>
 #include <stdexcept>
 #include <string>
+
+#include "core/disjoint_sets.h"
 
 namespace adasfm {
 
@@ -73,22 +74,17 @@ void ViewGraph::Check() const {
 
 std::vector<std::vector<image_t>> FindConnectedComponents(
     const ViewGraph& graph) {
-  std::vector<int> parent(graph.images.size());
-  std::iota(parent.begin(), parent.end(), 0);
-  const auto find = [&parent](int i) {
-    while (parent[i] != i) i = parent[i] = parent[parent[i]];
-    return i;
-  };
+  DisjointSets sets(graph.images.size());
   for (const ViewGraphEdge& edge : graph.edges) {
     if (!edge.IsKept()) continue;
-    const int a = find(graph.IndexOf(edge.image_id1));
-    const int b = find(graph.IndexOf(edge.image_id2));
+    const int a = sets.Find(graph.IndexOf(edge.image_id1));
+    const int b = sets.Find(graph.IndexOf(edge.image_id2));
     // The root is the smallest index, so roots are in order of the ids.
-    parent[std::max(a, b)] = std::min(a, b);
+    sets.Join(std::max(a, b), std::min(a, b));
   }
   std::map<int, std::vector<image_t>> by_root;
-  for (size_t i = 0; i < parent.size(); ++i) {
-    by_root[find(i)].push_back(graph.images[i]);
+  for (size_t i = 0; i < graph.images.size(); ++i) {
+    by_root[sets.Find(i)].push_back(graph.images[i]);
   }
   std::vector<std::vector<image_t>> components;
   for (auto& [root, images] : by_root) components.push_back(std::move(images));

@@ -36,7 +36,7 @@ TEST(InitialPair, HasTheParallaxAskedFor) {
     ASSERT_FALSE(pairs.empty());
     EXPECT_LE(pairs.size(), 3);
     for (size_t i = 0; i < pairs.size(); ++i) {
-      EXPECT_GE(pairs[i].num_points, InitialPairOptions().min_num_points);
+      EXPECT_GE(pairs[i].num_points, InitialPairOptions::kMinNumPoints);
       if (i > 0) {
         EXPECT_LE(pairs[i].num_points, pairs[i - 1].num_points);
       }

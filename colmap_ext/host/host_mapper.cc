@@ -1,0 +1,132 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "colmap_ext/host/host_mapper.h"
+
+#include <base/database_cache.h>
+#include <estimators/pose.h>
+#include <sfm/incremental_mapper.h>
+
+#include <limits>
+#include <utility>
+
+namespace adasfm {
+
+HostMapper::HostMapper(colmap::Reconstruction* reconstruction)
+    : reconstruction_(*reconstruction),
+      cache_(std::make_unique<colmap::DatabaseCache>()) {}
+
+HostMapper::~HostMapper() = default;
+
+void HostMapper::AddCamera(const colmap::Camera& camera) {
+  cache_->AddCamera(camera);
+}
+
+void HostMapper::AddImage(image_t image_id, const std::string& name,
+                          camera_t camera_id,
+                          const std::vector<Eigen::Vector2d>& keypoints) {
+  colmap::Image image;
+  image.SetImageId(image_id);
+  image.SetName(name);
+  image.SetCameraId(camera_id);
+  image.SetPoints2D(keypoints);
+  cache_->AddImage(std::move(image));
+}
+
+void HostMapper::AddMatches(image_t image_id1, image_t image_id2,
+                            const std::vector<FeatureMatch>& matches) {
+  colmap::FeatureMatches host_matches;
+  host_matches.reserve(matches.size());
+  for (const FeatureMatch& match : matches) {
+    host_matches.emplace_back(match.point2D_idx1, match.point2D_idx2);
+  }
+  // The cache is ours and not const; COLMAP 3.8 lets only its own reading of a
+  // database change the graph. The graph is not finalized: that drops images
+  // without matches, which the mapper then asks for in vain.
+  const_cast<colmap::CorrespondenceGraph&>(Graph()).AddCorrespondences(
+      image_id1, image_id2, host_matches);
+}
+
+void HostMapper::Begin() {
+  mapper_ = std::make_unique<colmap::IncrementalMapper>(cache_.get());
+  mapper_->BeginReconstruction(&reconstruction_);
+  // The reconstruction has its own copy of the keypoints.
+  for (const auto& [image_id, image] : reconstruction_.Images()) {
+    cache_->Image(image_id) = colmap::Image();
+  }
+}
+
+void HostMapper::End() { mapper_->EndReconstruction(/*discard=*/false); }
+
+const colmap::CorrespondenceGraph& HostMapper::Graph() const {
+  return std::as_const(*cache_).CorrespondenceGraph();
+}
+
+std::vector<image_t> HostMapper::FindNextImages(int min_num_visible_points) {
+  colmap::IncrementalMapper::Options options;
+  options.image_selection_method = colmap::IncrementalMapper::Options::
+      ImageSelectionMethod::MAX_VISIBLE_POINTS_NUM;
+  options.abs_pose_min_num_inliers = min_num_visible_points;
+  // The caller decides when to try again.
+  options.max_reg_trials = std::numeric_limits<int>::max();
+  return mapper_->FindNextImages(options);
+}
+
+bool HostMapper::RegisterNextImage(image_t image_id, double max_reproj_error_px,
+                                   int min_num_inliers) {
+  colmap::IncrementalMapper::Options options;
+  options.abs_pose_max_error = max_reproj_error_px;
+  options.abs_pose_min_num_inliers = min_num_inliers;
+  options.abs_pose_refine_focal_length = false;
+  options.abs_pose_refine_extra_params = false;
+  options.num_threads = 1;
+  return mapper_->RegisterNextImage(options, image_id);
+}
+
+void HostMapper::TriangulateImage(image_t image_id, double min_angle_deg) {
+  colmap::IncrementalTriangulator::Options options;
+  options.min_angle = min_angle_deg;
+  // A straight drive has many tracks of two views; the adjustment weighs them,
+  // and verified matches made them.
+  options.ignore_two_view_tracks = false;
+  mapper_->TriangulateImage(options, image_id);
+}
+
+void HostMapper::CompleteAndMergeTracks(double max_reproj_error_px) {
+  colmap::IncrementalTriangulator::Options options;
+  options.complete_max_reproj_error = max_reproj_error_px;
+  options.merge_max_reproj_error = max_reproj_error_px;
+  mapper_->CompleteTracks(options);
+  mapper_->MergeTracks(options);
+}
+
+void HostMapper::FilterPoints(double max_reproj_error_px,
+                              double min_angle_deg) {
+  colmap::IncrementalMapper::Options options;
+  options.filter_max_reproj_error = max_reproj_error_px;
+  options.filter_min_tri_angle = min_angle_deg;
+  mapper_->FilterPoints(options);
+}
+
+void RefinePose(const PointsInImage& points,
+                const std::vector<char>& inlier_mask,
+                const colmap::Camera& camera, Rigid3d* cam_from_world) {
+  colmap::AbsolutePoseRefinementOptions options;
+  options.refine_focal_length = false;
+  options.refine_extra_params = false;
+  options.print_summary = false;
+  options.max_num_iterations = 20;
+  options.gradient_tolerance = 10.0;
+  colmap::Camera fixed_camera = camera;
+  const Eigen::Quaterniond& rotation = cam_from_world->rotation;
+  Eigen::Vector4d qvec(rotation.w(), rotation.x(), rotation.y(), rotation.z());
+  Eigen::Vector3d tvec = cam_from_world->translation;
+  if (!colmap::RefineAbsolutePose(options, inlier_mask, points.pixels,
+                                  points.points_in_world, &qvec, &tvec,
+                                  &fixed_camera) ||
+      !qvec.allFinite() || !tvec.allFinite()) {
+    return;
+  }
+  *cam_from_world =
+      Rigid3d(Eigen::Quaterniond(qvec(0), qvec(1), qvec(2), qvec(3)), tvec);
+}
+
+}  // namespace adasfm
