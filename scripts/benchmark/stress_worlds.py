@@ -72,7 +72,7 @@ DIALS = {
     'long standstill': dial(('standing_s',), 200, stops=1, stop_duration=12),
     'wheels on gravel': dial((), wheel_slip_noise=0.03, wheel_slips=4),
     'cars carry most matches': dial(
-        ('moving_keypoint_ratio', 'moving_match_ratio'), moving_ratio=0.6),
+        ('moving_keypoint_ratio', 'moving_match_ratio'), moving_ratio=0.5),
     'rolling shutter of 30 ms': dial((), rolling_shutter=0.03),
     'few keypoints inside parts': dial(
         ('num_images_without_texture',), 200, num_blackouts=4,
