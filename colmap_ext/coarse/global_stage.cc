@@ -87,10 +87,9 @@ std::map<ImagePair, std::vector<FeatureMatch>> MatchAnew(
     }
   }
   std::map<ImagePair, std::vector<FeatureMatch>> matched;
-  for (RefinedPair& pair :
-       RefineMatches(options, component.cams_from_world, matches.bearings,
-                     candidates)
-           .pairs) {
+  for (RefinedPair& pair : RefineMatches(options, component.cams_from_world,
+                                         matches.bearings, candidates)
+                               .pairs) {
     if (!pair.removed) matched[pair.pair] = std::move(pair.matches);
   }
   return matched;
@@ -199,9 +198,8 @@ StatusOr<GlobalStageResult> RunGlobalStage(
 
   // 7. Structure and adjustment.
   for (const CoarseComponent& component : result.poses.components) {
-    const CoarseModelInput input =
-        CreateModelInput(options.refinement, scene, component, result.poses,
-                         correspondences);
+    const CoarseModelInput input = CreateModelInput(
+        options.refinement, scene, component, result.poses, correspondences);
     watch = begin(DescribeTrackMemory(input), 0.5);
     result.models.push_back(BuildCoarseModel(options.structure, scene,
                                              correspondences.bearings, input));

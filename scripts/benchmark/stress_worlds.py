@@ -87,7 +87,7 @@ DIALS = {
         bar_m=1.0),
 }
 # Without logs the scale drifts: a fold errs by more of the way driven.
-MAX_DRIFT_WITHOUT_LOGS = 0.02
+MAX_DRIFT_WITHOUT_LOGS = 0.005
 
 
 def read_warnings(log_path):
