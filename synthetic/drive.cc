@@ -4,68 +4,33 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <stdexcept>
+#include <string>
 
+#include "core/random.h"
 #include "core/so3.h"
+#include "synthetic/routes.h"
+#include "synthetic/street_grid.h"
 #include "synthetic/taylor.h"
 
 namespace adasfm {
 namespace {
 
-constexpr double kBendLength = 18.0;  // m, along the path
-// The car is slower from this far before a bend to that far behind it.
-constexpr double kSlowBefore = 12.0;
-constexpr double kSlowBehind = 8.0;
-constexpr double kSlowdown = 0.6;  // 1 / speed grows by this share
+// The car is slower from this far before a bend to 4 / 9 behind it, by the
+// bend's length.
+constexpr double kSlowBefore = 2.0 / 3.0;
+constexpr double kSlowWidth = kSlowBefore + 1.0 + 4.0 / 9.0;
+constexpr double kCarSpeed = 8.0;    // m/s
+constexpr double kMowerSpeed = 1.0;  // m/s
+constexpr double kSlowdown = 0.6;    // 1 / speed grows by this share
 constexpr double kSpeedVariation = 0.08;
 constexpr double kSpeedWaveLength = 130.0;
 constexpr double kStartDuration = 2.5;  // s, from rest to full speed
+constexpr double kBrakeDuration =
+    1.5;  // s, before a stop, and to set off again
 // The first image is taken when the car has just got going.
 constexpr double kFirstImageDelay = 1.0;
 constexpr double kAxleHeight = 0.3;
-
-// Step from 0 to 1 with three continuous derivatives.
-template <typename T>
-T SmoothStep(const T& u) {
-  if (Value(u) <= 0.0) return T(0.0);
-  if (Value(u) >= 1.0) return T(1.0);
-  return u * u * u * u *
-         (T(35.0) + u * (T(-84.0) + u * (T(70.0) + u * T(-20.0))));
-}
-
-template <typename T>
-T SmoothStepDerivative(const T& u) {
-  if (Value(u) <= 0.0 || Value(u) >= 1.0) return T(0.0);
-  const T v = T(1.0) - u;
-  return T(140.0) * u * u * u * v * v * v;
-}
-
-double SmoothStepIntegral(double u) {
-  if (u <= 0.0) return 0.0;
-  if (u >= 1.0) return 0.5 + (u - 1.0);
-  return std::pow(u, 5) * (7.0 + u * (-14.0 + u * (10.0 - 2.5 * u)));
-}
-
-// Gauss-Legendre over [0, u] of the direction in a left bend.
-Eigen::Vector2d BendDisplacement(double u) {
-  constexpr std::array<double, 5> kNodes = {
-      0.0, 0.5384693101056831, -0.5384693101056831, 0.9061798459386640,
-      -0.9061798459386640};
-  constexpr std::array<double, 5> kWeights = {
-      0.5688888888888889, 0.4786286704993665, 0.4786286704993665,
-      0.2369268850561891, 0.2369268850561891};
-  constexpr int kNumPanels = 16;
-  Eigen::Vector2d sum(0.0, 0.0);
-  const double half = 0.5 * u / kNumPanels;
-  for (int panel = 0; panel < kNumPanels; ++panel) {
-    for (size_t k = 0; k < kNodes.size(); ++k) {
-      const double x = half * (2 * panel + 1 + kNodes[k]);
-      const double angle = 0.5 * kPi * SmoothStep(x);
-      sum += half * kWeights[k] *
-             Eigen::Vector2d(std::cos(angle), std::sin(angle));
-    }
-  }
-  return kBendLength * sum;
-}
 
 template <typename T, typename Waves>
 T SumWaves(const Waves& waves, const T& s) {
@@ -115,47 +80,22 @@ RotationSeries operator*(const RotationSeries& a, const RotationSeries& b) {
 
 }  // namespace
 
-Drive::Drive(const SyntheticWorldOptions& options, const Route& route,
+Drive::Drive(const SyntheticWorldOptions& options, const Path& path,
              const Rigid3d& imu_from_wheel)
     : imu_from_wheel_(imu_from_wheel),
-      // 8 m/s, but between 2.5 and 20 images a second.
-      cruise_speed_(options.image_interval_s > 0.0
-                        ? options.spacing_m / options.image_interval_s
-                        : std::clamp(8.0, options.spacing_m / 0.4,
-                                     options.spacing_m / 0.05)),
-      standstill_s_(options.standstill_s) {
-  BuildSegments(route);
+      // Between 2.5 and 20 images a second.
+      cruise_speed_(
+          options.image_interval_s > 0.0
+              ? options.spacing_m / options.image_interval_s
+              : std::clamp(IsOnLawn(options) ? kMowerSpeed : kCarSpeed,
+                           options.spacing_m / 0.4, options.spacing_m / 0.05)),
+      standstill_s_(options.standstill_s),
+      path_(path),
+      slope_(RoadSlope(options)) {
   DrawWaves(options);
-}
-
-void Drive::BuildSegments(const Route& route) {
-  // How far before and behind a crossing the bend reaches.
-  const double reach = BendDisplacement(1.0).x();
-  const auto node = [&route](size_t i) {
-    return Eigen::Vector2d(kBlockSize * route.nodes[i][0],
-                           kBlockSize * route.nodes[i][1]);
-  };
-  double s = 0.0;
-  Eigen::Vector2d position = node(0);
-  for (size_t i = 1; i + 1 < route.nodes.size(); ++i) {
-    const Eigen::Vector2d in = (node(i) - node(i - 1)) / kBlockSize;
-    const Eigen::Vector2d out = (node(i + 1) - node(i)) / kBlockSize;
-    const double heading = std::atan2(in.y(), in.x());
-    const int turn =
-        static_cast<int>(std::lround(in.x() * out.y() - in.y() * out.x()));
-    const Eigen::Vector2d end =
-        turn == 0 ? node(i) : Eigen::Vector2d(node(i) - reach * in);
-    const double length = (end - position).norm();
-    segments_.push_back({s, length, position, heading, 0});
-    s += length;
-    position = end;
-    if (turn != 0) {
-      segments_.push_back({s, kBendLength, position, heading, turn});
-      bends_.push_back(s);
-      s += kBendLength;
-      position = node(i) + reach * out;
-    }
-  }
+  last_image_s_ = TimeAt(ArcLengthAt(FirstImageTime()) +
+                         options.spacing_m * (options.num_images - 1));
+  AddStops(options);
 }
 
 void Drive::DrawWaves(const SyntheticWorldOptions& options) {
@@ -167,54 +107,86 @@ void Drive::DrawWaves(const SyntheticWorldOptions& options) {
   // On the straight street the centres have to stay on a line up to
   // millimetres.
   const bool is_straight = options.trajectory == SyntheticTrajectory::kStraight;
-  const double tilt = DegToRad(is_straight ? 0.08 : 0.4);
-  const double weave = is_straight ? 0.001 : 0.25;
+  const bool is_on_lawn = IsOnLawn(options);
+  const double tilt = DegToRad(is_straight ? 0.08 : is_on_lawn ? 0.8 : 0.4);
+  const double weave = is_straight ? 0.001 : is_on_lawn ? 0.03 : 0.25;
   const double heave = is_straight ? 0.001 : 0.005;
-  weave_ = {draw(weave, 57.0), draw(0.3 * weave, 23.0)};
-  roll_ = {draw(tilt, 9.1), draw(0.5 * tilt, 4.3)};
-  pitch_ = {draw(0.9 * tilt, 7.3), draw(0.4 * tilt, 3.7)};
-  heave_ = {draw(heave, 6.1), draw(0.4 * heave, 3.1)};
+  // A mower is a quarter of a car's size.
+  const double size = is_on_lawn ? 0.25 : 1.0;
+  weave_ = {draw(weave, size * 57.0), draw(0.3 * weave, size * 23.0)};
+  roll_ = {draw(tilt, size * 9.1), draw(0.5 * tilt, size * 4.3)};
+  pitch_ = {draw(0.9 * tilt, size * 7.3), draw(0.4 * tilt, size * 3.7)};
+  heave_ = {draw(heave, size * 6.1), draw(0.4 * heave, size * 3.1)};
 }
 
-const Drive::Segment& Drive::SegmentAt(double s) const {
-  const auto after = std::upper_bound(segments_.begin(), segments_.end(), s,
-                                      [](double value, const Segment& segment) {
-                                        return value < segment.begin;
-                                      });
-  return after == segments_.begin() ? segments_.front() : *std::prev(after);
-}
-
-Eigen::Vector2d Drive::AxisPosition(double s) const {
-  const Segment& segment = SegmentAt(s);
-  Eigen::Vector2d local(s - segment.begin, 0.0);
-  if (segment.turn != 0) {
-    local = BendDisplacement(local.x() / kBendLength);
-    local.y() *= segment.turn;
+void Drive::AddStops(const SyntheticWorldOptions& options) {
+  const int num_stops = options.num_stops + options.num_spins;
+  if (num_stops == 0) return;
+  const double first_s = FirstImageTime();
+  const double span_s = last_image_s_ - first_s;
+  Random random = MakeRandom(options.seed, 14);
+  std::vector<Stop> stops;
+  double lost_s = 0.0;
+  for (int k = 0; k < num_stops; ++k) {
+    // Turns on the spot lie evenly among the stops.
+    const bool is_spin = (k + 1) * options.num_spins / num_stops >
+                         k * options.num_spins / num_stops;
+    const double duration_s =
+        is_spin ? options.spin_duration_s : options.stop_duration_s;
+    const double sign = random.Uniform(0.0, 1.0) < 0.5 ? -1.0 : 1.0;
+    const double begin_s =
+        first_s + span_s * (k + 1) / (num_stops + 1) - 0.5 * duration_s;
+    stops.push_back(
+        {begin_s, begin_s + duration_s, is_spin ? sign * 2.0 * kPi : 0.0});
+    lost_s += duration_s + kBrakeDuration;
   }
-  return segment.start + Eigen::Rotation2Dd(segment.heading) * local;
-}
-
-template <typename T>
-T Drive::Heading(const T& s) const {
-  const Segment& segment = SegmentAt(Value(s));
-  if (segment.turn == 0) return T(segment.heading);
-  return T(segment.heading) +
-         T(0.5 * kPi * segment.turn) *
-             SmoothStep((s - T(segment.begin)) * T(1.0 / kBendLength));
-}
-
-template <typename T>
-T Drive::Curvature(const T& s) const {
-  const Segment& segment = SegmentAt(Value(s));
-  if (segment.turn == 0) return T(0.0);
-  return T(0.5 * kPi * segment.turn / kBendLength) *
-         SmoothStepDerivative((s - T(segment.begin)) * T(1.0 / kBendLength));
+  if (lost_s > 0.5 * span_s) {
+    throw std::invalid_argument(
+        "SyntheticWorldOptions: the stops and turns on the spot take " +
+        std::to_string(lost_s) + " s, but at most " +
+        std::to_string(0.5 * span_s) +
+        " s, half of the drive's time, may be spent with them");
+  }
+  stops_ = std::move(stops);
 }
 
 template <typename T>
 T Drive::SpeedFactor(const T& time_s) const {
-  if (standstill_s_ <= 0.0) return T(1.0);
-  return SmoothStep((time_s - T(standstill_s_)) * T(1.0 / kStartDuration));
+  T factor(1.0);
+  if (standstill_s_ > 0.0) {
+    factor = SmoothStep((time_s - T(standstill_s_)) * T(1.0 / kStartDuration));
+  }
+  for (const Stop& stop : stops_) {
+    const double scale = 1.0 / kBrakeDuration;
+    factor =
+        factor -
+        SmoothStep((time_s - T(stop.begin_s - kBrakeDuration)) * T(scale)) +
+        SmoothStep((time_s - T(stop.end_s)) * T(scale));
+  }
+  return factor;
+}
+
+template <typename T>
+T Drive::TurnOnTheSpot(const T& time_s) const {
+  T turn(0.0);
+  for (const Stop& stop : stops_) {
+    if (stop.turn_rad == 0.0) continue;
+    turn = turn +
+           T(stop.turn_rad) * SmoothStep((time_s - T(stop.begin_s)) *
+                                         T(1.0 / (stop.end_s - stop.begin_s)));
+  }
+  return turn;
+}
+
+// The last bend that the car has begun to slow down for at s, if any.
+int Drive::LastBendIndex(double s) const {
+  const std::vector<Path::Segment>& bends = path_.bends();
+  const auto after =
+      std::upper_bound(bends.begin(), bends.end(), s,
+                       [](double value, const Path::Segment& bend) {
+                         return value < bend.begin - kSlowBefore * bend.length;
+                       });
+  return static_cast<int>(after - bends.begin()) - 1;
 }
 
 // d(nominal time) / ds, 1 / speed of the car when it is under way.
@@ -223,11 +195,11 @@ T Drive::Slowness(const T& s) const {
   using std::cos;
   const double wave_number = 2.0 * kPi / kSpeedWaveLength;
   T factor = T(1.0) + T(kSpeedVariation) * cos(T(wave_number) * s);
-  const auto after =
-      std::upper_bound(bends_.begin(), bends_.end(), Value(s) + kSlowBefore);
-  if (after != bends_.begin()) {
-    const double width = kSlowBefore + kBendLength + kSlowBehind;
-    const T u = (s - T(*std::prev(after) - kSlowBefore)) * T(1.0 / width);
+  const int index = LastBendIndex(Value(s));
+  if (index >= 0) {
+    const Path::Segment& bend = path_.bends()[index];
+    const T u = (s - T(bend.begin - kSlowBefore * bend.length)) *
+                T(1.0 / (kSlowWidth * bend.length));
     // 64 u^3 (1 - u)^3 peaks at 1.
     factor = factor + T(kSlowdown * 64.0 / 140.0) * SmoothStepDerivative(u);
   }
@@ -238,13 +210,11 @@ T Drive::Slowness(const T& s) const {
 double Drive::NominalTime(double s) const {
   const double wave_number = 2.0 * kPi / kSpeedWaveLength;
   double sum = s + kSpeedVariation * std::sin(wave_number * s) / wave_number;
-  const auto after =
-      std::upper_bound(bends_.begin(), bends_.end(), s + kSlowBefore);
-  if (after != bends_.begin()) {
-    const double width = kSlowBefore + kBendLength + kSlowBehind;
-    const double u = (s - *std::prev(after) + kSlowBefore) / width;
-    const double num_before = after - bends_.begin() - 1;
-    sum += kSlowdown * 64.0 / 140.0 * width * (num_before + SmoothStep(u));
+  for (int k = LastBendIndex(s); k >= 0; --k) {
+    const Path::Segment& bend = path_.bends()[k];
+    const double width = kSlowWidth * bend.length;
+    const double u = (s - bend.begin + kSlowBefore * bend.length) / width;
+    sum += kSlowdown * 64.0 / 140.0 * width * SmoothStep(u);
   }
   return sum / cruise_speed_;
 }
@@ -266,9 +236,18 @@ double Drive::ArcLengthAtNominalTime(double tau) const {
 }
 
 double Drive::NominalTimeAt(double time_s) const {
-  if (standstill_s_ <= 0.0) return time_s;
-  return kStartDuration *
-         SmoothStepIntegral((time_s - standstill_s_) / kStartDuration);
+  double tau = time_s;
+  if (standstill_s_ > 0.0) {
+    tau = kStartDuration *
+          SmoothStepIntegral((time_s - standstill_s_) / kStartDuration);
+  }
+  for (const Stop& stop : stops_) {
+    const double begin_s = stop.begin_s - kBrakeDuration;
+    tau -= kBrakeDuration *
+           (SmoothStepIntegral((time_s - begin_s) / kBrakeDuration) -
+            SmoothStepIntegral((time_s - stop.end_s) / kBrakeDuration));
+  }
+  return tau;
 }
 
 double Drive::ArcLengthAt(double time_s) const {
@@ -277,13 +256,12 @@ double Drive::ArcLengthAt(double time_s) const {
 
 double Drive::TimeAt(double arc_length_m) const {
   const double tau = NominalTime(arc_length_m);
-  if (standstill_s_ <= 0.0) return tau;
-  if (tau >= 0.5 * kStartDuration) {
-    return tau + standstill_s_ + 0.5 * kStartDuration;
+  double low = 0.0;
+  double high = tau + standstill_s_ + kStartDuration;
+  for (const Stop& stop : stops_) {
+    high += stop.end_s - stop.begin_s + kBrakeDuration;
   }
-  double low = standstill_s_;
-  double high = standstill_s_ + kStartDuration;
-  for (int i = 0; i < 60; ++i) {
+  for (int i = 0; i < 100 && low < high; ++i) {
     const double middle = 0.5 * (low + high);
     (NominalTimeAt(middle) > tau ? high : low) = middle;
   }
@@ -303,21 +281,25 @@ DriveState Drive::StateAt(double time_s) const {
     s = Integrate(SpeedFactor(time) / Slowness(s), s0);
   }
   // 2. The axis of the street, and the weave about it.
-  const Taylor heading = Heading(s);
+  const Taylor heading = path_.Heading(s);
   const Taylor speed = Differentiate(s);
-  const Eigen::Vector2d axis = AxisPosition(s0);
+  const Eigen::Vector2d axis = path_.Position(s0);
   const Taylor weave = SumWaves(weave_, s);
   const Taylor x =
       Integrate(cos(heading) * speed, axis.x()) - sin(heading) * weave;
   const Taylor y =
       Integrate(sin(heading) * speed, axis.y()) + cos(heading) * weave;
-  const Taylor z = Taylor(kAxleHeight) + SumWaves(heave_, s);
+  const Taylor z =
+      Taylor(kAxleHeight) + Taylor(slope_) * s + SumWaves(heave_, s);
   // The car points where the wheel frame moves: wheels do not skid sideways.
-  const Taylor yaw = heading + atan(SumWaveSlopes(weave_, s) /
-                                    (Taylor(1.0) - Curvature(s) * weave));
+  const Taylor yaw = heading +
+                     atan(SumWaveSlopes(weave_, s) /
+                          (Taylor(1.0) - path_.Curvature(s) * weave)) +
+                     TurnOnTheSpot(time);
   // 3. The body.
+  const Taylor pitch = SumWaves(pitch_, s) - Taylor(std::atan(slope_));
   const RotationSeries rotation = AxisRotation(2, yaw) *
-                                  AxisRotation(1, SumWaves(pitch_, s)) *
+                                  AxisRotation(1, pitch) *
                                   AxisRotation(0, SumWaves(roll_, s));
   const Rigid3d wheel_from_imu = imu_from_wheel_.Inverse();
   const Eigen::Vector3d& lever = wheel_from_imu.translation;

@@ -6,7 +6,7 @@
 
 #include "core/random.h"
 #include "core/rigid3d.h"
-#include "synthetic/street_grid.h"
+#include "synthetic/path.h"
 #include "synthetic/synthetic_world.h"
 
 namespace adasfm {
@@ -22,37 +22,37 @@ struct DriveState {
   double wheel_yaw_rate = 0.0;
 };
 
-// A smooth drive along a route through the street grid, known in closed form:
-// arc length s(t) from a speed profile that starts at rest and slows down in
-// bends, the wheel frame's path with a weave about the street's axis, and a
-// body that rolls, pitches and heaves with the distance driven.
+// A smooth drive along a path, known in closed form: arc length s(t) from a
+// speed profile that starts at rest, slows down in bends and has stops, some of
+// which turn the machine on the spot, the wheel frame's path with a weave about
+// the path, and a body that rolls, pitches and heaves with the distance driven.
 class Drive {
  public:
-  Drive(const SyntheticWorldOptions& options, const Route& route,
+  Drive(const SyntheticWorldOptions& options, const Path& path,
         const Rigid3d& imu_from_wheel);
+
+  // At rest from begin to end, but for a turn on the spot by turn_rad.
+  struct Stop {
+    double begin_s, end_s, turn_rad;
+  };
 
   DriveState StateAt(double time_s) const;
   double ArcLengthAt(double time_s) const;
   // The time at which the car has driven so far; the inverse of ArcLengthAt.
   double TimeAt(double arc_length_m) const;
   double FirstImageTime() const;
+  // When the image of the options' last spacing would be taken without stops;
+  // images are taken until then.
+  double LastImageTime() const { return last_image_s_; }
+  const std::vector<Stop>& stops() const { return stops_; }
 
  private:
   struct Wave {
     double amplitude, wave_number, phase;
   };
-  // A piece of the route's axis: straight, or a bend by turn * 90 deg.
-  struct Segment {
-    double begin, length;
-    Eigen::Vector2d start;
-    double heading;
-    int turn;
-  };
-
-  void BuildSegments(const Route& route);
   void DrawWaves(const SyntheticWorldOptions& options);
-  const Segment& SegmentAt(double s) const;
-  Eigen::Vector2d AxisPosition(double s) const;
+  void AddStops(const SyntheticWorldOptions& options);
+  int LastBendIndex(double s) const;
   double NominalTime(double s) const;
   double ArcLengthAtNominalTime(double tau) const;
   double NominalTimeAt(double time_s) const;
@@ -62,16 +62,16 @@ class Drive {
   template <typename T>
   T Slowness(const T& s) const;
   template <typename T>
-  T Heading(const T& s) const;
-  template <typename T>
-  T Curvature(const T& s) const;
+  T TurnOnTheSpot(const T& time_s) const;
 
   Rigid3d imu_from_wheel_;
   double cruise_speed_;
   double standstill_s_;
-  std::vector<Segment> segments_;
-  // Where bends begin, ascending.
-  std::vector<double> bends_;
+  Path path_;
+  // Of the road: height per way.
+  double slope_;
+  double last_image_s_ = 0.0;
+  std::vector<Stop> stops_;
   std::vector<Wave> weave_, roll_, pitch_, heave_;
 };
 

@@ -3,12 +3,15 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <map>
 #include <optional>
 
 #include "core/parallel.h"
 #include "core/so3.h"
+#include "synthetic/false_pairs.h"
 #include "synthetic/pair_candidates.h"
+#include "synthetic/traffic.h"
 #include "synthetic/two_view_refinement.h"
 
 namespace adasfm {
@@ -22,11 +25,15 @@ constexpr double kMaxScaleRatio = 2.2;
 constexpr double kMatchRate = 0.85;
 // Look-alike facades are not equal in all details.
 constexpr double kAliasMatchRate = 0.4;
+// Points of cars are below zero.
+constexpr int kNoTwin = std::numeric_limits<int>::min();
 
 class Matcher {
  public:
-  Matcher(const LandmarkMap& map, const SyntheticWorld& world)
-      : map_(map),
+  Matcher(const StreetGrid& grid, const LandmarkMap& map,
+          const SyntheticWorld& world)
+      : grid_(grid),
+        map_(map),
         world_(world),
         indices_(world.images.size()),
         bearings_(world.images.size()) {
@@ -34,7 +41,10 @@ class Matcher {
       const SyntheticImage& image = world_.images[i];
       bearings_[i] = ComputeBearings(world_.camera, image);
       for (size_t k = 0; k < image.landmark_ids.size(); ++k) {
-        indices_[i].emplace_back(image.landmark_ids[k], k);
+        const bool is_on_car =
+            !image.car_point_ids.empty() && image.car_point_ids[k] >= 0;
+        indices_[i].emplace_back(
+            is_on_car ? -1 - image.car_point_ids[k] : image.landmark_ids[k], k);
       }
       std::sort(indices_[i].begin(), indices_[i].end());
     });
@@ -50,14 +60,15 @@ class Matcher {
     SyntheticPair pair;
     pair.image_id1 = image1.image_id;
     pair.image_id2 = image2.image_id;
-    pair.is_alias = candidate.is_alias;
-    const std::vector<FeatureMatch> shared = MatchLandmarks(candidate, &random);
+    pair.is_alias = candidate.IsAlias();
+    std::vector<FeatureMatch> shared = MatchLandmarks(candidate, &random);
+    LeaveRoomForOutliers(candidate, &random, &shared);
     if (static_cast<int>(shared.size()) < kMinNumInliers) return {};
     pair.raw_matches = shared;
     AddOutliers(candidate, &random, &pair.raw_matches);
 
-    Rigid3d apparent = ComputeCam2FromCam1(image1.cam_from_world,
-                                           candidate.apparent_cam2_from_world);
+    std::vector<FeatureMatch> rigid;
+    Rigid3d apparent = FindApparentMotion(candidate, shared, &rigid);
     // Without motion the direction is anybody's guess.
     if (apparent.translation.norm() < 1e-9) {
       apparent.translation = random.UnitVector();
@@ -65,7 +76,7 @@ class Matcher {
     const std::vector<Bearing>& bearings1 = bearings_[candidate.first];
     const std::vector<Bearing>& bearings2 = bearings_[candidate.second];
     pair.cam2_from_cam1 =
-        RefineTwoViewPose(bearings1, bearings2, shared, apparent);
+        RefineTwoViewPose(bearings1, bearings2, rigid, apparent);
     for (const FeatureMatch& match : pair.raw_matches) {
       if (ComputeSampsonErrorPx(bearings1[match.point2D_idx1],
                                 bearings2[match.point2D_idx2],
@@ -90,23 +101,19 @@ class Matcher {
     const Eigen::Vector3d center2 =
         candidate.apparent_cam2_from_world.TargetOriginInSource();
     for (const auto& [landmark, point1] : index1) {
+      const bool is_on_car = landmark < 0;
+      if (is_on_car && candidate.IsAlias()) continue;
       const int wanted =
-          candidate.is_alias ? map_.landmarks[landmark].twin : landmark;
-      if (wanted < 0) continue;
+          candidate.IsAlias() ? FindTwin(candidate, landmark) : landmark;
+      if (wanted == kNoTwin) continue;
       const auto found = std::lower_bound(index2.begin(), index2.end(),
                                           std::make_pair(wanted, 0));
       if (found == index2.end() || found->first != wanted) continue;
-      const Eigen::Vector3d& position =
-          map_.landmarks[landmark].position_in_world;
-      const double distance1 = (position - center1).norm();
-      const double distance2 = (position - center2).norm();
-      if (distance1 > kMaxScaleRatio * distance2 ||
-          distance2 > kMaxScaleRatio * distance1 ||
-          AngleBetweenRad(position - center1, position - center2) >
-              kMaxViewAngle) {
+      if (!is_on_car && !LooksSame(map_.landmarks[landmark].position_in_world,
+                                   center1, center2)) {
         continue;
       }
-      const double rate = candidate.is_alias ? kAliasMatchRate : kMatchRate;
+      const double rate = candidate.IsAlias() ? kAliasMatchRate : kMatchRate;
       if (random->Uniform(0.0, 1.0) > rate) continue;
       matches.push_back({static_cast<point2D_t>(point1),
                          static_cast<point2D_t>(found->second)});
@@ -114,9 +121,89 @@ class Matcher {
     return matches;
   }
 
-  // Joins keypoints at random that have no match yet.
+  // The motion of the rigid body, the town or a car, that carries most of the
+  // matches, and these.
+  Rigid3d FindApparentMotion(const PairCandidate& candidate,
+                             const std::vector<FeatureMatch>& matches,
+                             std::vector<FeatureMatch>* rigid) const {
+    const SyntheticImage& image1 = world_.images[candidate.first];
+    const SyntheticImage& image2 = world_.images[candidate.second];
+    std::map<int, std::vector<FeatureMatch>> by_body;
+    for (const FeatureMatch& match : matches) {
+      const int point = image1.car_point_ids.empty()
+                            ? -1
+                            : image1.car_point_ids[match.point2D_idx1];
+      by_body[point < 0 ? -1 : CarOfPoint(point)].push_back(match);
+    }
+    int body = -1;
+    for (const auto& [other, its_matches] : by_body) {
+      if (its_matches.size() > by_body[body].size()) body = other;
+    }
+    *rigid = by_body[body];
+    if (body >= 0) {
+      return ComputeCam2FromCam1(image1.cam_from_car[body],
+                                 image2.cam_from_car[body]);
+    }
+    return ComputeCam2FromCam1(image1.cam_from_world,
+                               candidate.apparent_cam2_from_world);
+  }
+
+  static bool LooksSame(const Eigen::Vector3d& position,
+                        const Eigen::Vector3d& center1,
+                        const Eigen::Vector3d& center2) {
+    const double distance1 = (position - center1).norm();
+    const double distance2 = (position - center2).norm();
+    return distance1 <= kMaxScaleRatio * distance2 &&
+           distance2 <= kMaxScaleRatio * distance1 &&
+           AngleBetweenRad(position - center1, position - center2) <=
+               kMaxViewAngle;
+  }
+
+  // The landmark that lies to street 2 of the candidate as this one does to
+  // street 1, in a street that looks the same.
+  int FindTwin(const PairCandidate& candidate, int landmark) const {
+    const Street& street1 = grid_.streets[candidate.street1];
+    const Street& street2 = grid_.streets[candidate.street2];
+    const int index = map_.StreetOf(landmark);
+    const Street& street = grid_.streets[index];
+    const auto moved = [&](double u) {
+      const Eigen::Vector3d place =
+          street.WorldFromLocal(Eigen::Vector3d(u, 0.0, 0.0));
+      return street2.WorldFromLocal(street1.LocalFromWorld(place));
+    };
+    const Eigen::Vector3d begin = moved(0.0);
+    const Eigen::Vector3d end = moved(kBlockSize);
+    for (int k = street.twin; k >= 0 && k != index; k = grid_.streets[k].twin) {
+      const Street& twin = grid_.streets[k];
+      const auto place = [&twin](double u) {
+        return twin.WorldFromLocal(Eigen::Vector3d(u, 0.0, 0.0));
+      };
+      if ((place(0.0) - begin).norm() < 1.0 &&
+          (place(kBlockSize) - end).norm() < 1.0) {
+        return landmark - map_.street_begin[index] + map_.street_begin[k];
+      }
+    }
+    return kNoTwin;
+  }
+
+  // Right matches go where too few keypoints would be free for the wrong ones.
+  void LeaveRoomForOutliers(const PairCandidate& candidate, Random* random,
+                            std::vector<FeatureMatch>* matches) const {
+    const size_t num_keypoints = std::min(indices_[candidate.first].size(),
+                                          indices_[candidate.second].size());
+    const size_t max_num_right = static_cast<size_t>(
+        (1.0 - world_.options.outlier_match_ratio) * num_keypoints);
+    if (matches->size() <= max_num_right) return;
+    random->Shuffle(matches);
+    matches->resize(max_num_right);
+    std::sort(matches->begin(), matches->end());
+  }
+
+  // Joins keypoints at random that have no match yet, so that the share of
+  // wrong matches is that of the options.
   void AddOutliers(const PairCandidate& candidate, Random* random,
                    std::vector<FeatureMatch>* matches) const {
+    const double ratio = world_.options.outlier_match_ratio;
     std::vector<bool> used1(indices_[candidate.first].size(), false);
     std::vector<bool> used2(indices_[candidate.second].size(), false);
     for (const FeatureMatch& match : *matches) {
@@ -132,7 +219,6 @@ class Matcher {
     }
     random->Shuffle(&free1);
     random->Shuffle(&free2);
-    const double ratio = world_.options.outlier_match_ratio;
     const size_t num = std::min({static_cast<size_t>(std::lround(
                                      ratio / (1.0 - ratio) * matches->size())),
                                  free1.size(), free2.size()});
@@ -140,9 +226,10 @@ class Matcher {
     std::sort(matches->begin(), matches->end());
   }
 
+  const StreetGrid& grid_;
   const LandmarkMap& map_;
   const SyntheticWorld& world_;
-  // By image: (landmark, keypoint), sorted.
+  // By image: (landmark, or -1 - point of a car, and keypoint), sorted.
   std::vector<std::vector<std::pair<int, int>>> indices_;
   std::vector<std::vector<Bearing>> bearings_;
 };
@@ -160,38 +247,59 @@ void MatchAll(const Matcher& matcher,
   }
 }
 
-// Look-alike pairs until they make up the share asked for.
-void MatchAliases(const Matcher& matcher, const StreetGrid& grid,
-                  const SyntheticWorld& world,
-                  std::map<ImagePair, SyntheticPair>* pairs) {
-  const double ratio = world.options.alias_pair_ratio;
-  const int num_wanted =
-      static_cast<int>(std::lround(ratio / (1.0 - ratio) * pairs->size()));
+// Of so many true pairs, when the wrong ones shall make up a share of all.
+int NumWrongPairs(const SyntheticWorldOptions& options, double ratio,
+                  size_t num_true_pairs) {
+  const double true_ratio =
+      1.0 - options.alias_pair_ratio - options.spurious_pair_ratio;
+  return static_cast<int>(std::lround(ratio / true_ratio * num_true_pairs));
+}
+
+// Look-alike pairs until there are so many. Returns how many were found.
+int MatchAliases(const Matcher& matcher, const StreetGrid& grid,
+                 const SyntheticWorld& world, int num_wanted,
+                 std::map<ImagePair, SyntheticPair>* pairs) {
   Random random = MakeRandom(world.options.seed, 11);
   int num_found = 0;
+  if (num_wanted == 0) return num_found;
   for (const PairCandidate& candidate : FindAliases(grid, world, &random)) {
-    if (num_found >= num_wanted) return;
+    if (num_found >= num_wanted) break;
     std::optional<SyntheticPair> pair = matcher.Match(candidate);
     if (!pair) continue;
     const ImagePair key(pair->image_id1, pair->image_id2);
     if (pairs->emplace(key, std::move(*pair)).second) ++num_found;
   }
+  return num_found;
 }
 
 }  // namespace
 
-void MatchImages(const StreetGrid& grid, const LandmarkMap& map,
-                 const std::vector<double>& arc_lengths_m,
-                 SyntheticWorld* world) {
-  const Matcher matcher(map, *world);
+double MatchImages(const StreetGrid& grid, const LandmarkMap& map,
+                   const std::vector<double>& arc_lengths_m,
+                   SyntheticWorld* world) {
+  const SyntheticWorldOptions& options = world->options;
+  const Matcher matcher(grid, map, *world);
   std::vector<PairCandidate> candidates = FindSequentialPairs(*world);
   const std::vector<PairCandidate> revisits =
       FindRevisits(*world, arc_lengths_m);
   candidates.insert(candidates.end(), revisits.begin(), revisits.end());
   std::map<ImagePair, SyntheticPair> pairs;
   MatchAll(matcher, candidates, &pairs);
-  MatchAliases(matcher, grid, *world, &pairs);
+  const size_t num_true_pairs = pairs.size();
+  const int num_aliases =
+      NumWrongPairs(options, options.alias_pair_ratio, num_true_pairs);
+  const int num_found =
+      MatchAliases(matcher, grid, *world, num_aliases, &pairs);
+  AddSpuriousPairs(
+      *world,
+      NumWrongPairs(options, options.spurious_pair_ratio, num_true_pairs),
+      &pairs);
+  SpoilRotations(options, &pairs);
+  world->pairs.clear();
   for (auto& [key, pair] : pairs) world->pairs.push_back(std::move(pair));
+  if (num_found == num_aliases) return options.alias_pair_ratio;
+  return (1.0 - options.spurious_pair_ratio) * num_found /
+         (num_found + num_true_pairs);
 }
 
 }  // namespace adasfm

@@ -9,10 +9,12 @@
 
 namespace adasfm {
 
-// Matches the images: neighbours in the sequence, places seen again, and
-// look-alike places. arc_lengths_m: how far the car had driven, by image.
-void MatchImages(const StreetGrid& grid, const LandmarkMap& map,
-                 const std::vector<double>& arc_lengths_m,
-                 SyntheticWorld* world);
+// Matches the images: neighbours in the sequence, places seen again, look-alike
+// places, and images with nothing in common. arc_lengths_m: how far the car had
+// driven, by image. Returns the share of look-alike pairs that was reached,
+// that of the options or the largest possible one.
+double MatchImages(const StreetGrid& grid, const LandmarkMap& map,
+                   const std::vector<double>& arc_lengths_m,
+                   SyntheticWorld* world);
 
 }  // namespace adasfm

@@ -15,6 +15,13 @@ constexpr double kFacadeDensity = 7.0;
 constexpr int kNumPolesPerSide = 5;
 constexpr int kNumPointsPerPole = 12;
 constexpr double kGroundDensity = 2.0;  // per metre of street
+constexpr double kFacadeTop = 9.0;      // m
+// Above the road, about.
+constexpr double kCameraHeight = 1.2;
+// The yard around the lanes, m.
+constexpr double kLawnMargin = 6.0;
+constexpr double kLawnDensity = 1.0;  // per square metre
+constexpr double kPostSpacing = 6.0;  // m, on average
 // Share of the visible features that the detector finds in an image.
 constexpr double kDetectionRate = 0.8;
 // A facade seen at a flatter angle than this shows no features.
@@ -23,9 +30,11 @@ constexpr double kImageBorder = 3.0;  // px
 
 class StreetLandmarks {
  public:
-  StreetLandmarks(const Street& street, double density, LandmarkMap* map)
+  StreetLandmarks(const Street& street, double density, double height,
+                  LandmarkMap* map)
       : street_(street),
         density_(density),
+        height_(height),
         random_(MakeRandom(street.layout_seed, 4)),
         map_(map) {}
 
@@ -47,7 +56,7 @@ class StreetLandmarks {
       const double relief = random_.Uniform(0.0, 0.4);
       const Eigen::Vector3d uvz(random_.Uniform(begin, end),
                                 side * (kStreetHalfWidth - relief),
-                                random_.Uniform(0.2, 9.0));
+                                random_.Uniform(0.2, height_));
       Add(uvz, -side, random_.Uniform(15.0, kMaxViewDistance));
     }
   }
@@ -60,7 +69,7 @@ class StreetLandmarks {
       for (int i = 0; i < num; ++i) {
         Add(Eigen::Vector3d(u + random_.Uniform(-0.1, 0.1),
                             v + random_.Uniform(-0.1, 0.1),
-                            random_.Uniform(0.2, 6.0)),
+                            random_.Uniform(0.2, std::min(6.0, height_))),
             0, random_.Uniform(10.0, 40.0));
       }
     }
@@ -89,6 +98,79 @@ class StreetLandmarks {
 
   const Street& street_;
   double density_;
+  double height_;
+  Random random_;
+  LandmarkMap* map_;
+};
+
+// A lawn with a fence of posts, in a yard of facades.
+class LawnLandmarks {
+ public:
+  LawnLandmarks(const SyntheticWorldOptions& options, double density,
+                LandmarkMap* map)
+      : low_(-kLawnMargin, -kLawnMargin),
+        high_(options.lane_length_m + kLawnMargin,
+              (NumLanes(options) - 1) * options.lane_spacing_m + kLawnMargin),
+        density_(density),
+        random_(MakeRandom(options.seed, 4)),
+        map_(map) {}
+
+  void Build() {
+    for (const int axis : {0, 1}) {
+      for (const int side : {-1, 1}) AddWall(axis, side);
+    }
+    const Eigen::Vector2d size = high_ - low_;
+    const int num = std::lround(density_ * kLawnDensity * size.x() * size.y());
+    for (int i = 0; i < num; ++i) {
+      const double x = random_.Uniform(low_.x(), high_.x());
+      Add(Eigen::Vector3d(x, random_.Uniform(low_.y(), high_.y()), 0.0),
+          Eigen::Vector2d::Zero(), random_.Uniform(4.0, 12.0));
+    }
+  }
+
+ private:
+  // At the low or high end of an axis, with posts 1 m before it.
+  void AddWall(int axis, int side) {
+    const double begin = low_[1 - axis];
+    const double end = high_[1 - axis];
+    Eigen::Vector2d normal = Eigen::Vector2d::Zero();
+    normal[axis] = -side;
+    const auto place = [&](double along, double before, double z) {
+      Eigen::Vector3d position(0.0, 0.0, z);
+      position[axis] = (side > 0 ? high_ : low_)[axis] - side * before;
+      position[1 - axis] = along;
+      return position;
+    };
+    const int num = std::lround(density_ * kFacadeDensity * (end - begin));
+    for (int i = 0; i < num; ++i) {
+      const double along = random_.Uniform(begin, end);
+      const double relief = random_.Uniform(0.0, 0.4);
+      Add(place(along, relief, random_.Uniform(0.2, 9.0)), normal,
+          random_.Uniform(15.0, kMaxViewDistance));
+    }
+    const int num_posts = std::lround((end - begin) / kPostSpacing);
+    for (int post = 0; post < num_posts; ++post) {
+      const double along = random_.Uniform(begin, end);
+      for (int i = 0; i < std::lround(density_ * kNumPointsPerPole); ++i) {
+        const double dx = random_.Uniform(-0.1, 0.1);
+        Add(place(along + dx, 1.0, random_.Uniform(0.1, 2.0)),
+            Eigen::Vector2d::Zero(), random_.Uniform(10.0, 40.0));
+      }
+    }
+  }
+
+  void Add(const Eigen::Vector3d& position, const Eigen::Vector2d& normal,
+           double max_distance) {
+    Landmark landmark;
+    landmark.position_in_world = position;
+    landmark.normal = normal;
+    landmark.max_distance = max_distance;
+    landmark.strength = random_.Uniform(0.0, 1.0);
+    map_->landmarks.push_back(landmark);
+  }
+
+  Eigen::Vector2d low_, high_;
+  double density_;
   Random random_;
   LandmarkMap* map_;
 };
@@ -99,7 +181,8 @@ class Observer {
            const SyntheticWorld& world)
       : grid_(grid), map_(map), world_(world) {}
 
-  void Observe(SyntheticImage* image) const {
+  void Observe(int max_num_keypoints, const ExposurePoses* exposure,
+               SyntheticImage* image) const {
     Random random = MakeRandom(world_.options.seed, 5, image->image_id);
     struct Seen {
       int landmark;
@@ -126,12 +209,13 @@ class Observer {
       return strength_a != strength_b ? strength_a > strength_b
                                       : a.landmark < b.landmark;
     });
-    if (seen.size() > world_.options.num_keypoints_per_image) {
-      seen.resize(world_.options.num_keypoints_per_image);
+    if (static_cast<int>(seen.size()) > max_num_keypoints) {
+      seen.resize(max_num_keypoints);
     }
     random.Shuffle(&seen);
     const double sigma = world_.options.pixel_noise_px;
-    for (const Seen& s : seen) {
+    for (Seen& s : seen) {
+      if (exposure != nullptr) RollShutter(*exposure, s.landmark, &s.pixel);
       const double noise_x = random.Gaussian(sigma);
       image->keypoints.emplace_back(s.pixel.x() + noise_x,
                                     s.pixel.y() + random.Gaussian(sigma));
@@ -140,7 +224,14 @@ class Observer {
   }
 
  private:
-  static bool IsNear(const Street& street, const Eigen::Vector3d& center) {
+  bool IsNear(const Street& street, const Eigen::Vector3d& center) const {
+    if (IsOnLawn(world_.options)) return true;
+    // Floors lie between those of a car park.
+    if (world_.options.trajectory == SyntheticTrajectory::kFloors &&
+        std::abs(street.HeightAt(0.5 * kBlockSize) + kCameraHeight -
+                 center.z()) > 0.5 * world_.options.floor_height_m) {
+      return false;
+    }
     const Eigen::Vector3d uvz = street.LocalFromWorld(center);
     return std::abs(uvz.x() - 0.5 * kBlockSize) <
                0.5 * kBlockSize + kMaxViewDistance &&
@@ -168,8 +259,27 @@ class Observer {
         pixel->y() > camera.height - kImageBorder) {
       return false;
     }
-    return HasLineOfSight(center.head<2>(),
+    return IsOnLawn(world_.options) ||
+           HasLineOfSight(center.head<2>(),
                           landmark.position_in_world.head<2>());
+  }
+
+  // Moves the pixel to where it is when its row is read.
+  void RollShutter(const ExposurePoses& exposure, int landmark,
+                   Eigen::Vector2d* pixel) const {
+    const Rigid3d& first = exposure.first_cam_from_world;
+    const Rigid3d& last = exposure.last_cam_from_world;
+    // Converges by the motion over one image height per round.
+    for (int round = 0; round < 4; ++round) {
+      const double share = pixel->y() / world_.camera.height;
+      const Rigid3d cam_from_world =
+          CamFromWorldWithCenter(first.rotation.slerp(share, last.rotation),
+                                 (1.0 - share) * first.TargetOriginInSource() +
+                                     share * last.TargetOriginInSource());
+      ProjectPoint(world_.camera,
+                   cam_from_world * map_.landmarks[landmark].position_in_world,
+                   pixel);
+    }
   }
 
   const StreetGrid& grid_;
@@ -183,28 +293,36 @@ LandmarkMap BuildLandmarks(const SyntheticWorldOptions& options,
                            const StreetGrid& grid) {
   LandmarkMap map;
   const double density = options.num_keypoints_per_image / 300.0;
+  const bool has_floors = options.trajectory == SyntheticTrajectory::kFloors;
+  const double height =
+      has_floors ? std::min(kFacadeTop, options.floor_height_m) : kFacadeTop;
   for (const Street& street : grid.streets) {
     map.street_begin.push_back(static_cast<int>(map.landmarks.size()));
-    StreetLandmarks(street, density, &map).Build();
-  }
-  map.street_begin.push_back(static_cast<int>(map.landmarks.size()));
-  for (size_t i = 0; i < grid.streets.size(); ++i) {
-    if (grid.streets[i].twin < 0) continue;
-    const int offset =
-        map.street_begin[grid.streets[i].twin] - map.street_begin[i];
-    for (int k = map.street_begin[i]; k < map.street_begin[i + 1]; ++k) {
-      map.landmarks[k].twin = k + offset;
+    if (IsOnLawn(options)) {
+      LawnLandmarks(options, density, &map).Build();
+    } else {
+      StreetLandmarks(street, density, height, &map).Build();
     }
   }
+  map.street_begin.push_back(static_cast<int>(map.landmarks.size()));
   return map;
 }
 
+int LandmarkMap::StreetOf(int landmark) const {
+  return static_cast<int>(
+      std::upper_bound(street_begin.begin(), street_begin.end(), landmark) -
+      street_begin.begin() - 1);
+}
+
 void ObserveLandmarks(const StreetGrid& grid, const LandmarkMap& map,
-                      const std::vector<bool>& is_blacked_out,
+                      const std::vector<int>& max_num_keypoints,
+                      const std::vector<ExposurePoses>& exposures,
                       SyntheticWorld* world) {
   const Observer observer(grid, map, *world);
   ParallelFor(-1, world->images.size(), [&](size_t i) {
-    if (!is_blacked_out[i]) observer.Observe(&world->images[i]);
+    observer.Observe(max_num_keypoints[i],
+                     exposures.empty() ? nullptr : &exposures[i],
+                     &world->images[i]);
   });
 }
 

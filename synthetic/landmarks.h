@@ -19,25 +19,34 @@ struct Landmark {
   double max_distance = 0.0;
   // Stronger features win where an image has more than it may keep.
   double strength = 0.0;
-  // The landmark that looks the same in the twin street, or -1.
-  int twin = -1;
 };
 
 // All landmarks of the streets; those of street i are the indices
-// [street_begin[i], street_begin[i + 1]).
+// [street_begin[i], street_begin[i + 1]), in the same order in all streets that
+// look alike.
 struct LandmarkMap {
   std::vector<Landmark> landmarks;
   std::vector<int> street_begin;
+
+  int StreetOf(int landmark) const;
 };
 
 LandmarkMap BuildLandmarks(const SyntheticWorldOptions& options,
                            const StreetGrid& grid);
 
-// Fills the keypoints of all images from their poses: what the camera sees,
-// neither hidden nor too far, the strongest first, with noise. Blacked-out
-// images stay empty.
+// Where the camera is while an image's rows are read, from the first to the
+// last one.
+struct ExposurePoses {
+  Rigid3d first_cam_from_world;
+  Rigid3d last_cam_from_world;
+};
+
+// Fills the keypoints of all images: what the camera sees, neither hidden nor
+// too far, the strongest first, with noise; at most max_num_keypoints[i] of
+// image i. exposures: of all images, or none for a global shutter.
 void ObserveLandmarks(const StreetGrid& grid, const LandmarkMap& map,
-                      const std::vector<bool>& is_blacked_out,
+                      const std::vector<int>& max_num_keypoints,
+                      const std::vector<ExposurePoses>& exposures,
                       SyntheticWorld* world);
 
 }  // namespace adasfm

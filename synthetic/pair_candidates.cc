@@ -19,10 +19,23 @@ constexpr double kMaxAliasOffset = 8.0;
 constexpr double kMinAliasDistance = 45.0;
 constexpr size_t kNumAliasNeighbors = 5;
 constexpr size_t kAliasRunLength = 14;
+// Above the road, about.
+constexpr double kCameraHeight = 1.2;
+
+// How far the car has driven between two visits.
+double RevisitDistance(const SyntheticWorldOptions& options) {
+  return IsOnLawn(options) ? options.lane_length_m : kRevisitDistance;
+}
+
+double MinAliasDistance(const SyntheticWorldOptions& options) {
+  return options.trajectory == SyntheticTrajectory::kFloors
+             ? 0.8 * options.floor_height_m
+             : kMinAliasDistance;
+}
 
 PairCandidate TrueCandidate(const SyntheticWorld& world, int first,
                             int second) {
-  return {first, second, false, world.images[second].cam_from_world};
+  return {first, second, -1, -1, world.images[second].cam_from_world};
 }
 
 // The images in a street, driven in the street's direction: (u, image).
@@ -36,6 +49,7 @@ std::vector<std::pair<double, int>> ImagesInStreet(const SyntheticWorld& world,
     const Eigen::Vector3d forward =
         pose.rotation.conjugate() * Eigen::Vector3d::UnitZ();
     if (uvz.x() > -10.0 && uvz.x() < kBlockSize && std::abs(uvz.y()) < 3.0 &&
+        std::abs(uvz.z() - kCameraHeight) < kCameraHeight &&
         forward.head<2>().dot(street.Direction()) > 0.9) {
       images.emplace_back(uvz.x(), static_cast<int>(i));
     }
@@ -59,10 +73,12 @@ Rigid3d MoveToTwin(const Rigid3d& cam_from_world, const Street& street,
 }
 
 // Candidates of one pair of twins, a run of neighbouring images first.
-void FindTwinAliases(const SyntheticWorld& world, const Street& street,
-                     const Street& twin, Random* random,
+void FindTwinAliases(const StreetGrid& grid, const SyntheticWorld& world,
+                     int street_index, int twin_index, Random* random,
                      std::vector<PairCandidate>* run,
                      std::vector<PairCandidate>* rest) {
+  const Street& street = grid.streets[street_index];
+  const Street& twin = grid.streets[twin_index];
   const auto here = ImagesInStreet(world, street);
   const auto there = ImagesInStreet(world, twin);
   if (here.empty() || there.empty()) return;
@@ -77,7 +93,7 @@ void FindTwinAliases(const SyntheticWorld& world, const Street& street,
            world.images[other].cam_from_world.TargetOriginInSource())
               .norm();
       if (std::abs(other_u - u) < kMaxAliasOffset &&
-          distance > kMinAliasDistance) {
+          distance > MinAliasDistance(world.options)) {
         near.emplace_back(std::abs(other_u - u), other);
       }
     }
@@ -85,13 +101,16 @@ void FindTwinAliases(const SyntheticWorld& world, const Street& street,
     for (size_t rank = 0; rank < near.size(); ++rank) {
       const int other = near[rank].second;
       // Camera 1 is the earlier image, and camera 2 sees itself in its street.
+      const bool is_first_here = image < other;
       PairCandidate candidate{std::min(image, other), std::max(image, other),
-                              true, Rigid3d()};
-      const bool is_first_here = candidate.first == image;
+                              is_first_here ? street_index : twin_index,
+                              is_first_here ? twin_index : street_index,
+                              Rigid3d()};
       candidate.apparent_cam2_from_world = MoveToTwin(
           world.images[candidate.second].cam_from_world,
           is_first_here ? twin : street, is_first_here ? street : twin);
-      const bool in_run = k >= begin && k < begin + kAliasRunLength &&
+      const bool in_run = (IsPeriodic(world.options) ||
+                           (k >= begin && k < begin + kAliasRunLength)) &&
                           rank < kNumAliasNeighbors;
       (in_run ? run : rest)->push_back(candidate);
     }
@@ -120,6 +139,7 @@ std::vector<PairCandidate> FindRevisits(
     return std::make_pair<int, int>(std::floor(center.x() / kRevisitRadius),
                                     std::floor(center.y() / kRevisitRadius));
   };
+  const double min_way_m = RevisitDistance(world.options);
   std::vector<PairCandidate> candidates;
   for (size_t i = 0; i < world.images.size(); ++i) {
     const Rigid3d& pose = world.images[i].cam_from_world;
@@ -132,7 +152,7 @@ std::vector<PairCandidate> FindRevisits(
           const Rigid3d& other = world.images[j].cam_from_world;
           const double distance =
               (center - other.TargetOriginInSource()).norm();
-          if (arc_lengths_m[i] - arc_lengths_m[j] > kRevisitDistance &&
+          if (arc_lengths_m[i] - arc_lengths_m[j] > min_way_m &&
               distance < kRevisitRadius &&
               AngleBetweenRad(pose.rotation, other.rotation) < kMaxViewAngle) {
             near.emplace_back(distance, j);
@@ -156,13 +176,21 @@ std::vector<PairCandidate> FindAliases(const StreetGrid& grid,
                                        const SyntheticWorld& world,
                                        Random* random) {
   std::vector<PairCandidate> runs, rest;
-  for (size_t i = 0; i < grid.streets.size(); ++i) {
-    const int twin = grid.streets[i].twin;
-    if (twin < static_cast<int>(i)) continue;
-    FindTwinAliases(world, grid.streets[i], grid.streets[twin], random, &runs,
-                    &rest);
+  const int num_streets = static_cast<int>(grid.streets.size());
+  for (int i = 0; i < num_streets; ++i) {
+    if (!grid.streets[i].is_driven || grid.streets[i].twin < 0) continue;
+    for (int j = i + 1; j < num_streets; ++j) {
+      if (!grid.streets[j].is_driven ||
+          grid.streets[j].layout_seed != grid.streets[i].layout_seed) {
+        continue;
+      }
+      FindTwinAliases(grid, world, i, j, random, &runs, &rest);
+    }
   }
   runs.insert(runs.end(), rest.begin(), rest.end());
+  if (IsPeriodic(world.options)) {
+    random->Shuffle(&runs);
+  }
   return runs;
 }
 

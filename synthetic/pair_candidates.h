@@ -17,10 +17,14 @@ inline constexpr double kMaxViewAngle = DegToRad(35.0);
 // Two images that may match, by index; the first is the earlier one.
 struct PairCandidate {
   int first, second;
-  bool is_alias = false;
+  // The streets that look alike, of an alias.
+  int street1 = -1;
+  int street2 = -1;
   // Where camera 2 seems to be: its pose relative to the landmarks that look
-  // like those which camera 1 sees. The true one unless is_alias.
+  // like those which camera 1 sees. The true one unless it is an alias.
   Rigid3d apparent_cam2_from_world;
+
+  bool IsAlias() const { return street1 >= 0; }
 };
 
 // Each image with the next ones.
@@ -31,8 +35,9 @@ std::vector<PairCandidate> FindSequentialPairs(const SyntheticWorld& world);
 std::vector<PairCandidate> FindRevisits(
     const SyntheticWorld& world, const std::vector<double>& arc_lengths_m);
 
-// Images at corresponding places of twin streets: of each pair of twins first
-// a run of neighbouring images, and after all runs the rest.
+// Images at corresponding places of streets that look alike. In a town of each
+// pair of streets first a run of neighbouring images, and after all runs the
+// rest; parallel streets and floors in random order, all along.
 std::vector<PairCandidate> FindAliases(const StreetGrid& grid,
                                        const SyntheticWorld& world,
                                        Random* random);

@@ -107,7 +107,7 @@ WallHit FindWall(const Eigen::Vector2d& from,
 }  // namespace
 
 WorldRenderer::WorldRenderer(const SyntheticWorld& world)
-    : world_(world), grid_(BuildStreetGrid(world.options)) {
+    : world_(world), grid_(BuildStreetGrid(world.options, world.num_twins)) {
   const SyntheticCamera& camera = world.camera;
   rays_in_cam_.reserve(camera.width * camera.height);
   for (int y = 0; y < camera.height; ++y) {
@@ -123,18 +123,18 @@ WorldRenderer::WorldRenderer(const SyntheticWorld& world)
 
 const Street& WorldRenderer::StreetBetween(const GridNode& a,
                                            const GridNode& b) {
-  const auto key = StreetKey(a, b);
-  const auto found = grid_.street_from_key.find(key);
-  if (found != grid_.street_from_key.end()) {
+  const StreetId id = MakeStreetId(a, b);
+  const auto found = grid_.street_from_id.find(id);
+  if (found != grid_.street_from_id.end()) {
     return grid_.streets[found->second];
   }
   // A street far from the route.
-  Street& street = far_streets_[key];
-  street.from = key.first;
-  street.to = key.second;
-  const uint64_t place = static_cast<uint64_t>(key.first[0] + 100000) * 400009 +
-                         2 * (key.first[1] + 100000) +
-                         (key.first[0] != key.second[0]);
+  Street& street = far_streets_[id];
+  street.from = std::get<1>(id);
+  street.to = std::get<2>(id);
+  const uint64_t place =
+      static_cast<uint64_t>(street.from[0] + 100000) * 400009 +
+      2 * (street.from[1] + 100000) + (street.from[0] != street.to[0]);
   street.layout_seed = place;
   return street;
 }

@@ -54,7 +54,7 @@ class WorldRenderer {
   const SyntheticWorld& world_;
   StreetGrid grid_;
   std::vector<PixelRay> rays_in_cam_;
-  std::map<std::pair<GridNode, GridNode>, Street> far_streets_;
+  std::map<StreetId, Street> far_streets_;
   std::map<std::tuple<uint64_t, int>, Facade> facades_;
   std::map<uint64_t, MipTexture> roads_;
   std::map<GridNode, MipTexture> crossings_;

@@ -20,4 +20,7 @@ void SimulateImu(const Drive& drive, double end_s, SyntheticWorld* world);
 void SimulateWheels(const Drive& drive, double first_image_s, double end_s,
                     SyntheticWorld* world);
 
+// Positions of a receiver at options.gnss_rate_hz, with noise and jumps.
+void SimulateGnss(const Drive& drive, double end_s, SyntheticWorld* world);
+
 }  // namespace adasfm

@@ -3,8 +3,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <set>
-#include <stdexcept>
 
 namespace adasfm {
 namespace {
@@ -14,151 +14,163 @@ constexpr double kMinTwinDistance = 55.0;
 // About as many look-alike image pairs come from one pair of streets.
 constexpr int kNumAliasPairsPerTwin = 70;
 
-int NumRouteNodes(const SyntheticWorldOptions& options) {
-  const double length = options.spacing_m * options.num_images + 100.0;
-  // Bends cut corners: a street is driven in a little less than its length.
-  return static_cast<int>(std::ceil(length / (kBlockSize - 5.0))) + 3;
+// At street i of the route the car is so high.
+double HeightAtNode(const SyntheticWorldOptions& options, size_t i) {
+  return options.trajectory == SyntheticTrajectory::kFloors
+             ? 0.25 * i * options.floor_height_m
+             : 0.0;
 }
 
-Route BuildStraightRoute(int num_nodes) {
-  Route route;
-  for (int i = 0; i < num_nodes; ++i) route.nodes.push_back({i, 0});
-  return route;
-}
-
-// A walk that never turns back, in a town of a size that the walk has to come
-// back to streets driven before. It likes to meet its own way, follows it for
-// one or two streets, and leaves it again.
-class TownWalk {
+class StreetBuilder {
  public:
-  TownWalk(int num_nodes, Random* random)
-      : num_nodes_(num_nodes),
-        size_(std::max(
-            3, static_cast<int>(std::lround(std::sqrt(0.5 * num_nodes))))),
-        random_(random) {}
+  StreetBuilder(const SyntheticWorldOptions& options, Random* random,
+                StreetGrid* grid)
+      : options_(options), random_(*random), grid_(*grid) {}
 
-  Route Build() {
-    Route route;
-    GridNode node = {0, 0};
-    GridNode step = {0, 1};
-    route.nodes.push_back(node);
-    while (static_cast<int>(route.nodes.size()) < num_nodes_) {
-      const GridNode next = {node[0] + step[0], node[1] + step[1]};
-      const bool is_repeat = !driven_.insert({node, next}).second;
-      num_repeats_ = is_repeat ? num_repeats_ + 1 : 0;
-      visited_.insert(node);
-      node = next;
-      route.nodes.push_back(node);
-      step = ChooseStep(node, step);
+  void Build() {
+    const std::vector<GridNode>& nodes = grid_.route.nodes;
+    if (options_.trajectory == SyntheticTrajectory::kFloors) {
+      for (size_t i = 0; i + 1 < nodes.size(); ++i) AddFloorStreets(i);
+      return;
     }
-    return route;
+    for (size_t i = 0; i + 1 < nodes.size(); ++i) {
+      Add(nodes[i], nodes[i + 1], 0);
+      grid_.streets.back().is_driven = true;
+    }
+    // All streets within view of the route.
+    std::set<GridNode> near;
+    for (const GridNode& node : nodes) {
+      for (int dx = -1; dx <= 1; ++dx) {
+        for (int dy = -1; dy <= 1; ++dy) {
+          near.insert({node[0] + dx, node[1] + dy});
+        }
+      }
+    }
+    for (const GridNode& node : near) {
+      for (const GridNode& step : kSteps) {
+        Add(node, {node[0] + step[0], node[1] + step[1]}, 0);
+      }
+    }
   }
 
  private:
-  GridNode ChooseStep(const GridNode& node, const GridNode& step) {
-    std::vector<GridNode> choices;
-    for (const GridNode& choice :
-         {step, GridNode{-step[1], step[0]}, GridNode{step[1], -step[0]}}) {
-      const GridNode next = {node[0] + choice[0], node[1] + choice[1]};
-      if (std::min(next[0], next[1]) < 0 ||
-          std::max(next[0], next[1]) >= size_) {
-        continue;
-      }
-      int weight = visited_.count(next) > 0 ? 3 : 1;
-      if (driven_.count({node, next}) > 0) weight = num_repeats_ < 2 ? 10 : 1;
-      choices.insert(choices.end(), weight, choice);
+  static constexpr GridNode kSteps[] = {{-1, 0}, {1, 0}, {0, -1}, {0, 1}};
+
+  Street* Add(const GridNode& from, const GridNode& to, int level) {
+    const StreetId id = MakeStreetId(from, to, level);
+    if (!grid_.street_from_id.emplace(id, grid_.streets.size()).second) {
+      return nullptr;
     }
-    return choices[random_->UniformInt(0, choices.size() - 1)];
+    Street street;
+    street.from = from;
+    street.to = to;
+    street.layout_seed = random_.UniformInt(0, int64_t{1} << 62);
+    grid_.streets.push_back(street);
+    return &grid_.streets.back();
   }
 
-  int num_nodes_;
-  int size_;
-  Random* random_;
-  std::set<GridNode> visited_;
-  std::set<std::pair<GridNode, GridNode>> driven_;
-  int num_repeats_ = 0;
+  // Street i of the ramp, and what is seen ahead from its begin.
+  void AddFloorStreets(size_t i) {
+    const GridNode& from = grid_.route.nodes[i];
+    Street* street = Add(from, grid_.route.nodes[i + 1], i);
+    street->is_driven = true;
+    street->height_m = HeightAtNode(options_, i);
+    street->slope =
+        (HeightAtNode(options_, i + 1) - street->height_m) / kBlockSize;
+    for (const GridNode& step : kSteps) {
+      const GridNode to = {from[0] + step[0], from[1] + step[1]};
+      if (std::clamp(to[0], 0, 1) == to[0] &&
+          std::clamp(to[1], 0, 1) == to[1]) {
+        continue;  // a street of the ramp
+      }
+      Add(from, to, i)->height_m = HeightAtNode(options_, i);
+    }
+  }
+
+  const SyntheticWorldOptions& options_;
+  Random& random_;
+  StreetGrid& grid_;
 };
 
-void AddStreet(const GridNode& from, const GridNode& to, bool is_driven,
-               Random* random, StreetGrid* grid) {
-  const auto key = StreetKey(from, to);
-  if (grid->street_from_key.count(key) > 0) return;
-  grid->street_from_key[key] = static_cast<int>(grid->streets.size());
-  Street street;
-  street.from = from;
-  street.to = to;
-  street.is_driven = is_driven;
-  street.layout_seed = random->UniformInt(0, int64_t{1} << 62);
-  grid->streets.push_back(street);
-}
-
-void AddStreets(Random* random, StreetGrid* grid) {
-  const std::vector<GridNode>& nodes = grid->route.nodes;
-  for (size_t i = 0; i + 1 < nodes.size(); ++i) {
-    AddStreet(nodes[i], nodes[i + 1], true, random, grid);
-  }
-  // All streets within view of the route.
-  std::set<GridNode> near;
-  for (const GridNode& node : nodes) {
-    for (int dx = -1; dx <= 1; ++dx) {
-      for (int dy = -1; dy <= 1; ++dy) {
-        near.insert({node[0] + dx, node[1] + dy});
-      }
-    }
-  }
-  for (const GridNode& node : near) {
-    for (const GridNode& step :
-         {GridNode{-1, 0}, GridNode{1, 0}, GridNode{0, -1}, GridNode{0, 1}}) {
-      AddStreet(node, {node[0] + step[0], node[1] + step[1]}, false, random,
-                grid);
-    }
-  }
-}
-
-// How many streets of the route the images certainly reach.
-int NumDrivenStreets(const SyntheticWorldOptions& options,
-                     const StreetGrid& grid) {
+// The streets of the route that the images certainly reach, in its order.
+std::vector<int> ReachedStreets(const SyntheticWorldOptions& options,
+                                const StreetGrid& grid) {
   const int reach = static_cast<int>(options.spacing_m *
                                      (options.num_images - 1) / kBlockSize);
-  std::set<int> streets;
+  std::vector<int> streets;
   for (int i = 0; i < reach; ++i) {
-    streets.insert(grid.street_from_key.at(
-        StreetKey(grid.route.nodes[i], grid.route.nodes[i + 1])));
-  }
-  return static_cast<int>(streets.size());
-}
-
-void MakeTwins(const SyntheticWorldOptions& options, Random* random,
-               StreetGrid* grid) {
-  const double num_alias_pairs = options.alias_pair_ratio * options.num_images *
-                                 options.num_sequential_neighbors;
-  int num_twins =
-      static_cast<int>(std::ceil(num_alias_pairs / kNumAliasPairsPerTwin));
-  if (num_twins == 0) return;
-  // Driven streets come first in the list, in the order of the route.
-  std::vector<int> order(NumDrivenStreets(options, *grid));
-  for (size_t i = 0; i < order.size(); ++i) order[i] = static_cast<int>(i);
-  random->Shuffle(&order);
-  bool has_twins = false;
-  for (const int a : order) {
-    for (const int b : order) {
-      Street& first = grid->streets[a];
-      Street& second = grid->streets[b];
-      if (num_twins == 0 || first.twin >= 0 || second.twin >= 0 || a == b ||
-          (first.Midpoint() - second.Midpoint()).norm() < kMinTwinDistance) {
-        continue;
-      }
-      first.twin = b;
-      second.twin = a;
-      second.layout_seed = first.layout_seed;
-      has_twins = true;
-      --num_twins;
+    const bool has_levels = options.trajectory == SyntheticTrajectory::kFloors;
+    const int street = grid.street_from_id.at(MakeStreetId(
+        grid.route.nodes[i], grid.route.nodes[i + 1], has_levels ? i : 0));
+    if (std::find(streets.begin(), streets.end(), street) == streets.end()) {
+      streets.push_back(street);
     }
   }
-  if (!has_twins) {
-    throw std::invalid_argument(
-        "SyntheticWorldOptions: alias_pair_ratio needs a longer drive, of at "
-        "least three streets of 60 m");
+  return streets;
+}
+
+// Joins the rings of streets that look alike.
+void JoinTwins(int a, int b, std::vector<Street>* streets) {
+  for (const int k : {a, b}) {
+    if ((*streets)[k].twin < 0) (*streets)[k].twin = k;
+  }
+  int k = b;
+  do {
+    (*streets)[k].layout_seed = (*streets)[a].layout_seed;
+    k = (*streets)[k].twin;
+  } while (k != b);
+  std::swap((*streets)[a].twin, (*streets)[b].twin);
+}
+
+// Pairs of streets first, then larger classes. Returns how many were joined.
+int MakeTwins(int num_twins, const std::vector<int>& reached, Random* random,
+              std::vector<Street>* streets) {
+  // Driven streets come first in the list, in the order of the route.
+  std::vector<int> order = reached;
+  std::sort(order.begin(), order.end());
+  random->Shuffle(&order);
+  int num_joined = 0;
+  const auto join_all = [&](auto may_join) {
+    for (const int a : order) {
+      for (const int b : order) {
+        const Street& first = (*streets)[a];
+        const Street& second = (*streets)[b];
+        if (num_joined == num_twins || a == b ||
+            first.layout_seed == second.layout_seed ||
+            !may_join(first, second) ||
+            (first.Midpoint() - second.Midpoint()).norm() < kMinTwinDistance) {
+          continue;
+        }
+        JoinTwins(a, b, streets);
+        ++num_joined;
+      }
+    }
+  };
+  join_all([](const Street& a, const Street& b) {
+    return a.twin < 0 && b.twin < 0;
+  });
+  join_all([](const Street&, const Street&) { return true; });
+  return num_joined;
+}
+
+// Parallel streets, or the floors of a car park: every period-th street of the
+// route, and what branches off there, looks the same.
+void MakePeriodicTwins(const SyntheticWorldOptions& options, StreetGrid* grid) {
+  std::vector<Street>& streets = grid->streets;
+  if (options.trajectory == SyntheticTrajectory::kFloors) {
+    std::map<std::array<GridNode, 2>, int> first;
+    for (size_t i = 0; i < streets.size(); ++i) {
+      const auto [it, is_new] =
+          first.insert({{streets[i].from, streets[i].to}, static_cast<int>(i)});
+      if (!is_new) JoinTwins(it->second, i, &streets);
+    }
+    return;
+  }
+  // One street up or down and the connection behind it.
+  const size_t period = options.street_num_blocks + 1;
+  for (size_t i = period; i + 1 < grid->route.nodes.size(); ++i) {
+    if ((i + 1) % period == 0) continue;
+    JoinTwins(i % period, i, &streets);
   }
 }
 
@@ -193,31 +205,49 @@ Eigen::Vector3d Street::WorldFromLocal(const Eigen::Vector3d& uvz) const {
   const Eigen::Vector2d d = Direction();
   return Eigen::Vector3d(origin.x() + d.x() * uvz.x() - d.y() * uvz.y(),
                          origin.y() + d.y() * uvz.x() + d.x() * uvz.y(),
-                         uvz.z());
+                         uvz.z() + HeightAt(uvz.x()));
 }
 
 Eigen::Vector3d Street::LocalFromWorld(const Eigen::Vector3d& xyz) const {
   const Eigen::Vector2d offset = xyz.head<2>() - Origin();
   const Eigen::Vector2d d = Direction();
-  return Eigen::Vector3d(d.dot(offset), d.x() * offset.y() - d.y() * offset.x(),
-                         xyz.z());
+  const double u = d.dot(offset);
+  return Eigen::Vector3d(u, d.x() * offset.y() - d.y() * offset.x(),
+                         xyz.z() - HeightAt(u));
 }
 
-std::pair<GridNode, GridNode> StreetKey(const GridNode& a, const GridNode& b) {
-  return a < b ? std::make_pair(a, b) : std::make_pair(b, a);
+StreetId MakeStreetId(const GridNode& a, const GridNode& b, int level) {
+  return {level, std::min(a, b), std::max(a, b)};
 }
 
-StreetGrid BuildStreetGrid(const SyntheticWorldOptions& options) {
+StreetGrid BuildStreetGrid(const SyntheticWorldOptions& options,
+                           int num_twins) {
   StreetGrid grid;
   Random random = MakeRandom(options.seed, 1);
-  const int num_nodes = NumRouteNodes(options);
-  grid.route = options.trajectory == SyntheticTrajectory::kStraight
-                   ? BuildStraightRoute(num_nodes)
-                   : TownWalk(num_nodes, &random).Build();
-  AddStreets(&random, &grid);
+  grid.route = BuildRoute(options, &random);
+  if (IsOnLawn(options)) {
+    // The field is one "street" whose frame is that of the world.
+    grid.streets.resize(1);
+    grid.streets[0].to = {1, 0};
+    return grid;
+  }
+  StreetBuilder(options, &random, &grid).Build();
+  if (IsPeriodic(options)) {
+    MakePeriodicTwins(options, &grid);
+    return grid;
+  }
   Random twin_random = MakeRandom(options.seed, 2);
-  MakeTwins(options, &twin_random, &grid);
+  if (num_twins < 0) num_twins = FirstNumTwins(options);
+  grid.can_have_more_twins =
+      num_twins == MakeTwins(num_twins, ReachedStreets(options, grid),
+                             &twin_random, &grid.streets);
   return grid;
+}
+
+int FirstNumTwins(const SyntheticWorldOptions& options) {
+  const double num_alias_pairs = options.alias_pair_ratio * options.num_images *
+                                 options.num_sequential_neighbors;
+  return static_cast<int>(std::ceil(num_alias_pairs / kNumAliasPairsPerTwin));
 }
 
 bool HasLineOfSight(const Eigen::Vector2d& from, const Eigen::Vector2d& to) {

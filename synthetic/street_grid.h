@@ -2,28 +2,20 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <array>
 #include <map>
-#include <utility>
+#include <tuple>
 #include <vector>
 
 #include "core/random.h"
+#include "synthetic/routes.h"
 #include "synthetic/synthetic_world.h"
 
 namespace adasfm {
 
 // The town is a square grid of streets. Between the streets stand blocks of
 // houses, squares that nobody can look through.
-inline constexpr double kBlockSize = 60.0;       // between street axes, m
 inline constexpr double kStreetHalfWidth = 7.0;  // axis to facade, m
 inline constexpr double kMaxViewDistance = 60.0;
-
-using GridNode = std::array<int, 2>;
-
-// Crossings in the order in which the car passes them.
-struct Route {
-  std::vector<GridNode> nodes;
-};
 
 // One street between two crossings, with its own frame: u along the street
 // in the direction in which it is first driven, v to the left, z up.
@@ -32,9 +24,14 @@ struct Street {
   GridNode to = {0, 0};
   // Equal layout seeds give equal facades.
   uint64_t layout_seed = 0;
-  // The street that looks the same, or -1.
+  // The next one of the ring of streets that look the same, or -1.
   int twin = -1;
   bool is_driven = false;
+  // Of the road, where u = 0, and per u.
+  double height_m = 0.0;
+  double slope = 0.0;
+
+  double HeightAt(double u) const { return height_m + slope * u; }
 
   Eigen::Vector2d Origin() const {
     return kBlockSize * Eigen::Vector2d(from[0], from[1]);
@@ -49,18 +46,26 @@ struct Street {
   Eigen::Vector3d LocalFromWorld(const Eigen::Vector3d& xyz) const;
 };
 
-// A crossing pair with the smaller one first.
-std::pair<GridNode, GridNode> StreetKey(const GridNode& a, const GridNode& b);
+// Level and crossings, the smaller one first.
+using StreetId = std::tuple<int, GridNode, GridNode>;
+StreetId MakeStreetId(const GridNode& a, const GridNode& b, int level = 0);
 
 struct StreetGrid {
   Route route;
   std::vector<Street> streets;
-  std::map<std::pair<GridNode, GridNode>, int> street_from_key;
+  std::map<StreetId, int> street_from_id;
+  // A larger num_twins makes more streets look alike.
+  bool can_have_more_twins = false;
 };
 
-// A random walk long enough for the drive, and all streets that it can see.
-// Streets become twins as far as look-alike places are asked for.
-StreetGrid BuildStreetGrid(const SyntheticWorldOptions& options);
+// The route and all streets that it can see, one field on a lawn. num_twins
+// times two streets are made to look alike, pairs first, then classes; parallel
+// streets and the floors of a car park always do. -1: FirstNumTwins.
+StreetGrid BuildStreetGrid(const SyntheticWorldOptions& options,
+                           int num_twins = -1);
+
+// About as many as options.alias_pair_ratio needs.
+int FirstNumTwins(const SyntheticWorldOptions& options);
 
 // Whether no block stands between two points (heights do not matter).
 bool HasLineOfSight(const Eigen::Vector2d& from, const Eigen::Vector2d& to);

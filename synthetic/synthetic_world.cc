@@ -12,6 +12,7 @@
 #include "synthetic/landmarks.h"
 #include "synthetic/sensor_logs.h"
 #include "synthetic/street_grid.h"
+#include "synthetic/traffic.h"
 
 namespace adasfm {
 namespace {
@@ -45,9 +46,11 @@ Rigid3d MakeCamFromImu() {
                                 Eigen::Vector3d(0.5, 0.05, 0.9));
 }
 
-std::vector<bool> DrawBlackouts(const SyntheticWorldOptions& options) {
+// Keypoints that each image may have.
+std::vector<int> DrawBlackouts(const SyntheticWorldOptions& options) {
   Random random = MakeRandom(options.seed, 12);
-  std::vector<bool> is_blacked_out(options.num_images, false);
+  std::vector<int> max_num_keypoints(options.num_images,
+                                     options.num_keypoints_per_image);
   // One in each of equally long stretches, away from their ends.
   for (int i = 0; i < options.num_blackouts; ++i) {
     const int64_t begin = int64_t{options.num_images} * i;
@@ -58,24 +61,21 @@ std::vector<bool> DrawBlackouts(const SyntheticWorldOptions& options) {
     const int start = first + static_cast<int>(random.UniformInt(
                                   slack / 4, slack - slack / 4));
     for (int k = 0; k < options.blackout_num_images; ++k) {
-      is_blacked_out[start + k] = true;
+      max_num_keypoints[start + k] = options.blackout_num_keypoints;
     }
   }
-  return is_blacked_out;
+  return max_num_keypoints;
 }
 
-// Poses and times; returns how far the car had driven at each image.
+// Images at even times, up to a jitter. Returns the times.
 std::vector<double> TakeImages(const Drive& drive, SyntheticWorld* world) {
   const SyntheticWorldOptions& options = world->options;
   Random random = MakeRandom(options.seed, 13);
   const double first_s = drive.FirstImageTime();
-  const double last_s =
-      drive.TimeAt(drive.ArcLengthAt(first_s) +
-                   options.spacing_m * (options.num_images - 1));
   const double period_s =
-      (last_s - first_s) / std::max(1, options.num_images - 1);
+      (drive.LastImageTime() - first_s) / (options.num_images - 1);
   const timestamp_t shift_ns = std::llround(1e9 * options.timeshift_cam_imu_s);
-  std::vector<double> arc_lengths_m;
+  std::vector<double> times_s;
   for (int i = 0; i < options.num_images; ++i) {
     const double jitter = random.Uniform(-kTimeJitter, kTimeJitter);
     const timestamp_t time_ns =
@@ -88,15 +88,70 @@ std::vector<double> TakeImages(const Drive& drive, SyntheticWorld* world) {
     image.cam_from_world =
         world->cam_from_imu * drive.StateAt(time_s).world_from_imu.Inverse();
     world->images.push_back(image);
-    arc_lengths_m.push_back(drive.ArcLengthAt(time_s));
+    times_s.push_back(time_s);
   }
-  return arc_lengths_m;
+  for (const Drive::Stop& stop : drive.stops()) {
+    const auto at = [&](double time_s) {
+      return kWorldStartNs - shift_ns + std::llround(1e9 * time_s);
+    };
+    world->stops.emplace_back(at(stop.begin_s), at(stop.end_s));
+  }
+  return times_s;
+}
+
+// Of the rows of all images; empty for a global shutter.
+std::vector<ExposurePoses> TakeRows(const Drive& drive,
+                                    const std::vector<double>& times_s,
+                                    const SyntheticWorld& world) {
+  std::vector<ExposurePoses> exposures;
+  const double half_s = 0.5 * world.options.rolling_shutter_s;
+  if (half_s <= 0.0) return exposures;
+  const auto pose_at = [&](double time_s) {
+    return world.cam_from_imu * drive.StateAt(time_s).world_from_imu.Inverse();
+  };
+  for (const double time_s : times_s) {
+    exposures.push_back({pose_at(time_s - half_s), pose_at(time_s + half_s)});
+  }
+  return exposures;
+}
+
+// What the camera sees, and the matches, with so many streets that look alike
+// as the share of look-alike pairs needs.
+void FillImagesAndPairs(const std::vector<ExposurePoses>& exposures,
+                        const std::vector<double>& arc_lengths_m,
+                        SyntheticWorld* world) {
+  const SyntheticWorldOptions& options = world->options;
+  for (int num_twins = FirstNumTwins(options);; num_twins *= 2) {
+    const StreetGrid grid = BuildStreetGrid(options, num_twins);
+    const LandmarkMap map = BuildLandmarks(options, grid);
+    world->num_twins = num_twins;
+    world->landmarks.clear();
+    for (const Landmark& landmark : map.landmarks) {
+      world->landmarks.push_back(landmark.position_in_world);
+    }
+    for (SyntheticImage& image : world->images) {
+      image.keypoints.clear();
+      image.landmark_ids.clear();
+    }
+    ObserveLandmarks(grid, map, DrawBlackouts(options), exposures, world);
+    AddTraffic(world);
+    const double reached = MatchImages(grid, map, arc_lengths_m, world);
+    if (reached == options.alias_pair_ratio) return;
+    if (grid.can_have_more_twins) continue;
+    throw std::invalid_argument(
+        "SyntheticWorldOptions: alias_pair_ratio = " +
+        std::to_string(options.alias_pair_ratio) +
+        ", but the largest possible value of this drive is " +
+        std::to_string(reached) +
+        "; streets that look alike have to be driven in full, and far from "
+        "each other");
+  }
 }
 
 // Reports the first rule that is broken.
 template <typename T>
-bool Require(bool is_valid, const char* name, const T& value, const char* rule,
-             std::string* error) {
+bool Require(bool is_valid, const char* name, const T& value,
+             const std::string& rule, std::string* error) {
   if (is_valid) return true;
   std::ostringstream message;
   message << "SyntheticWorldOptions: " << name << " = " << value
@@ -130,13 +185,35 @@ bool SyntheticWorldOptions::IsValid(std::string* error) const {
          positive(num_keypoints_per_image, "num_keypoints_per_image") &&
          not_negative(pixel_noise_px, "pixel_noise_px") &&
          share(outlier_match_ratio, "outlier_match_ratio") &&
+         positive(street_num_blocks, "street_num_blocks") &&
+         Require(floor_height_m >= 2.5 && floor_height_m <= 6.0,
+                 "floor_height_m", floor_height_m, "from 2.5 to 6", error) &&
+         positive(lane_spacing_m, "lane_spacing_m") &&
+         Require(lane_length_m >= 4.0 * lane_spacing_m, "lane_length_m",
+                 lane_length_m, "at least four times lane_spacing_m", error) &&
+         not_negative(num_stops, "num_stops") &&
+         positive(stop_duration_s, "stop_duration_s") &&
+         not_negative(num_spins, "num_spins") &&
+         Require(spin_duration_s >= 2.0, "spin_duration_s", spin_duration_s,
+                 "at least 2 s", error) &&
+         Require(rolling_shutter_s >= 0.0 && rolling_shutter_s <= 0.1,
+                 "rolling_shutter_s", rolling_shutter_s, "from 0 to 0.1",
+                 error) &&
+         share(moving_keypoint_ratio, "moving_keypoint_ratio") &&
          positive(num_sequential_neighbors, "num_sequential_neighbors") &&
          share(alias_pair_ratio, "alias_pair_ratio") &&
+         share(spurious_pair_ratio, "spurious_pair_ratio") &&
+         share(alias_pair_ratio + spurious_pair_ratio,
+               "alias_pair_ratio + spurious_pair_ratio") &&
+         share(rotation_outlier_ratio, "rotation_outlier_ratio") &&
+         not_negative(blackout_num_keypoints, "blackout_num_keypoints") &&
          not_negative(num_blackouts, "num_blackouts") &&
          positive(blackout_num_images, "blackout_num_images") &&
          Require(2 * int64_t{num_blackouts} * blackout_num_images <= num_images,
                  "num_blackouts", num_blackouts,
-                 "so small that half of the images keep their texture",
+                 "at most " +
+                     std::to_string(num_images / (2 * blackout_num_images)) +
+                     ": half of the images keep their texture",
                  error) &&
          positive(imu_rate_hz, "imu_rate_hz") &&
          positive(wheel_rate_hz, "wheel_rate_hz") &&
@@ -153,6 +230,14 @@ bool SyntheticWorldOptions::IsValid(std::string* error) const {
          not_negative(wheel_speed_noise, "wheel_speed_noise") &&
          positive(wheel_scale, "wheel_scale") &&
          not_negative(num_wheel_slips, "num_wheel_slips") &&
+         Require(wheel_slip_sigma >= 0.0 && wheel_slip_sigma <= 0.5,
+                 "wheel_slip_sigma", wheel_slip_sigma, "from 0 to 0.5",
+                 error) &&
+         Require(std::isfinite(gyro_drift), "gyro_drift", gyro_drift,
+                 "a number", error) &&
+         not_negative(gnss_rate_hz, "gnss_rate_hz") &&
+         not_negative(gnss_noise_m, "gnss_noise_m") &&
+         not_negative(num_gnss_jumps, "num_gnss_jumps") &&
          not_negative(standstill_s, "standstill_s") &&
          Require(std::abs(timeshift_cam_imu_s) < 1e6, "timeshift_cam_imu_s",
                  timeshift_cam_imu_s, "within a million seconds", error);
@@ -168,21 +253,21 @@ SyntheticWorld BuildSyntheticWorld(const SyntheticWorldOptions& options) {
   world.imu_from_wheel = Rigid3d(Eigen::Quaterniond::Identity(),
                                  Eigen::Vector3d(-0.4, 0.05, -0.3));
   // 1. The streets and the drive through them.
-  const StreetGrid grid = BuildStreetGrid(options);
-  const Drive drive(options, grid.route, world.imu_from_wheel);
-  const std::vector<double> arc_lengths_m = TakeImages(drive, &world);
+  const Drive drive(options, BuildPath(options, BuildStreetGrid(options).route),
+                    world.imu_from_wheel);
+  const std::vector<double> times_s = TakeImages(drive, &world);
+  std::vector<double> arc_lengths_m;
+  for (const double time_s : times_s) {
+    arc_lengths_m.push_back(drive.ArcLengthAt(time_s));
+  }
   // 2. The logs.
   const double first_s = drive.FirstImageTime();
-  const double end_s = drive.TimeAt(arc_lengths_m.back()) + kTail;
+  const double end_s = times_s.back() + kTail;
   SimulateImu(drive, end_s, &world);
   SimulateWheels(drive, first_s, end_s, &world);
+  SimulateGnss(drive, end_s, &world);
   // 3. What the camera sees, and the matches.
-  const LandmarkMap map = BuildLandmarks(options, grid);
-  for (const Landmark& landmark : map.landmarks) {
-    world.landmarks.push_back(landmark.position_in_world);
-  }
-  ObserveLandmarks(grid, map, DrawBlackouts(options), &world);
-  MatchImages(grid, map, arc_lengths_m, &world);
+  FillImagesAndPairs(TakeRows(drive, times_s, world), arc_lengths_m, &world);
   return world;
 }
 

@@ -15,7 +15,7 @@ namespace adasfm {
 
 enum class SyntheticCameraModel { kPinhole, kFisheye };
 
-enum class SyntheticTrajectory { kTown, kStraight };
+enum class SyntheticTrajectory { kTown, kStraight, kParallel, kFloors, kLanes };
 
 // A drive through streets with facades. One generator serves the tests, the
 // benchmarks and the demo; equal options give equal worlds.
@@ -27,8 +27,23 @@ struct SyntheticWorldOptions {
   // Mean time between images under way; 0: that of 8 m/s, within 0.05 to 0.4 s.
   double image_interval_s = 0.0;
   // kTown drives blocks with right-angle bends and returns to places seen
-  // before; kStraight is one street.
+  // before; kStraight is one street; kParallel goes up and down parallel
+  // streets that look alike; kFloors climbs the floors of a car park that look
+  // alike; kLanes goes back and forth on a lawn, as a mower does.
   SyntheticTrajectory trajectory = SyntheticTrajectory::kTown;
+  // kParallel: blocks of 60 m of each street.
+  int street_num_blocks = 3;
+  // kFloors: height from floor to floor.
+  double floor_height_m = 3.0;
+  // kLanes.
+  double lane_spacing_m = 1.0;
+  double lane_length_m = 20.0;
+  // Stops under way, and turns by 360 deg on the spot. Images go on at even
+  // times: the drive becomes shorter.
+  int num_stops = 0;
+  double stop_duration_s = 10.0;
+  int num_spins = 0;
+  double spin_duration_s = 8.0;
   SyntheticCameraModel camera_model = SyntheticCameraModel::kPinhole;
 
   // The focal length follows the width.
@@ -36,6 +51,11 @@ struct SyntheticWorldOptions {
   int image_height = 500;
   int num_keypoints_per_image = 300;
   double pixel_noise_px = 0.5;
+  // Time from the first to the last row of an image; 0: global shutter. The
+  // pose is that of the middle row.
+  double rolling_shutter_s = 0.0;
+  // Share of an image's keypoints that lie on two cars that drive ahead.
+  double moving_keypoint_ratio = 0.0;
   // Share of raw matches that are wrong at random (verification drops most).
   double outlier_match_ratio = 0.2;
   // Consecutive pairs up to this distance in the sequence are matched, as well
@@ -44,9 +64,16 @@ struct SyntheticWorldOptions {
   // Share of verified pairs that join look-alike places: mutually consistent
   // wrong matches of repeated facades.
   double alias_pair_ratio = 0.0;
-  // Intervals without texture: this many, each this many images long.
+  // Share of verified pairs that join images with nothing in common, by a few
+  // matches that fit some epipolar geometry by chance.
+  double spurious_pair_ratio = 0.0;
+  // Share of the true pairs whose rotation is off by 15 to 90 deg.
+  double rotation_outlier_ratio = 0.0;
+  // Intervals without texture: this many, each this many images long, with at
+  // most so many keypoints.
   int num_blackouts = 0;
   int blackout_num_images = 16;
+  int blackout_num_keypoints = 0;
 
   double imu_rate_hz = 200.0;
   double wheel_rate_hz = 50.0;
@@ -59,6 +86,17 @@ struct SyntheticWorldOptions {
   double wheel_scale = 1.0;
   // Intervals in which the wheels turn without moving the car so far.
   int num_wheel_slips = 0;
+  // Gravel: each wheel's slip, 1 sigma as a share of its speed, with a
+  // correlation time of 1 s. The calibration does not know of it.
+  double wheel_slip_sigma = 0.0;
+  // The gyroscope's bias about the vertical grows so fast, rad/s per s. The
+  // calibration does not know of it.
+  double gyro_drift = 0.0;
+  // Positions of a receiver; 0: none. White noise per axis, and intervals of 5
+  // s in which they are 15 m off.
+  double gnss_rate_hz = 0.0;
+  double gnss_noise_m = 1.0;
+  int num_gnss_jumps = 0;
   // Seconds at rest before the car sets off (the first image follows a second
   // later); 0: the log begins at full speed.
   double standstill_s = 3.0;
@@ -85,8 +123,13 @@ struct SyntheticImage {
   timestamp_t timestamp_ns = 0;        // the camera's clock
   Rigid3d cam_from_world;              // true pose; world is z-up, in metres
   std::vector<Eigen::Vector2d> keypoints;
-  // The landmark each keypoint sees.
+  // The landmark each keypoint sees; numbers of their own beyond all landmarks
+  // for keypoints on cars.
   std::vector<int> landmark_ids;
+  // The point of a car that each keypoint sees, -1 for none; empty without
+  // cars.
+  std::vector<int> car_point_ids;
+  std::vector<Rigid3d> cam_from_car;
 };
 
 struct SyntheticPair {
@@ -98,6 +141,16 @@ struct SyntheticPair {
   Rigid3d cam2_from_cam1;
   // The pair joins two places that look alike; its matches are wrong.
   bool is_alias = false;
+  // The pair joins places with nothing in common.
+  bool is_spurious = false;
+  // The matches are right, the pose is not.
+  bool is_rotation_outlier = false;
+};
+
+// A position of a receiver, in the world.
+struct SyntheticFix {
+  timestamp_t timestamp_ns = 0;  // the IMU's clock
+  Eigen::Vector3d position_in_world = Eigen::Vector3d::Zero();
 };
 
 struct SyntheticWorld {
@@ -116,9 +169,16 @@ struct SyntheticWorld {
   Eigen::Vector3d true_accel_bias = Eigen::Vector3d::Zero();
   // Camera-clock intervals of the slips.
   std::vector<std::pair<timestamp_t, timestamp_t>> wheel_slips;
+  std::vector<SyntheticFix> gnss_fixes;
+  Eigen::Vector3d antenna_in_imu = Eigen::Vector3d(0.1, 0.0, 1.2);
+  // Camera-clock intervals at rest after the start, with turns on the spot.
+  std::vector<std::pair<timestamp_t, timestamp_t>> stops;
+  // Pairs of streets that were made to look alike.
+  int num_twins = 0;
 };
 
-// Throws std::invalid_argument for options that are not valid.
+// Throws std::invalid_argument for options that are not valid, or ask for more
+// than the drive can have; the message names the largest possible value.
 SyntheticWorld BuildSyntheticWorld(const SyntheticWorldOptions& options);
 
 // The ray of a pixel and its derivative. Throws for a pixel that the fisheye

@@ -2,6 +2,7 @@
 #include "colmap_ext/coarse/global_stage.h"
 
 #include <chrono>
+#include <set>
 #include <sstream>
 #include <stdexcept>
 
@@ -67,8 +68,37 @@ Status NothingHoldsTogether() {
       "a relative pose and no usable priors; match the images first");
 }
 
+// What two-view verification took for the motion of a pair was that of
+// something else, as of cars that carry most of its matches: those of its raw
+// matches that agree with the poses.
+std::map<ImagePair, std::vector<FeatureMatch>> MatchAnew(
+    const MatchRefinementOptions& options, const SceneData& scene,
+    const GlobalCorrespondences& matches, const CoarseComponent& component,
+    const ViewGraph& graph) {
+  std::set<ImagePair> refuted;
+  for (const ViewGraphEdge& edge : graph.edges) {
+    if (edge.removal == EdgeRemoval::kOdometryPose) refuted.insert(edge.Pair());
+  }
+  std::map<ImagePair, std::vector<FeatureMatch>> candidates;
+  for (const ScenePair& pair : scene.pairs) {
+    const ImagePair key(pair.image_id1, pair.image_id2);
+    if (refuted.count(key) > 0 && !pair.raw_matches.empty()) {
+      candidates[key] = pair.raw_matches;
+    }
+  }
+  std::map<ImagePair, std::vector<FeatureMatch>> matched;
+  for (RefinedPair& pair : RefineMatches(options, component.cams_from_world,
+                                         matches.bearings, candidates)
+                               .pairs) {
+    if (!pair.removed) matched[pair.pair] = std::move(pair.matches);
+  }
+  return matched;
+}
+
 // The matches of the edges that hold the component together.
-CoarseModelInput CreateModelInput(const CoarseComponent& component,
+CoarseModelInput CreateModelInput(const MatchRefinementOptions& options,
+                                  const SceneData& scene,
+                                  const CoarseComponent& component,
                                   const CoarsePoses& poses,
                                   const GlobalCorrespondences& matches) {
   CoarseModelInput input;
@@ -78,6 +108,7 @@ CoarseModelInput CreateModelInput(const CoarseComponent& component,
   }
   input.cams_from_world = component.cams_from_world;
   input.metric = component.metric;
+  input.matches = MatchAnew(options, scene, matches, component, poses.graph);
   for (const ViewGraphEdge& edge : poses.graph.edges) {
     if (!edge.IsKept() || edge.source == EdgeSource::kSensor) continue;
     if (component.cams_from_world.count(edge.image_id1) == 0 ||
@@ -168,8 +199,8 @@ StatusOr<GlobalStageResult> RunGlobalStage(
 
   // 2.7 Structure and adjustment.
   for (const CoarseComponent& component : result.poses.components) {
-    const CoarseModelInput input =
-        CreateModelInput(component, result.poses, correspondences);
+    const CoarseModelInput input = CreateModelInput(
+        options.refinement, scene, component, result.poses, correspondences);
     watch = begin(DescribeTrackMemory(input), 0.5);
     result.models.push_back(BuildCoarseModel(options.structure, scene,
                                              correspondences.bearings, input));

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <filesystem>
 #include <iostream>
+#include <map>
 #include <opencv2/imgcodecs.hpp>
 #include <set>
 #include <stdexcept>
@@ -13,6 +14,7 @@
 #include "colmap_ext/io/output_files.h"
 #include "core/check_options.h"
 #include "synthetic/render_world.h"
+#include "synthetic/world_summary.h"
 
 namespace adasfm {
 namespace {
@@ -39,7 +41,25 @@ void AddOptions(SynthesizerOptions* options, CommandOptions* command) {
                       "mean time between images under way; 0: that of 8 m/s, "
                       "within 0.05 to 0.4 s [s]");
   command->AddDefault("trajectory", &options->trajectory,
-                      "town (bends and revisits) or straight");
+                      "town (bends and revisits), straight, parallel (streets "
+                      "that look alike, up and down), floors (of a car park, "
+                      "which look alike) or lanes (of a mower)");
+  command->AddDefault("street_blocks", &world->street_num_blocks,
+                      "parallel: length of a street [60 m]");
+  command->AddDefault("floor_height", &world->floor_height_m,
+                      "floors: height from one to the next [m]");
+  command->AddDefault("lane_spacing", &world->lane_spacing_m,
+                      "lanes: distance between neighbouring ones [m]");
+  command->AddDefault("lane_length", &world->lane_length_m,
+                      "lanes: length of each [m]");
+  command->AddDefault("stops", &world->num_stops,
+                      "stops under way; images go on");
+  command->AddDefault("stop_duration", &world->stop_duration_s,
+                      "duration of a stop [s]");
+  command->AddDefault("spins", &world->num_spins,
+                      "turns by 360 deg on the spot; images go on");
+  command->AddDefault("spin_duration", &world->spin_duration_s,
+                      "duration of such a turn [s]");
   command->AddDefault("camera_model", &options->camera_model,
                       "camera of the drive: PINHOLE or OPENCV_FISHEYE");
   command->AddDefault("image_width", &world->image_width,
@@ -50,18 +70,42 @@ void AddOptions(SynthesizerOptions* options, CommandOptions* command) {
                       "keypoints per image of the database");
   command->AddDefault("pixel_noise", &world->pixel_noise_px,
                       "noise of keypoints, 1 sigma [px]");
+  command->AddDefault("rolling_shutter", &world->rolling_shutter_s,
+                      "time from the first to the last row of an image; 0: "
+                      "global shutter [s]");
+  command->AddDefault("moving_ratio", &world->moving_keypoint_ratio,
+                      "share of keypoints on cars that drive ahead");
   command->AddDefault("outlier_ratio", &world->outlier_match_ratio,
                       "share of raw matches that are wrong");
   command->AddDefault("num_neighbors", &world->num_sequential_neighbors,
                       "images matched with so many of the next ones");
   command->AddDefault("alias_ratio", &world->alias_pair_ratio,
                       "share of pairs that join look-alike places");
+  command->AddDefault("spurious_ratio", &world->spurious_pair_ratio,
+                      "share of pairs that join images with nothing in common "
+                      "by 15 to 25 matches");
+  command->AddDefault("rotation_outliers", &world->rotation_outlier_ratio,
+                      "share of true pairs whose rotation is wrong");
   command->AddDefault("num_blackouts", &world->num_blackouts,
                       "intervals without texture");
   command->AddDefault("blackout_images", &world->blackout_num_images,
                       "images of each such interval");
+  command->AddDefault("blackout_keypoints", &world->blackout_num_keypoints,
+                      "keypoints at most of such an image");
   command->AddDefault("wheel_slips", &world->num_wheel_slips,
                       "intervals in which the wheels slip");
+  command->AddDefault("wheel_slip_noise", &world->wheel_slip_sigma,
+                      "gravel: random slip of each wheel over a second, 1 "
+                      "sigma, as a share of its speed; not declared");
+  command->AddDefault("gyro_drift", &world->gyro_drift,
+                      "growth of the gyroscope's bias about the vertical, not "
+                      "declared [rad/s^2]");
+  command->AddDefault("gnss_rate", &world->gnss_rate_hz,
+                      "positions of a receiver, in gnss.csv; 0: none [Hz]");
+  command->AddDefault("gnss_noise", &world->gnss_noise_m,
+                      "their noise per axis, 1 sigma [m]");
+  command->AddDefault("gnss_jumps", &world->num_gnss_jumps,
+                      "intervals of 5 s in which they are 15 m off");
   command->AddDefault("wheel_scale", &world->wheel_scale,
                       "true speed per logged speed");
   command->AddDefault("wheel_noise", &world->wheel_speed_noise,
@@ -75,27 +119,43 @@ void AddOptions(SynthesizerOptions* options, CommandOptions* command) {
 }
 
 Status Translate(SynthesizerOptions* options) {
-  if (options->trajectory == "straight") {
-    options->world.trajectory = SyntheticTrajectory::kStraight;
-  } else if (options->trajectory != "town") {
+  const std::map<std::string, SyntheticTrajectory> trajectories = {
+      {"town", SyntheticTrajectory::kTown},
+      {"straight", SyntheticTrajectory::kStraight},
+      {"parallel", SyntheticTrajectory::kParallel},
+      {"floors", SyntheticTrajectory::kFloors},
+      {"lanes", SyntheticTrajectory::kLanes}};
+  const auto trajectory = trajectories.find(options->trajectory);
+  if (trajectory == trajectories.end()) {
     return Status::Error("trajectory = " + options->trajectory +
-                         ", but it must be town or straight");
+                         ", but it must be town, straight, parallel, floors or "
+                         "lanes");
   }
+  options->world.trajectory = trajectory->second;
   if (options->camera_model == "OPENCV_FISHEYE") {
     options->world.camera_model = SyntheticCameraModel::kFisheye;
   } else if (options->camera_model != "PINHOLE") {
     return Status::Error("camera_model = " + options->camera_model +
                          ", but it must be PINHOLE or OPENCV_FISHEYE");
   }
-  return CheckOptions(options->world);
+  const SyntheticWorldOptions& world = options->world;
+  if (options->render &&
+      (options->trajectory == "floors" || options->trajectory == "lanes" ||
+       world.moving_keypoint_ratio > 0.0 || world.rolling_shutter_s > 0.0)) {
+    return Status::Error(
+        "render = 1, but photos show streets of one level only, without cars "
+        "or rolling shutter");
+  }
+  return CheckOptions(world);
 }
 
 // A world of ours may be replaced, somebody's own files may not.
 Status CheckWorldFolder(const std::string& path) {
   std::error_code none;
   if (fs::exists(path + "/landmarks.txt", none)) return Status::Ok();
-  for (const char* name : {"database.db", "imu.csv", "wheel.csv", "times.csv",
-                           "sensors.yaml", "gt.txt"}) {
+  for (const char* name :
+       {"database.db", "imu.csv", "wheel.csv", "times.csv", "sensors.yaml",
+        "gt.txt", "gnss.csv", "world.json"}) {
     if (!fs::exists(path + "/" + name, none)) continue;
     return Status::Error(path + "/" + name +
                          " was not made by this command and is not replaced; "
@@ -175,7 +235,10 @@ Status RunAdasfmSynthesizer(int argc, char** argv) {
   std::cout << "Wrote " << world.images.size() << " images, "
             << world.pairs.size() << " matched pairs and "
             << world.imu_samples.size() << " IMU samples to "
-            << options.output_path << std::endl;
+            << options.output_path << "; what the world has (world.json):\n";
+  for (const auto& [name, value] : ListFigures(SummarizeWorld(world))) {
+    std::cout << "  " << name << ": " << value << "\n";
+  }
   return Status::Ok();
 }
 

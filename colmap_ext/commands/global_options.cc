@@ -109,8 +109,6 @@ void GlobalOptionAdder::AddLoops() {
       "pairs that each of the two places needs that join two parts");
   Add("join_min_turn_deg", &loops->min_turn_deg,
       "these places lie before and behind a turn [deg]");
-  Add("join_max_place_images", &loops->max_place_images,
-      "or so many images apart");
 }
 
 void GlobalOptionAdder::AddPositions() {

@@ -5,6 +5,7 @@
 #include <base/database.h>
 #include <estimators/two_view_geometry.h>
 
+#include <algorithm>
 #include <cstdio>
 #include <filesystem>
 #include <functional>
@@ -17,6 +18,7 @@
 #include "colmap_ext/io/output_files.h"
 #include "core/so3.h"
 #include "core/sqlite.h"
+#include "synthetic/world_summary.h"
 
 namespace adasfm {
 namespace {
@@ -206,6 +208,35 @@ void WriteSensors(const SyntheticWorld& world, std::ostream* file) {
         << options.wheel_rate_hz << "\n  track_width: " << world.track_width_m
         << "\n  speed_noise: " << options.wheel_speed_noise << "\n";
   WriteTransform("T_imu_wheel", world.imu_from_wheel, file);
+  if (world.gnss_fixes.empty()) return;
+  const Eigen::Vector3d& antenna = world.antenna_in_imu;
+  *file << "gnss0:\n  p_imu_antenna: [" << antenna.x() << ", " << antenna.y()
+        << ", " << antenna.z() << "]\n";
+}
+
+void WriteGnss(const SyntheticWorld& world, std::ostream* file) {
+  *file << "#timestamp [ns],latitude [deg],longitude [deg],altitude [m],"
+           "sigma_horizontal [m],sigma_vertical [m]\n"
+        << std::setprecision(17);
+  const EnuFrame frame(kSyntheticWorldOrigin);
+  // A receiver never states an error of nothing.
+  const double sigma_m = std::max(0.01, world.options.gnss_noise_m);
+  for (const SyntheticFix& fix : world.gnss_fixes) {
+    const GeodeticPosition position =
+        frame.GeodeticFromEnu(fix.position_in_world);
+    *file << fix.timestamp_ns << "," << position.latitude_deg << ","
+          << position.longitude_deg << "," << position.height_m << ","
+          << sigma_m << "," << sigma_m << "\n";
+  }
+}
+
+void WriteSummary(const SyntheticWorld& world, std::ostream* file) {
+  const char* separator = "{";
+  for (const auto& [name, value] : ListFigures(SummarizeWorld(world))) {
+    *file << separator << "\n  \"" << name << "\": " << value;
+    separator = ",";
+  }
+  *file << "\n}\n";
 }
 
 }  // namespace
@@ -241,10 +272,12 @@ Status WriteSyntheticDatabase(const SyntheticWorld& world,
 Status WriteSyntheticLogs(const SyntheticWorld& world,
                           const std::string& folder) {
   using Writer = void (*)(const SyntheticWorld&, std::ostream*);
-  const std::vector<std::pair<const char*, Writer>> files = {
+  std::vector<std::pair<const char*, Writer>> files = {
       {"imu.csv", WriteImu},        {"wheel.csv", WriteWheels},
       {"times.csv", WriteTimes},    {"sensors.yaml", WriteSensors},
-      {"gt.txt", WriteGroundTruth}, {"landmarks.txt", WriteLandmarks}};
+      {"gt.txt", WriteGroundTruth}, {"landmarks.txt", WriteLandmarks},
+      {"world.json", WriteSummary}};
+  if (!world.gnss_fixes.empty()) files.emplace_back("gnss.csv", WriteGnss);
   for (const auto& [name, write] : files) {
     const Status status = WriteText(
         fs::path(folder) / name,

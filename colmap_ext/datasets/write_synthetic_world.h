@@ -6,6 +6,7 @@
 
 #include <string>
 
+#include "core/geodesy.h"
 #include "core/status.h"
 #include "synthetic/synthetic_world.h"
 
@@ -19,7 +20,10 @@ Status WriteSyntheticDatabase(const SyntheticWorld& world,
                               const std::string& path);
 
 // Writes imu.csv, wheel.csv, times.csv, sensors.yaml, gt.txt and landmarks.txt
-// to the folder, in the formats that the importer and the evaluator read.
+// to the folder, in the formats that the importer and the evaluator read;
+// gnss.csv when there are fixes, with the world's origin at
+// kSyntheticWorldOrigin; and world.json, what the world really has.
+inline constexpr GeodeticPosition kSyntheticWorldOrigin{48.98, 8.39, 115.0};
 Status WriteSyntheticLogs(const SyntheticWorld& world,
                           const std::string& folder);
 

@@ -72,9 +72,8 @@ std::vector<int> CountStreets(const LoopClosureOptions& options,
 
 bool DriveParts::AreApart(const LoopClosureOptions& options, int i,
                           int j) const {
-  const int64_t gap = std::abs(rank_of[i] - rank_of[j]);
-  return gap > options.max_place_images ||
-         (gap > options.max_sequence_gap && street_of[i] != street_of[j]);
+  return std::abs(rank_of[i] - rank_of[j]) > options.max_sequence_gap &&
+         street_of[i] != street_of[j];
 }
 
 DriveParts FindDriveParts(const LoopClosureOptions& options,

@@ -31,7 +31,7 @@ struct DriveParts {
   std::vector<int> street_of;
 
   // Whether what is seen at one image is evidence beside what is seen at the
-  // other: a turn or max_place_images lie between them.
+  // other: a turn lies between them.
   bool AreApart(const LoopClosureOptions& options, int i, int j) const;
 };
 

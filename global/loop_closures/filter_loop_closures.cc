@@ -298,10 +298,9 @@ bool LoopClosureOptions::IsValid(std::string* error) const {
         " >= 0";
     return false;
   }
-  if (max_sequence_gap < 1 || min_num_pairs < 1 || max_place_images < 1) {
+  if (max_sequence_gap < 1 || min_num_pairs < 1) {
     *error = "max_sequence_gap = " + std::to_string(max_sequence_gap) +
-             ", min_num_pairs = " + std::to_string(min_num_pairs) +
-             " and max_place_images = " + std::to_string(max_place_images) +
+             " and min_num_pairs = " + std::to_string(min_num_pairs) +
              " must be >= 1";
     return false;
   }

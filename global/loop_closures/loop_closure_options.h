@@ -30,10 +30,9 @@ struct LoopClosureOptions {
   bool split_unverified_joins = true;
   // Pairs that a place needs to join two parts.
   int min_num_pairs = 3;
-  // Two places confirm each other beyond a turn, or so many images: a straight
-  // street looks alike all along.
+  // Two places confirm each other beyond a turn only: a straight street can
+  // look alike all along, however long it is.
   double min_turn_deg = 30.0;
-  int max_place_images = 100;
 
   bool IsValid(std::string* error) const;
 };

@@ -102,7 +102,7 @@ WORLDS = {
     'images 3.7 m apart': world({'spacing': 3.7, 'num_neighbors': 6}),
     'images 7 m apart': world({'spacing': 7, 'num_neighbors': 4}, images=150),
     'images 0.5 m and 0.8 s apart': world(
-        {'spacing': 0.5, 'image_interval': 0.8}),
+        {'spacing': 0.5, 'image_interval': 0.8, 'alias_ratio': 0}),
     'images 3 m and 1 s apart': world(
         {'spacing': 3, 'image_interval': 1, 'num_neighbors': 6}),
 }

@@ -110,7 +110,7 @@ TEST(WorldRenderer, TwinStreetsLookAlike) {
   options.num_images = 250;
   options.alias_pair_ratio = 0.05;
   const SyntheticWorld world = BuildSyntheticWorld(options);
-  const StreetGrid grid = BuildStreetGrid(options);
+  const StreetGrid grid = BuildStreetGrid(options, world.num_twins);
   WorldRenderer renderer(world);
   int num_tested = 0;
   for (const SyntheticPair& pair : world.pairs) {

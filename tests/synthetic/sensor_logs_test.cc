@@ -25,14 +25,16 @@ SyntheticWorldOptions NoiseFreeOptions(uint64_t seed) {
 }
 
 Drive MakeDrive(const SyntheticWorld& world) {
-  return Drive(world.options, BuildStreetGrid(world.options).route,
+  return Drive(world.options,
+               BuildPath(world.options, BuildStreetGrid(world.options).route),
                world.imu_from_wheel);
 }
 
 TEST(Drive, VelocitiesAreDerivativesOfThePose) {
   for (const uint64_t seed : {1, 2, 3}) {
     const SyntheticWorldOptions options = NoiseFreeOptions(seed);
-    const Drive drive(options, BuildStreetGrid(options).route,
+    const Drive drive(options,
+                      BuildPath(options, BuildStreetGrid(options).route),
                       Rigid3d(ExpSo3(Eigen::Vector3d(0.1, -0.2, 0.3)),
                               Eigen::Vector3d(-0.4, 0.1, -0.3)));
     const double h = 1e-3;
@@ -61,7 +63,8 @@ TEST(Drive, VelocitiesAreDerivativesOfThePose) {
 
 TEST(Drive, TimeInvertsArcLength) {
   const SyntheticWorldOptions options = NoiseFreeOptions(4);
-  const Drive drive(options, BuildStreetGrid(options).route, Rigid3d());
+  const Drive drive(options, BuildPath(options, BuildStreetGrid(options).route),
+                    Rigid3d());
   for (const double s : {0.01, 0.5, 3.0, 20.0, 47.0, 60.0, 100.0}) {
     EXPECT_NEAR(drive.ArcLengthAt(drive.TimeAt(s)), s, 1e-9);
   }

@@ -107,6 +107,21 @@ TEST(RunGlobalStageTest, RefinedMatchesAreTrueOnes) {
   EXPECT_GT(num_refuted, 0);
 }
 
+// Two-view verification takes the motion against cars ahead for that of the
+// camera. The odometry refutes it, and the matches of the town, among the raw
+// ones, hold the images.
+TEST(RunGlobalStageTest, TrafficDoesNotHideTheTown) {
+  SyntheticWorldOptions options = SmallWorld();
+  options.moving_keypoint_ratio = 0.5;
+  const SyntheticWorld world = BuildSyntheticWorld(options);
+  const GlobalStageResult result =
+      RunStage(BuildSyntheticScene(world, SyntheticPriorOptions()));
+  ASSERT_EQ(result.models.size(), 1);
+  EXPECT_EQ(result.models[0].reconstruction.NumRegImages(), 60);
+  EXPECT_EQ(result.models[0].num_images_without_points, 0);
+  EXPECT_LT(ComparePoses(world, result.models[0].reconstruction).rmse_m, 0.2);
+}
+
 TEST(RunGlobalStageTest, SameResultOnAnyNumberOfThreads) {
   const SyntheticWorld world = BuildSyntheticWorld(SmallWorld());
   const SceneData scene = BuildSyntheticScene(world, SyntheticPriorOptions());

@@ -69,7 +69,6 @@ const std::vector<OptionCase>& Cases() {
       OPTION("max_sequence_gap", 5, poses.loops.max_sequence_gap),
       OPTION("join_min_num_pairs", 5, poses.loops.min_num_pairs),
       OPTION("join_min_turn_deg", 40, poses.loops.min_turn_deg),
-      OPTION("join_max_place_images", 60, poses.loops.max_place_images),
       OPTION("min_angle_floor_deg", 2, structure.min_angle_floor_deg),
       OPTION("min_num_points_per_image", 10,
              structure.min_num_points_per_image),

@@ -1,0 +1,307 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: BSD-3-Clause
+"""One world for each thing that can go wrong: what it has, and what comes out.
+
+Makes each dial's world with `adasfm_synthesizer`, reads from its world.json what
+the world really has, runs `adasfm_prior_importer`, `adasfm_global` and
+`adasfm_mapper` on it, and the last two again without any log, compares all
+models with the truth, and writes a table: one row a dial and seed. A model is
+folded when its camera centres err by more than a bar after a similarity; a fold
+without a warning is the one thing that must not happen. Needs only Python's
+standard library.
+"""
+
+import argparse
+import datetime
+import json
+import os
+import platform
+import shutil
+import sys
+
+from benchmarking.figures import add_arguments, measure, world_folder
+from benchmarking.process import Failed, run
+
+# Without logs the scale drifts: a fold errs by more of the way driven.
+MAX_DRIFT_WITHOUT_LOGS = 0.005
+ALL_LOGS = ('imu', 'wheel')
+
+
+# One world: the figures of world.json that tell the dial, and options of the
+# synthesizer.
+def dial(figures=(), images=150, logs=ALL_LOGS, bar_m=0.5,
+         max_drift=MAX_DRIFT_WITHOUT_LOGS, **options):
+  return {'figures': figures, 'images': images, 'logs': logs, 'bar_m': bar_m,
+          'max_drift': max_drift, 'options': options}
+
+
+DIALS = {
+    'plain': dial(('mean_overlap',)),
+    'mower, lanes 1 m apart': dial(
+        ('driven_m', 'num_revisit_pairs'), 300, bar_m=0.1, trajectory='lanes',
+        spacing=0.5, image_interval=0.5),
+    'mower on gravel': dial(
+        ('driven_m',), 300, bar_m=0.1, trajectory='lanes', spacing=0.5,
+        image_interval=0.5, wheel_slip_noise=0.1, wheel_slips=6),
+    'mower, 5 turns on the spot, 2 stops': dial(
+        ('standing_s',), 300, bar_m=0.1, trajectory='lanes', spacing=0.5,
+        image_interval=0.5, spins=5, stops=2),
+    'parallel streets': dial(
+        ('alias_pair_ratio', 'num_images_with_false_pairs'),
+        trajectory='parallel', street_blocks=2, spacing=3, num_neighbors=6,
+        alias_ratio=0.3),
+    'parallel streets, half of the pairs false': dial(
+        ('alias_pair_ratio', 'num_images_with_false_pairs'),
+        trajectory='parallel', street_blocks=2, spacing=3, num_neighbors=3,
+        alias_ratio=0.45, spurious_ratio=0.05),
+    'parallel streets, three blackouts': dial(
+        ('alias_pair_ratio', 'num_images_without_texture'),
+        trajectory='parallel', street_blocks=2, spacing=3, num_neighbors=6,
+        alias_ratio=0.2, num_blackouts=3, blackout_images=10),
+    'two parallel streets, 180 images alike, a blackout between': dial(
+        ('alias_pair_ratio', 'num_images_with_false_pairs'), 400,
+        trajectory='parallel', spacing=1, num_neighbors=4, alias_ratio=0.2,
+        num_blackouts=1, blackout_images=40),
+    'floors of a car park': dial(
+        ('alias_pair_ratio', 'num_images_with_false_pairs'), 220,
+        max_drift=0, trajectory='floors', spacing=3, num_neighbors=6,
+        alias_ratio=0.3),
+    'town, 40 % look-alikes': dial(
+        ('alias_pair_ratio',), 200, alias_ratio=0.4),
+    'half of the pairs spurious': dial(
+        ('spurious_pair_ratio',), spurious_ratio=0.5),
+    '70 % of the pairs false': dial(
+        ('alias_pair_ratio', 'spurious_pair_ratio'), 200, alias_ratio=0.2,
+        spurious_ratio=0.5),
+    'turns on the spot': dial(('standing_s',), 200, spins=1, spin_duration=4),
+    'long standstill': dial(('standing_s',), 200, stops=1, stop_duration=12),
+    'wheels on gravel': dial((), wheel_slip_noise=0.03, wheel_slips=4),
+    'cars carry most matches': dial(
+        ('moving_keypoint_ratio', 'moving_match_ratio'), moving_ratio=0.45),
+    'rolling shutter of 30 ms': dial((), rolling_shutter=0.03),
+    'few keypoints inside parts': dial(
+        ('num_images_without_texture',), 200, num_blackouts=4,
+        blackout_images=12, blackout_keypoints=14),
+    'gyroscope drifts by 0.6 deg/s a minute': dial((), gyro_drift=1.75e-4),
+    'a third of the rotations wrong': dial(
+        ('rotation_outlier_ratio',), rotation_outliers=0.33),
+    '80 % outliers': dial(('outlier_match_ratio',), outlier_ratio=0.8,
+                          num_keypoints=600),
+    'GNSS with jumps, no other log': dial(
+        ('num_gnss_fixes',), logs=('gnss',), gnss_rate=1, gnss_jumps=1,
+        bar_m=1.0),
+}
+NOT_ABOUT_A_MODEL = ('are in no model', 'fall apart', 'may join another',
+                     'joins not made')
+
+
+def read_warnings(log_path):
+  with open(log_path, errors='replace') as file:
+    return sorted({line.strip().split('WARNING: ')[1] for line in file
+                   if 'WARNING: ' in line})
+
+
+def list_models(folder):
+  names = [name for name in os.listdir(folder) if name.isdigit()]
+  return [os.path.join(folder, name) for name in sorted(names, key=int)]
+
+
+def map_world(folder, logs, args):
+  """Imports the logs, runs both commands; returns what came out."""
+  suffix = 'with' if logs else 'without'
+  log_path = os.path.join(folder, suffix + '.log')
+  database = os.path.join(folder, suffix + '.db')
+  shutil.copy(os.path.join(folder, 'database.db'), database)
+  if logs:
+    arguments = [args.colmap, 'adasfm_prior_importer', '--database_path',
+                 database, '--image_times_path',
+                 os.path.join(folder, 'times.csv'), '--sensors_path',
+                 os.path.join(folder, 'sensors.yaml')]
+    for log in logs:
+      arguments += ['--%s_path' % log, os.path.join(folder, log + '.csv')]
+    run(arguments, log_path)
+  coarse = os.path.join(folder, suffix + '-global')
+  final = os.path.join(folder, suffix + '-sparse')
+  usage = [run([args.colmap, 'adasfm_global', '--database_path', database,
+                '--output_path', coarse], log_path)]
+  if args.run_mapper:
+    usage.append(run([args.colmap, 'adasfm_mapper', '--database_path', database,
+                      '--input_path', coarse, '--output_path', final],
+                     log_path))
+  models = [measure(path, folder, args, log_path)
+            for path in list_models(final if args.run_mapper else coarse)]
+  models = [model for model in models if model]
+  with open(os.path.join(coarse, 'summary.json')) as file:
+    summary = json.load(file)
+  warnings = [text for text in read_warnings(log_path)
+              if 'no sensor priors' not in text]
+  if summary['joins']['not_made']:
+    warnings.append('joins not made')
+  if any(model['unverified_joins'] for model in summary['models']):
+    warnings.append('unverified joins')
+  return {'images': sum(model['images'] for model in models),
+          'models': len(models),
+          'rmse_m': max((model['rmse_m'] for model in models), default=None),
+          'scale': models[0]['scale'] if models else None,
+          'cpu_s': round(sum(u.cpu_seconds for u in usage), 1),
+          'warnings': warnings}
+
+
+def judge(outcome, bar_m, num_images):
+  if 'error' in outcome:
+    return outcome['error']
+  if outcome['rmse_m'] is None:
+    return 'no model'
+  is_folded = outcome['rmse_m'] > bar_m
+  # What is left out or stays apart says nothing of the models that there are.
+  is_told = any(not any(words in text for words in NOT_ABOUT_A_MODEL)
+                for text in outcome['warnings'])
+  if is_folded:
+    return 'beyond the bar, warned' if is_told else 'BEYOND THE BAR, SILENT'
+  return 'whole' if outcome['images'] == num_images else 'right, incomplete'
+
+
+def describe_failure(error, folder):
+  """The last error of the logs: a command that refuses a world says why."""
+  said = []
+  for name in ('with.log', 'without.log'):
+    path = os.path.join(folder, name)
+    if os.path.exists(path):
+      with open(path, errors='replace') as file:
+        said += [line.strip() for line in file if line.startswith('ERROR: ')]
+  return 'refused: ' + said[-1][len('ERROR: '):] if said else str(error)
+
+
+def run_dial(name, seed, args):
+  row = DIALS[name]
+  folder = world_folder(name, seed, args)
+  shutil.rmtree(folder, ignore_errors=True)
+  os.makedirs(folder)
+  record = {'dial': name, 'seed': seed, 'num_images': row['images']}
+  arguments = [args.colmap, 'adasfm_synthesizer', '--output_path', folder,
+               '--num_images', str(row['images']), '--seed', str(seed)]
+  for option, value in row['options'].items():
+    arguments += ['--' + option, str(value)]
+  record['command'] = ' '.join(arguments[1:2] + arguments[4:])
+  try:
+    run(arguments, os.path.join(folder, 'world.log'))
+  except Failed as error:
+    record['error'] = str(error)
+    return record
+  with open(os.path.join(folder, 'world.json')) as file:
+    record['world'] = json.load(file)
+  drift_m = row['max_drift'] * record['world']['driven_m']
+  for key, logs, bar_m in (('with', row['logs'], row['bar_m']),
+                           ('without', (), max(row['bar_m'], drift_m))):
+    if key not in args.runs.split(','):
+      continue
+    try:
+      record[key] = map_world(folder, logs, args)
+    except Failed as error:
+      record[key] = {'error': describe_failure(error, folder)}
+    record[key]['bar_m'] = bar_m
+    record[key]['verdict'] = judge(record[key], bar_m, row['images'])
+  if not args.keep:
+    shutil.rmtree(folder)
+  return record
+
+
+def cells(outcome):
+  if not outcome:
+    return ['', '', '']
+  if 'error' in outcome or outcome['rmse_m'] is None:
+    return ['-', '-', outcome['verdict']]
+  return ['%d' % outcome['images'] + (
+      ' in %d models' % outcome['models'] if outcome['models'] > 1 else ''),
+          '%.3f' % outcome['rmse_m'], outcome['verdict']]
+
+
+def format_figure(name, value):
+  name = name.replace('num_', '').replace('_ratio', '').replace('_', ' ')
+  return '%s %.4g' % (name, value)
+
+
+def report(records, args):
+  version = args.version or 'of the tree'
+  lines = [
+      '# Worlds under stress', '',
+      'Written by `scripts/benchmark/stress_worlds.py --seeds %s` with version '
+      '%s on %d cores (%s), %s. Each row is one world: its dial with the value '
+      'that `world.json` counted, then images and RMSE of camera centres after a '
+      'similarity (the worst model where there are several), with the logs and '
+      'without any. The bar is 0.5 m (lanes: 0.1 m, GNSS alone: 1 m) and, '
+      'without logs, at least %g %% of the way. Warnings about images and parts that '
+      'are left out do not count as warnings about a model.' % (
+          args.seeds, version, os.cpu_count(), platform.machine(),
+          datetime.date.today().isoformat(), 100 * MAX_DRIFT_WITHOUT_LOGS), '',
+      '| dial | seed | what the world has | images | m | verdict | images, no '
+      'logs | m | verdict |',
+      '|---|---|---|---|---|---|---|---|---|']
+  for record in records:
+    world = record.get('world', {})
+    figures = ', '.join(format_figure(key, world[key])
+                        for key in DIALS[record['dial']]['figures']
+                        if key in world)
+    lines.append('| ' + ' | '.join(
+        [record['dial'], str(record['seed']),
+         record.get('error', figures)] + cells(record.get('with')) +
+        cells(record.get('without'))) + ' |')
+  silent = [(r['dial'], r['seed'], key) for r in records
+            for key in ('with', 'without')
+            if 'SILENT' in r.get(key, {}).get('verdict', '')]
+  lines += ['', 'Beyond the bar without a word: %d of %d models.' % (
+      len(silent), sum(key in r for r in records for key in
+                       ('with', 'without')))]
+  return '\n'.join(lines) + '\n'
+
+
+def parse_arguments():
+  parser = argparse.ArgumentParser(description=__doc__.split('\n')[0])
+  parser.add_argument('dials', nargs='*',
+                      help='rows of the table; all when none is named')
+  add_arguments(parser, __file__, 'stress_worlds', 'adasfm-stress-worlds')
+  parser.add_argument('--seeds', default='1', help='as 1,2,5-8')
+  parser.add_argument('--runs', default='with,without',
+                      help='with logs, without, or both')
+  parser.add_argument('--run_mapper', type=int, default=1,
+                      help='0: coarse models only')
+  parser.add_argument('--version', default='', help='stands in the table')
+  args = parser.parse_args()
+  for name in args.dials:
+    if name not in DIALS:
+      parser.error('no such dial: %s; there are: %s' %
+                   (name, '; '.join(DIALS)))
+  return args
+
+
+def list_seeds(text):
+  seeds = []
+  for part in text.split(','):
+    first, _, last = part.partition('-')
+    seeds += range(int(first), int(last or first) + 1)
+  return seeds
+
+
+def main():
+  args = parse_arguments()
+  records = []
+  for name in args.dials or DIALS:
+    for seed in list_seeds(args.seeds):
+      record = run_dial(name, seed, args)
+      records.append(record)
+      print(name, seed, record.get('error', ''), *(
+          '| %s: %s %s %s' % (key, record[key].get('images'),
+                              record[key].get('rmse_m'),
+                              record[key]['verdict'] + ' ' + '; '.join(
+                                  w[:60] for w in
+                                  record[key].get('warnings', [])))
+          for key in ('with', 'without') if key in record), flush=True)
+      with open(args.figures_path, 'w') as file:
+        json.dump(records, file, indent=1)
+        file.write('\n')
+      with open(args.table_path, 'w') as file:
+        file.write(report(records, args))
+
+
+if __name__ == '__main__':
+  sys.exit(main())

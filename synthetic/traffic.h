@@ -1,0 +1,20 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include "synthetic/synthetic_world.h"
+
+namespace adasfm {
+
+// Two cars that drive ahead of the camera, one in its lane and one in the next,
+// at distances that change slowly; each turns with the camera's car. Nothing is
+// hidden behind them.
+inline constexpr int kNumCars = 2;
+inline constexpr int kNumPointsPerCar = 1000;
+
+// Car k has the points kNumPointsPerCar * k and so on.
+inline int CarOfPoint(int point) { return point / kNumPointsPerCar; }
+
+// Puts options.moving_keypoint_ratio of each image's keypoints onto the cars.
+void AddTraffic(SyntheticWorld* world);
+
+}  // namespace adasfm
