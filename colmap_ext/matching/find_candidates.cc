@@ -1,0 +1,171 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "colmap_ext/matching/find_candidates.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "core/so3.h"
+
+namespace adasfm {
+namespace {
+
+constexpr double kMinDepthM = 0.5;
+// Of a ray's z against its length, for it to be in front.
+constexpr double kMinForward = 0.05;
+
+// A strip of the plane z = 1 of camera 2: |across . p - offset| <= half_width
+// and least <= along . p <= most.
+struct Band {
+  Eigen::Vector2d across;
+  Eigen::Vector2d along;
+  double offset = 0.0;
+  double half_width = 0.0;
+  double least = 0.0;
+  double most = 0.0;
+};
+
+class BandFinder {
+ public:
+  BandFinder(const CandidateOptions& options, const PredictedMotion& prediction,
+             double pixel_size)
+      : prediction_(prediction),
+        rotation_(prediction.cam2_from_cam1.rotation.toRotationMatrix()),
+        min_error_(options.max_error_px * pixel_size),
+        num_sigmas_(options.num_sigmas),
+        greatest_inverse_depth_(
+            1.0 / std::max(kMinDepthM,
+                           prediction.cam2_from_cam1.translation.norm())) {}
+
+  // False when the point at infinity is not in front of camera 2.
+  bool Find(const Eigen::Vector2d& point1, Band* band) const {
+    const Eigen::Vector3d ray = rotation_ * point1.homogeneous().normalized();
+    if (!(ray.z() >= kMinForward)) return false;
+    const Eigen::Vector3d& translation = prediction_.cam2_from_cam1.translation;
+    // The image of ray + inverse depth * translation moves along a line.
+    const Eigen::Vector2d begin = ray.hnormalized();
+    const Eigen::Vector2d motion =
+        translation.head<2>() - translation.z() * begin;
+    band->along = motion.norm() > 1e-9 ? motion.normalized().eval()
+                                       : Eigen::Vector2d::UnitX().eval();
+    band->across = Eigen::Vector2d(-band->along.y(), band->along.x());
+    band->offset = band->across.dot(begin);
+    const Eigen::Matrix2d covariance = ImageCovariance(ray, 0.0);
+    double variance_across = Variance(covariance, band->across);
+    double sigma_along = std::sqrt(Variance(covariance, band->along));
+    band->least =
+        band->along.dot(begin) - min_error_ - num_sigmas_ * sigma_along;
+    const Eigen::Vector3d end = ray + greatest_inverse_depth_ * translation;
+    if (end.z() < kMinForward) {
+      // Half way is as far as such points are in sight.
+      variance_across =
+          std::max(variance_across,
+                   Variance(ImageCovariance(ray, 0.5 * greatest_inverse_depth_),
+                            band->across));
+      band->most = std::numeric_limits<double>::infinity();
+    } else {
+      const Eigen::Matrix2d end_covariance =
+          ImageCovariance(ray, greatest_inverse_depth_);
+      variance_across =
+          std::max(variance_across, Variance(end_covariance, band->across));
+      sigma_along = std::sqrt(Variance(end_covariance, band->along));
+      band->most = band->along.dot(end.hnormalized()) + min_error_ +
+                   num_sigmas_ * sigma_along;
+    }
+    band->half_width = min_error_ + num_sigmas_ * std::sqrt(variance_across);
+    return true;
+  }
+
+ private:
+  static double Variance(const Eigen::Matrix2d& covariance,
+                         const Eigen::Vector2d& direction) {
+    return std::max(0.0, direction.dot(covariance * direction));
+  }
+
+  // Of the image of the point at that depth, by the prediction's errors.
+  Eigen::Matrix2d ImageCovariance(const Eigen::Vector3d& ray,
+                                  double inverse_depth) const {
+    const Eigen::Vector3d point =
+        ray + inverse_depth * prediction_.cam2_from_cam1.translation;
+    const double z = std::max(point.z(), kMinForward);
+    Eigen::Matrix<double, 2, 3> projection;
+    projection << 1.0, 0.0, -point.x() / z, 0.0, 1.0, -point.y() / z;
+    Eigen::Matrix<double, 2, 6> jacobian;
+    jacobian << projection / z * -Hat(ray), projection / z * inverse_depth;
+    return jacobian * prediction_.covariance * jacobian.transpose();
+  }
+
+  const PredictedMotion& prediction_;
+  const Eigen::Matrix3d rotation_;
+  const double min_error_;
+  const double num_sigmas_;
+  const double greatest_inverse_depth_;
+};
+
+// Coordinates in arrays of their own, so that the compiler compares several
+// keypoints at once.
+struct Columns {
+  std::vector<float> x;
+  std::vector<float> y;
+  std::vector<uint8_t> is_inside;
+};
+
+void AppendInside(const Band& band, Columns* columns,
+                  std::vector<int>* indices) {
+  const int count = columns->x.size();
+  const float across_x = band.across.x(), across_y = band.across.y();
+  const float along_x = band.along.x(), along_y = band.along.y();
+  const float offset = band.offset, half_width = band.half_width;
+  const float least = band.least, most = band.most;
+  const float* x = columns->x.data();
+  const float* y = columns->y.data();
+  uint8_t* is_inside = columns->is_inside.data();
+  for (int i = 0; i < count; ++i) {
+    const float across = std::abs(across_x * x[i] + across_y * y[i] - offset);
+    const float along = along_x * x[i] + along_y * y[i];
+    is_inside[i] = (across <= half_width) & (along >= least) & (along <= most);
+  }
+  for (int i = 0; i < count; ++i) {
+    if (is_inside[i]) indices->push_back(i);
+  }
+}
+
+}  // namespace
+
+bool FindCandidates(const CandidateOptions& options,
+                    const PredictedMotion& prediction,
+                    const PlaneKeypoints& keypoints1,
+                    const PlaneKeypoints& keypoints2,
+                    MatchCandidates* candidates) {
+  *candidates = MatchCandidates();
+  const std::vector<Eigen::Vector2d>& points1 = keypoints1.points;
+  const BandFinder finder(options, prediction, keypoints2.pixel_size);
+  std::vector<Band> bands(points1.size());
+  std::vector<char> has_band(points1.size());
+  std::vector<double> half_widths;
+  for (size_t i = 0; i < points1.size(); ++i) {
+    has_band[i] = finder.Find(points1[i], &bands[i]);
+    if (has_band[i]) half_widths.push_back(bands[i].half_width);
+  }
+  if (half_widths.empty() || 2 * half_widths.size() < points1.size()) {
+    return false;
+  }
+  const auto middle = half_widths.begin() + half_widths.size() / 2;
+  std::nth_element(half_widths.begin(), middle, half_widths.end());
+  if (!(*middle <= options.max_band_px * keypoints2.pixel_size)) return false;
+
+  Columns columns;
+  for (const Eigen::Vector2d& point : keypoints2.points) {
+    columns.x.push_back(point.x());
+    columns.y.push_back(point.y());
+  }
+  columns.is_inside.resize(keypoints2.points.size());
+  candidates->begins.push_back(0);
+  for (size_t i = 0; i < points1.size(); ++i) {
+    if (has_band[i]) AppendInside(bands[i], &columns, &candidates->indices);
+    candidates->begins.push_back(candidates->indices.size());
+  }
+  return true;
+}
+
+}  // namespace adasfm
