@@ -66,8 +66,9 @@ void AddFeatureOptions(FeatureOptions* features, CommandOptions* command) {
                       "empty, the focal length is EXIF's or 1.2 times the "
                       "longer side");
   command->AddDefault("single_camera", &features->single_camera,
-                      "1: one camera took all photos, 0: each its own, -1: "
-                      "photos of equal size and focal length share one");
+                      "1: one camera took all photos, 0: each its own, 2: one "
+                      "a folder, -1: photos of equal size and focal length "
+                      "share one");
   command->AddDefault("max_image_size", &features->max_image_size,
                       "larger photos are scaled down for the detector [px]");
   command->AddDefault("max_num_features", &features->max_num_features,

@@ -22,8 +22,9 @@ struct FeatureOptions {
   // Comma-separated, in the model's order; empty: from EXIF, else 1.2 times the
   // longer side as focal length.
   std::string camera_params;
-  // 1: all photos are of one camera; 0: each of its own; -1: photos of equal
-  // size and equal first parameters share one.
+  // 1: all photos are of one camera; 0: each of its own; 2: those of equal size
+  // in a folder share one, as with a lens a folder; -1: photos of equal size
+  // and equal first parameters share one.
   int single_camera = -1;
   // Larger photos are scaled down for the detector.
   int max_image_size = 2000;

@@ -14,13 +14,16 @@ constexpr double kMinDepthM = 0.5;
 // Of a ray's z against its length, for it to be in front.
 constexpr double kMinForward = 0.05;
 
-// A strip of the plane z = 1 of camera 2: |across . p - offset| <= half_width
-// and least <= along . p <= most.
+// A wedge of the plane z = 1 of camera 2, with a = along . p:
+// |across . p - offset| <= half_width + slope * max(0, a - begin),
+// least <= a <= most.
 struct Band {
   Eigen::Vector2d across;
   Eigen::Vector2d along;
   double offset = 0.0;
   double half_width = 0.0;
+  double slope = 0.0;
+  double begin = 0.0;
   double least = 0.0;
   double most = 0.0;
 };
@@ -50,36 +53,39 @@ class BandFinder {
                                        : Eigen::Vector2d::UnitX().eval();
     band->across = Eigen::Vector2d(-band->along.y(), band->along.x());
     band->offset = band->across.dot(begin);
+    band->begin = band->along.dot(begin);
     const Eigen::Matrix2d covariance = ImageCovariance(ray, 0.0);
-    double variance_across = Variance(covariance, band->across);
-    double sigma_along = std::sqrt(Variance(covariance, band->along));
-    band->least =
-        band->along.dot(begin) - min_error_ - num_sigmas_ * sigma_along;
-    const Eigen::Vector3d end = ray + greatest_inverse_depth_ * translation;
-    if (end.z() < kMinForward) {
-      // Half way is as far as such points are in sight.
-      variance_across =
-          std::max(variance_across,
-                   Variance(ImageCovariance(ray, 0.5 * greatest_inverse_depth_),
-                            band->across));
-      band->most = std::numeric_limits<double>::infinity();
+    band->half_width = Margin(covariance, band->across);
+    band->least = band->begin - Margin(covariance, band->along);
+    // Half way to the nearest point, where that would lie behind the camera.
+    const bool has_end =
+        (ray + greatest_inverse_depth_ * translation).z() >= kMinForward;
+    const double inverse_depth =
+        has_end ? greatest_inverse_depth_ : 0.5 * greatest_inverse_depth_;
+    const Eigen::Vector3d end = ray + inverse_depth * translation;
+    if (!(end.z() >= kMinForward)) return false;
+    const Eigen::Matrix2d end_covariance = ImageCovariance(ray, inverse_depth);
+    const double end_along = band->along.dot(end.hnormalized());
+    const double widening =
+        Margin(end_covariance, band->across) - band->half_width;
+    const double length = end_along - band->begin;
+    if (length > min_error_) {
+      band->slope = std::max(0.0, widening / length);
     } else {
-      const Eigen::Matrix2d end_covariance =
-          ImageCovariance(ray, greatest_inverse_depth_);
-      variance_across =
-          std::max(variance_across, Variance(end_covariance, band->across));
-      sigma_along = std::sqrt(Variance(end_covariance, band->along));
-      band->most = band->along.dot(end.hnormalized()) + min_error_ +
-                   num_sigmas_ * sigma_along;
+      band->half_width += std::max(0.0, widening);
     }
-    band->half_width = min_error_ + num_sigmas_ * std::sqrt(variance_across);
+    band->most = has_end ? end_along + Margin(end_covariance, band->along)
+                         : std::numeric_limits<double>::infinity();
     return true;
   }
 
  private:
-  static double Variance(const Eigen::Matrix2d& covariance,
-                         const Eigen::Vector2d& direction) {
-    return std::max(0.0, direction.dot(covariance * direction));
+  // How far off the prediction a keypoint may be in that direction.
+  double Margin(const Eigen::Matrix2d& covariance,
+                const Eigen::Vector2d& direction) const {
+    return min_error_ +
+           num_sigmas_ *
+               std::sqrt(std::max(0.0, direction.dot(covariance * direction)));
   }
 
   // Of the image of the point at that depth, by the prediction's errors.
@@ -116,6 +122,7 @@ void AppendInside(const Band& band, Columns* columns,
   const float across_x = band.across.x(), across_y = band.across.y();
   const float along_x = band.along.x(), along_y = band.along.y();
   const float offset = band.offset, half_width = band.half_width;
+  const float slope = band.slope, begin = band.begin;
   const float least = band.least, most = band.most;
   const float* x = columns->x.data();
   const float* y = columns->y.data();
@@ -123,7 +130,8 @@ void AppendInside(const Band& band, Columns* columns,
   for (int i = 0; i < count; ++i) {
     const float across = std::abs(across_x * x[i] + across_y * y[i] - offset);
     const float along = along_x * x[i] + along_y * y[i];
-    is_inside[i] = (across <= half_width) & (along >= least) & (along <= most);
+    const float width = half_width + slope * std::max(0.0f, along - begin);
+    is_inside[i] = (across <= width) & (along >= least) & (along <= most);
   }
   for (int i = 0; i < count; ++i) {
     if (is_inside[i]) indices->push_back(i);
@@ -142,17 +150,12 @@ bool FindCandidates(const CandidateOptions& options,
   const BandFinder finder(options, prediction, keypoints2.pixel_size);
   std::vector<Band> bands(points1.size());
   std::vector<char> has_band(points1.size());
-  std::vector<double> half_widths;
+  size_t num_bands = 0;
   for (size_t i = 0; i < points1.size(); ++i) {
     has_band[i] = finder.Find(points1[i], &bands[i]);
-    if (has_band[i]) half_widths.push_back(bands[i].half_width);
+    num_bands += has_band[i];
   }
-  if (half_widths.empty() || 2 * half_widths.size() < points1.size()) {
-    return false;
-  }
-  const auto middle = half_widths.begin() + half_widths.size() / 2;
-  std::nth_element(half_widths.begin(), middle, half_widths.end());
-  if (!(*middle <= options.max_band_px * keypoints2.pixel_size)) return false;
+  if (num_bands == 0 || 2 * num_bands < points1.size()) return false;
 
   Columns columns;
   for (const Eigen::Vector2d& point : keypoints2.points) {
@@ -160,9 +163,12 @@ bool FindCandidates(const CandidateOptions& options,
     columns.y.push_back(point.y());
   }
   columns.is_inside.resize(keypoints2.points.size());
+  const double max_num_candidates =
+      options.max_share * points1.size() * keypoints2.points.size();
   candidates->begins.push_back(0);
   for (size_t i = 0; i < points1.size(); ++i) {
     if (has_band[i]) AppendInside(bands[i], &columns, &candidates->indices);
+    if (candidates->indices.size() > max_num_candidates) return false;
     candidates->begins.push_back(candidates->indices.size());
   }
   return true;

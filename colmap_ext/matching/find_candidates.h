@@ -28,9 +28,9 @@ struct CandidateOptions {
   double max_error_px = 4.0;
   // Sigmas of the prediction that are granted.
   double num_sigmas = 3.0;
-  // Of the half width of the band about the epipolar line [px]. Beyond, the
-  // prediction leaves too much for its search to be faster.
-  double max_band_px = 40.0;
+  // Candidates among all pairs of keypoints. Beyond, the prediction leaves too
+  // much for its search to be faster.
+  double max_share = 0.1;
 };
 
 // Where the predicted motion puts the points of image 1 in image 2: near their
@@ -38,10 +38,11 @@ struct CandidateOptions {
 // that of one as near as the baseline is long, or half a metre. Nearer points
 // are seen from directions too different for SIFT.
 // Method: the prediction's covariance is carried to the image, at both ends of
-// the line; every keypoint of image 2 is compared with the band. False, and no
-// candidates, where the prediction is no help: a band wider than
-// max_band_px at the middle keypoint, or a point at infinity that would lie
-// behind camera 2 for more than half of the keypoints.
+// the line. What the rotation's error moves is the same along the line, what
+// the translation's error moves is proportional to the way from infinity; so
+// the band widens linearly. Every keypoint of image 2 is compared with it.
+// False where the prediction is no help: for more candidates than max_share, or
+// where more than half of the keypoints would lie behind camera 2.
 bool FindCandidates(const CandidateOptions& options,
                     const PredictedMotion& prediction,
                     const PlaneKeypoints& keypoints1,
