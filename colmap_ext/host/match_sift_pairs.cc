@@ -54,6 +54,34 @@ PlaneKeypoints KeypointsOnPlane(const colmap::Camera& camera,
   return plane;
 }
 
+// Whether the matches could have been found without the prediction: of an even
+// sample at least a quarter are nearest among all descriptors of image 2. Of
+// wrong matches, found only because nothing else was compared, hardly any are.
+bool IsConfirmedByAll(const colmap::FeatureMatches& matches,
+                      const colmap::FeatureDescriptors& descriptors1,
+                      const colmap::FeatureDescriptors& descriptors2) {
+  constexpr size_t kMaxSampleSize = 64;
+  const size_t count = std::min(matches.size(), kMaxSampleSize);
+  const auto match = [&](size_t k) -> const colmap::FeatureMatch& {
+    return matches[k * matches.size() / count];
+  };
+  colmap::FeatureDescriptors sample(count, kSiftDimensions);
+  for (size_t k = 0; k < count; ++k) {
+    sample.row(k) = descriptors1.row(match(k).point2D_idx1);
+  }
+  BestTwo of_sample;
+  BestTwo of2;
+  FindBestTwo(sample.data(), count, descriptors2.data(), descriptors2.rows(),
+              ProductKernel::kAutomatic, &of_sample, &of2);
+  size_t num_nearest = 0;
+  for (size_t k = 0; k < count; ++k) {
+    const int32_t product = sample.row(k).cast<int32_t>().dot(
+        descriptors2.row(match(k).point2D_idx2).cast<int32_t>());
+    num_nearest += product == of_sample.best[k];
+  }
+  return 4 * num_nearest >= count;
+}
+
 colmap::FeatureMatches ForHost(const std::vector<FeatureMatch>& matches) {
   colmap::FeatureMatches host_matches;
   for (const FeatureMatch& match : matches) {
@@ -106,7 +134,10 @@ std::optional<SiftPairMatcher::Result> SiftPairMatcher::MatchByPrediction(
   const std::optional<colmap::TwoViewGeometry> geometry =
       VerifyPrediction(VerificationOptions(result.matches.size()), *prediction,
                        camera1, camera2, result.matches, points);
-  if (!geometry) return std::nullopt;
+  if (!geometry || !IsConfirmedByAll(geometry->inlier_matches, *descriptors1,
+                                     *descriptors2)) {
+    return std::nullopt;
+  }
   result.geometry = *geometry;
   result.is_guided = true;
   return result;

@@ -56,7 +56,7 @@ class FindCandidatesTest : public testing::Test {
       if (point2.z() < 0.3 * depth || point2.hnormalized().norm() > 1.0) {
         continue;
       }
-      const auto noise = [&] {
+      const auto noise = [&]() -> Eigen::Vector2d {
         return Eigen::Vector2d(random_.Gaussian(noise_px),
                                random_.Gaussian(noise_px)) /
                kFocalLengthPx;
