@@ -5,6 +5,7 @@
 #include <util/random.h>
 
 #include <algorithm>
+#include <map>
 #include <stdexcept>
 #include <string>
 
@@ -54,32 +55,36 @@ PlaneKeypoints KeypointsOnPlane(const colmap::Camera& camera,
   return plane;
 }
 
-// Whether the matches could have been found without the prediction: of an even
-// sample at least a quarter are nearest among all descriptors of image 2. Of
-// wrong matches, found only because nothing else was compared, hardly any are.
-bool IsConfirmedByAll(const colmap::FeatureMatches& matches,
+// Whether matches that were found without the prediction are among those found
+// with it: of an even sample of image 1's descriptors, compared with all of
+// image 2. A wrong prediction finds only matches that happen to agree with it.
+bool IsConfirmedByAll(const colmap::FeatureMatches& inlier_matches,
                       const colmap::FeatureDescriptors& descriptors1,
                       const colmap::FeatureDescriptors& descriptors2) {
-  constexpr size_t kMaxSampleSize = 64;
-  const size_t count = std::min(matches.size(), kMaxSampleSize);
-  const auto match = [&](size_t k) -> const colmap::FeatureMatch& {
-    return matches[k * matches.size() / count];
-  };
+  constexpr int kMaxSampleSize = 512;
+  constexpr size_t kMinNumMatches = 8;
+  constexpr double kMinShare = 0.4;
+  const int num_all = descriptors1.rows();
+  const int count = std::min(num_all, kMaxSampleSize);
   colmap::FeatureDescriptors sample(count, kSiftDimensions);
-  for (size_t k = 0; k < count; ++k) {
-    sample.row(k) = descriptors1.row(match(k).point2D_idx1);
+  for (int k = 0; k < count; ++k) {
+    sample.row(k) = descriptors1.row(k * num_all / count);
   }
-  BestTwo of_sample;
-  BestTwo of2;
-  FindBestTwo(sample.data(), count, descriptors2.data(), descriptors2.rows(),
-              ProductKernel::kAutomatic, &of_sample, &of2);
-  size_t num_nearest = 0;
-  for (size_t k = 0; k < count; ++k) {
-    const int32_t product = sample.row(k).cast<int32_t>().dot(
-        descriptors2.row(match(k).point2D_idx2).cast<int32_t>());
-    num_nearest += product == of_sample.best[k];
+  const std::vector<FeatureMatch> matches =
+      MatchDescriptors(MatchingOptions(), sample.data(), count,
+                       descriptors2.data(), descriptors2.rows());
+  std::map<point2D_t, point2D_t> partners;
+  for (const colmap::FeatureMatch& match : inlier_matches) {
+    partners[match.point2D_idx1] = match.point2D_idx2;
   }
-  return 4 * num_nearest >= count;
+  size_t num_agreeing = 0;
+  for (const FeatureMatch& match : matches) {
+    const auto partner = partners.find(match.point2D_idx1 * num_all / count);
+    num_agreeing +=
+        partner != partners.end() && partner->second == match.point2D_idx2;
+  }
+  return matches.size() >= kMinNumMatches &&
+         num_agreeing >= kMinShare * matches.size();
 }
 
 colmap::FeatureMatches ForHost(const std::vector<FeatureMatch>& matches) {

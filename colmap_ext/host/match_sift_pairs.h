@@ -23,10 +23,10 @@ namespace adasfm {
 // neither on the threads nor on the order of the pairs.
 // Where the motion between the images is predicted, only keypoints are compared
 // that it lets show the same point (matching/find_candidates.h), and the
-// geometry is sought next to it (verify_prediction.h). Where that finds none, or
-// one whose matches all descriptors do not confirm, the pair is matched as any
-// other.
-// Images must have descriptors of kSiftDimensions bytes, or none.
+// geometry is sought next to it (verify_prediction.h). Where that finds none,
+// or one that a sample of matches found without the prediction does not
+// confirm, the pair is matched as any other. Images must have descriptors of
+// kSiftDimensions bytes, or none.
 class SiftPairMatcher {
  public:
   // The database and the cache over it must outlive the matcher.
