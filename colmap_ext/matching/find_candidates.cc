@@ -2,8 +2,10 @@
 #include "colmap_ext/matching/find_candidates.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 #include "core/so3.h"
 
@@ -108,35 +110,89 @@ class BandFinder {
   const double greatest_inverse_depth_;
 };
 
-// Coordinates in arrays of their own, so that the compiler compares several
-// keypoints at once.
-struct Columns {
-  std::vector<float> x;
-  std::vector<float> y;
-  std::vector<uint8_t> is_inside;
-};
+// Keypoints in blocks of neighbours, so that most of them are told from a band
+// together.
+class KeypointBlocks {
+ public:
+  explicit KeypointBlocks(const std::vector<Eigen::Vector2d>& points) {
+    std::vector<int> order;
+    for (size_t i = 0; i < points.size(); ++i) {
+      if (points[i].allFinite()) order.push_back(i);
+    }
+    // Strips by x, cut by y: as many strips as blocks in a strip.
+    const auto sort = [&](size_t begin, size_t end, int axis) {
+      std::sort(order.begin() + begin, order.begin() + end, [&](int i, int k) {
+        return std::make_pair(points[i](axis), i) <
+               std::make_pair(points[k](axis), k);
+      });
+    };
+    sort(0, order.size(), 0);
+    const size_t strip_size =
+        kSize *
+        static_cast<size_t>(std::ceil(std::sqrt(order.size() / double{kSize})));
+    for (size_t begin = 0; begin < order.size(); begin += strip_size) {
+      const size_t end = std::min(order.size(), begin + strip_size);
+      sort(begin, end, 1);
+      for (size_t i = begin; i < end; i += kSize) {
+        Add(points, order.data() + i, std::min<size_t>(kSize, end - i));
+      }
+    }
+  }
 
-void AppendInside(const Band& band, Columns* columns,
-                  std::vector<int>* indices) {
-  const int count = columns->x.size();
-  const float across_x = band.across.x(), across_y = band.across.y();
-  const float along_x = band.along.x(), along_y = band.along.y();
-  const float offset = band.offset, half_width = band.half_width;
-  const float slope = band.slope, begin = band.begin;
-  const float least = band.least, most = band.most;
-  const float* x = columns->x.data();
-  const float* y = columns->y.data();
-  uint8_t* is_inside = columns->is_inside.data();
-  for (int i = 0; i < count; ++i) {
-    const float across = std::abs(across_x * x[i] + across_y * y[i] - offset);
-    const float along = along_x * x[i] + along_y * y[i];
-    const float width = half_width + slope * std::max(0.0f, along - begin);
-    is_inside[i] = (across <= width) & (along >= least) & (along <= most);
+  void AppendInside(const Band& band, std::vector<int>* indices) const {
+    for (const Block& block : blocks_) {
+      const double along = band.along.dot(block.center);
+      const double across =
+          std::abs(band.across.dot(block.center) - band.offset);
+      const double width =
+          band.half_width +
+          band.slope * std::max(0.0, along + block.radius - band.begin);
+      if (across > width + block.radius || along + block.radius < band.least ||
+          along - block.radius > band.most) {
+        continue;
+      }
+      for (int k = 0; k < block.count; ++k) {
+        if (IsInside(band, block.points[k])) indices->push_back(block.ids[k]);
+      }
+    }
   }
-  for (int i = 0; i < count; ++i) {
-    if (is_inside[i]) indices->push_back(i);
+
+ private:
+  static constexpr int kSize = 8;
+  struct Block {
+    Eigen::Vector2d center = Eigen::Vector2d::Zero();
+    double radius = 0.0;
+    int count = 0;
+    std::array<Eigen::Vector2d, kSize> points;
+    std::array<int, kSize> ids;
+  };
+
+  static bool IsInside(const Band& band, const Eigen::Vector2d& point) {
+    const double along = band.along.dot(point);
+    const double width =
+        band.half_width + band.slope * std::max(0.0, along - band.begin);
+    return std::abs(band.across.dot(point) - band.offset) <= width &&
+           along >= band.least && along <= band.most;
   }
-}
+
+  void Add(const std::vector<Eigen::Vector2d>& points, const int* ids,
+           int count) {
+    Block block;
+    block.count = count;
+    for (int k = 0; k < count; ++k) {
+      block.ids[k] = ids[k];
+      block.points[k] = points[ids[k]];
+      block.center += points[ids[k]] / count;
+    }
+    for (int k = 0; k < count; ++k) {
+      block.radius =
+          std::max(block.radius, (block.points[k] - block.center).norm());
+    }
+    blocks_.push_back(block);
+  }
+
+  std::vector<Block> blocks_;
+};
 
 }  // namespace
 
@@ -157,17 +213,12 @@ bool FindCandidates(const CandidateOptions& options,
   }
   if (num_bands == 0 || 2 * num_bands < points1.size()) return false;
 
-  Columns columns;
-  for (const Eigen::Vector2d& point : keypoints2.points) {
-    columns.x.push_back(point.x());
-    columns.y.push_back(point.y());
-  }
-  columns.is_inside.resize(keypoints2.points.size());
+  const KeypointBlocks blocks(keypoints2.points);
   const double max_num_candidates =
       options.max_share * points1.size() * keypoints2.points.size();
   candidates->begins.push_back(0);
   for (size_t i = 0; i < points1.size(); ++i) {
-    if (has_band[i]) AppendInside(bands[i], &columns, &candidates->indices);
+    if (has_band[i]) blocks.AppendInside(bands[i], &candidates->indices);
     if (candidates->indices.size() > max_num_candidates) return false;
     candidates->begins.push_back(candidates->indices.size());
   }

@@ -40,7 +40,8 @@ struct CandidateOptions {
 // Method: the prediction's covariance is carried to the image, at both ends of
 // the line. What the rotation's error moves is the same along the line, what
 // the translation's error moves is proportional to the way from infinity; so
-// the band widens linearly. Every keypoint of image 2 is compared with it.
+// the band widens linearly. The keypoints of image 2 are compared with it in
+// blocks of neighbours.
 // False where the prediction is no help: for more candidates than max_share, or
 // where more than half of the keypoints would lie behind camera 2.
 bool FindCandidates(const CandidateOptions& options,
