@@ -208,7 +208,8 @@ TEST_F(BagTest, AVideoBecomesPhotosWithItsTimes) {
   }
   std::sort(truths.begin(), truths.end());
   for (int i = 0; i < kNumImages; ++i) {
-    const std::string name = std::to_string(1000000000 * (35 + i) / 5) + ".jpg";
+    const std::string name =
+        std::to_string(int64_t{200000000} * (35 + i)) + ".jpg";
     const cv::Mat photo = cv::imread(workspace_ + "/bag/images/" +
                                      std::string(23 - name.size(), '0') + name);
     ASSERT_FALSE(photo.empty()) << name;
