@@ -224,7 +224,8 @@ TEST_F(BagTest, AVideoBecomesPhotosWithItsTimes) {
   ExpectError(command + " --image_distance_m 1", "with a video --wheel_path");
   ExpectError(command, "ffprobe is not on the PATH", "PATH=/nowhere");
   ExpectError("adasfm_automatic_reconstructor --video_path " +
-                  drive_->File("gt.txt") + " --workspace_path " + workspace_,
+                  folder_.Write("no.mp4", "This is no film.") +
+                  " --workspace_path " + workspace_,
               "ffprobe failed");
 }
 
