@@ -4,12 +4,15 @@
 # COLMAP once into a cache folder, configures and builds the project.
 # Run it again at any time: what is done is not done twice.
 #
-#   scripts/setup.sh [--host-only] [--for-tests] [--configure-only] [CMake arguments...]
+#   scripts/setup.sh [--for-demo | --for-tests] [--host-only] [--configure-only]
+#                    [CMake arguments...]
 #
-# --host-only stops after the host, --for-tests also installs the browser that
+# --for-demo does only what the adasfm_* commands need: no tests, no benchmarks,
+# no program of COLMAP, only the files of its library that are linked; the next
+# run without it does the rest. --for-tests also installs the browser that
 # the report's test and the screenshots need, a Slurm for the cluster's test,
-# and what the packages and the documentation are checked with;
-# --configure-only leaves the project unbuilt.
+# and what the packages and the documentation are checked with. --host-only
+# stops after the host; --configure-only leaves the project unbuilt.
 # Environment: ADASFM_CACHE (default: the user's cache folder) holds the host;
 # ADASFM_BUILD_DIR (default: build/); ADASFM_BUILD_TYPE (default: Release).
 # With -DCOLMAP_DIR=PREFIX/share/colmap that COLMAP is used instead.
@@ -21,10 +24,15 @@ build=${ADASFM_BUILD_DIR:-$root/build}
 jobs=$(nproc)
 colmap_version=3.8
 host_prefix=$cache/colmap-$colmap_version
+host_source=$cache/apt/sources/colmap-$colmap_version
+host_log=$cache/colmap-build.log
+# CPU minutes, for the plan; a machine that has nothing else to do needs less.
+host_minutes=12 host_part_minutes=6 project_minutes=20 demo_minutes=11
 
-packages=(
+# Without these nothing is built.
+demo_packages=(
   # The tools.
-  build-essential cmake ninja-build ccache clang-format dpkg-dev
+  build-essential cmake ninja-build dpkg-dev
   # The host's own dependencies.
   libboost-program-options-dev libboost-filesystem-dev libboost-graph-dev
   libboost-system-dev libboost-test-dev libfreeimage-dev libflann-dev
@@ -34,14 +42,35 @@ packages=(
   # do not depend on the number of cores.
   libopenblas-serial-dev
   # Ours.
-  libopencv-dev libyaml-cpp-dev nlohmann-json3-dev libzstd-dev
+  libopencv-dev libyaml-cpp-dev nlohmann-json3-dev libzstd-dev)
+more_packages=(
+  ccache clang-format
+  # ROS 1 bags, tests and benchmarks.
   librosbag-storage-dev libsensor-msgs-dev libnav-msgs-dev
   libgtest-dev libgmock-dev libbenchmark-dev
   # For the scripts that draw tables and compare models.
   python3 python3-numpy python3-matplotlib sqlite3)
 test_packages=(chromium chromium-driver python3-selenium file lintian
-  python3-h5py clang libclang-rt-14-dev linux-perf
+  python3-h5py clang libclang-rt-14-dev linux-perf ffmpeg
   slurmctld slurmd slurm-client munge)
+
+# The files of COLMAP's library that our program links
+# (scripts/checks/check_host_part.sh), and its other libraries.
+host_part=(base/{camera,camera_database,camera_models,camera_rig}
+  base/{correspondence_graph,database,essential_matrix,gps,homography_matrix}
+  base/{image,image_reader,point2d,point3d,polynomial,pose,projection}
+  base/{reconstruction,similarity_transform,track,triangulation}
+  base/visibility_pyramid estimators/{absolute_pose,affine_transform}
+  estimators/{essential_matrix,fundamental_matrix,homography_matrix,pose}
+  estimators/{triangulation,two_view_geometry,utils}
+  feature/{extraction,matching,sift,types,utils}
+  optim/{bundle_adjustment,combination_sampler,random_sampler}
+  optim/support_measurement retrieval/{geometry,vote_and_verify}
+  sfm/incremental_triangulator util/{bitmap,camera_specs,logging,math,misc}
+  util/{ply,random,string,threading,timer})
+host_part_libraries=(PBA/libpba.a SiftGPU/libsift_gpu.a VLFeat/libvlfeat.a)
+# Linked by name, and nothing of them used.
+host_unused_libraries=(liblsd.a libpoisson_recon.a)
 
 say() { printf '\n== %s\n' "$*"; }
 die() { printf 'setup: %s\n' "$*" >&2; exit 1; }
@@ -58,22 +87,66 @@ check_root() {
   sudo -v || die 'installing packages needs root, and sudo refused; run this script as root'
 }
 
-install_packages() {
-  local missing=() package
+# Reads lines `DONE ALL` of numbers, and shows one line of progress with the
+# time left; in a log a line at every tenth.
+show_progress() {
+  local what=$1 start=$SECONDS shown=0 finished all percent rest line
+  while read -r finished all; do
+    percent=$((100 * finished / all))
+    printf -v line '   %s: %3d %%' "$what" "$percent"
+    if [ "$percent" -ge 2 ]; then
+      rest=$(((SECONDS - start) * (all - finished) / finished))
+      printf -v line '%s, %d:%02d left' "$line" $((rest / 60)) $((rest % 60))
+    fi
+    if [ -t 1 ]; then
+      printf '\r%-60s' "$line"
+    elif [ $((percent / 10)) -gt "$shown" ]; then
+      printf '%s\n' "$line"
+    fi
+    shown=$((percent / 10))
+  done
+  if [ -t 1 ]; then printf '\n'; fi
+}
+
+# Builds with Ninja in the folder $2, all or the targets that follow, into the
+# log $3, with progress called $1.
+build_with_progress() {
+  local what=$1 folder=$2 log=$3
+  shift 3
+  NINJA_STATUS='[%f %t] ' ninja -C "$folder" -j "$jobs" "$@" 2>&1 |
+    tee -a "$log" | sed -unE 's/^\[([0-9]+ [0-9]+)\].*/\1/p' |
+    show_progress "$what"
+}
+
+find_missing_packages() {
+  local package
+  missing_packages=()
   for package in "${packages[@]}"; do
     dpkg-query -W -f '${Status}' "$package" 2> /dev/null |
-      grep -q 'install ok installed' || missing+=("$package")
+      grep -q 'install ok installed' || missing_packages+=("$package")
   done
-  if [ ${#missing[@]} = 0 ]; then return; fi
-  say "Installing ${#missing[@]} Debian packages (about 2 minutes): ${missing[*]}"
+}
+
+install_packages() {
+  if [ ${#missing_packages[@]} = 0 ]; then return; fi
+  say "Installing ${#missing_packages[@]} Debian packages: ${missing_packages[*]}"
   check_root
+  local log=$cache/apt.log kind percent
   {
-    as_root apt-get -o APT::Update::Error-Mode=any update &&
+    as_root apt-get -o APT::Update::Error-Mode=any update > "$log" 2>&1 &&
       as_root env DEBIAN_FRONTEND=noninteractive apt-get install -y \
-        --no-install-recommends "${missing[@]}"
-  } > "$cache/apt.log" 2>&1 || {
-    tail -n 5 "$cache/apt.log" >&2
-    die "installing the packages failed (it needs the network); see $cache/apt.log"
+        --no-install-recommends -o APT::Status-Fd=1 "${missing_packages[@]}" \
+        2>> "$log" | tee -a "$log" |
+        while IFS=: read -r kind _ percent _; do
+          # Getting the packages is a quarter of the time.
+          case $kind in
+            dlstatus) echo "${percent%%.*}" 400 ;;
+            pmstatus) echo $((100 + 3 * ${percent%%.*})) 400 ;;
+          esac
+        done | show_progress packages
+  } || {
+    tail -n 5 "$log" >&2
+    die "installing the packages failed (it needs the network); see $log"
   }
 }
 
@@ -113,38 +186,124 @@ fetch_host_source() {
   }
 }
 
-build_host() {
-  if [ -f "$host_prefix/.complete" ]; then return; fi
-  say "Building the host COLMAP $colmap_version into $host_prefix, once" \
-    "(about $((20 / jobs + 1)) minutes on $jobs cores)"
+configure_host() {
+  if [ -f "$host_source/build/build.ninja" ]; then return; fi
   fetch_host_source
-  local source_dir=$cache/apt/sources/colmap-$colmap_version
-  local log=$cache/colmap-build.log
   rm -rf "$host_prefix"
-  {
-    cmake -S "$source_dir" -B "$source_dir/build" -G Ninja \
-      -DCMAKE_BUILD_TYPE=Release -DCMAKE_INSTALL_PREFIX="$host_prefix" \
-      -DGUI_ENABLED=OFF -DOPENGL_ENABLED=OFF -DCUDA_ENABLED=OFF \
-      -DCGAL_ENABLED=OFF -DTESTS_ENABLED=OFF -DBOOST_STATIC=OFF
-    cmake --build "$source_dir/build" --parallel "$jobs"
-    cmake --install "$source_dir/build"
-  } > "$log" 2>&1 || {
-    tail -n 20 "$log" >&2
-    die "building COLMAP failed; see $log"
+  cmake -S "$host_source" -B "$host_source/build" -G Ninja \
+    -DCMAKE_BUILD_TYPE=Release -DCMAKE_INSTALL_PREFIX="$host_prefix" \
+    -DGUI_ENABLED=OFF -DOPENGL_ENABLED=OFF -DCUDA_ENABLED=OFF \
+    -DCGAL_ENABLED=OFF -DTESTS_ENABLED=OFF -DBOOST_STATIC=OFF > "$host_log" 2>&1
+}
+
+# Headers, CMake package and what of the libraries our program links. The build
+# folder stays: build_host goes on from there, and installs the same headers.
+build_host_part() {
+  local source objects=() lib=$host_prefix/lib/colmap
+  for source in "${host_part[@]}"; do
+    objects+=("src/CMakeFiles/colmap.dir/$source.cc.o")
+  done
+  configure_host &&
+    build_with_progress COLMAP "$host_source/build" "$host_log" \
+      "${objects[@]}" "${host_part_libraries[@]/#/lib/}" &&
+    cmake -D CMAKE_INSTALL_LOCAL_ONLY=1 \
+      -P "$host_source/build/cmake_install.cmake" >> "$host_log" 2>&1 &&
+    mkdir -p "$lib" && cd "$host_source/build" &&
+    cp "${host_part_libraries[@]/#/lib/}" "$lib" &&
+    rm -f "$lib/libcolmap.a" && ar qcs "$lib/libcolmap.a" "${objects[@]}" &&
+    for source in "${host_unused_libraries[@]}"; do ar qcs "$lib/$source"; done
+}
+
+build_whole_host() {
+  configure_host &&
+    build_with_progress COLMAP "$host_source/build" "$host_log" &&
+    cmake --install "$host_source/build" >> "$host_log" 2>&1 &&
+    rm -rf "$host_source/build"
+}
+
+# $1: whole or part.
+build_host() {
+  say "Building COLMAP $colmap_version ($1) into $host_prefix, once"
+  local mark=$host_prefix/.complete
+  if [ "$1" = part ]; then mark=$host_prefix/.part; fi
+  # In a shell of its own, as an if would switch off errexit, and cd stays.
+  (
+    case $1 in
+      part) build_host_part ;;
+      whole) build_whole_host ;;
+    esac
+  ) || {
+    tail -n 20 "$host_log" >&2
+    die "building COLMAP failed; see $host_log"
   }
-  rm -rf "$source_dir/build"
-  touch "$host_prefix/.complete"
+  touch "$mark"
+}
+
+build_project() {
+  say "Building the project into $build"
+  local options=(-DCMAKE_BUILD_TYPE="${ADASFM_BUILD_TYPE:-Release}"
+    -DCOLMAP_DIR="$colmap_dir" -DADASFM_WERROR=ON)
+  local log=$cache/configure.log targets=()
+  if [ "$for_demo" = 1 ]; then
+    targets=(adasfm_launcher)
+    # A folder that was set up with tests keeps them.
+    if [ ! -f "$build/CMakeCache.txt" ]; then
+      options+=(-DADASFM_BUILD_TESTS=OFF -DADASFM_BUILD_BENCHMARKS=OFF)
+    fi
+  else
+    options+=(-DADASFM_BUILD_TESTS=ON -DADASFM_BUILD_BENCHMARKS=ON)
+  fi
+  cmake -S "$root" -B "$build" -G Ninja "${options[@]}" \
+    "${cmake_arguments[@]}" > "$log" 2>&1 || {
+    tail -n 20 "$log" >&2
+    die "configuring failed; see $log"
+  }
+  if [ "$configure_only" = 1 ]; then return; fi
+  log=$cache/build.log
+  : > "$log"
+  build_with_progress project "$build" "$log" "${targets[@]}" || {
+    grep -A 30 -m 1 '^FAILED' "$log" >&2 || tail -n 20 "$log" >&2
+    die "building the project failed; see $log"
+  }
+}
+
+# The CPU minutes above, divided among the cores.
+say_plan() {
+  local total=0 minutes
+  plan() {
+    minutes=$1
+    total=$((total + minutes))
+    printf '   about %2d min  %s\n' "$minutes" "$2"
+  }
+  say "This will take, on $jobs cores, at most:"
+  if [ ${#missing_packages[@]} != 0 ]; then
+    plan 2 "${#missing_packages[@]} Debian packages (about 200 MB to download)"
+  fi
+  case $host in
+    part) plan $((host_part_minutes / jobs + 1)) "the part of COLMAP $colmap_version that is needed" ;;
+    whole) plan $((host_minutes / jobs + 1)) "COLMAP $colmap_version" ;;
+  esac
+  if [ "$host_only$configure_only" = 00 ] && [ ! -f "$build/bin/colmap" ]; then
+    if [ "$for_demo" = 1 ]; then
+      plan $((demo_minutes / jobs + 1)) 'the project'
+    else
+      plan $((project_minutes / jobs + 1)) 'the project with its tests'
+    fi
+  fi
+  if [ "$total" = 0 ]; then printf '   seconds\n'; fi
 }
 
 main() {
   [ -r /etc/debian_version ] || die 'this script knows Debian 12 only; see docs/guide/install.md for other systems'
   mkdir -p "$cache" && [ -w "$cache" ] ||
     die "cannot write to the cache folder $cache; set ADASFM_CACHE to another one"
-  local host_only=0 configure_only=0 argument cmake_arguments=()
-  local colmap_dir=$host_prefix/share/colmap
+  local argument for_demo=0 host_only=0 configure_only=0 cmake_arguments=()
+  local colmap_dir=$host_prefix/share/colmap host=none missing_packages
+  local packages=("${demo_packages[@]}" "${more_packages[@]}")
   for argument in "$@"; do
     case $argument in
       --host-only) host_only=1 ;;
+      --for-demo) for_demo=1 packages=("${demo_packages[@]}") ;;
       --for-tests) packages+=("${test_packages[@]}") ;;
       --configure-only) configure_only=1 ;;
       -DCOLMAP_DIR=*) colmap_dir=${argument#*=} ;;
@@ -152,19 +311,17 @@ main() {
       *) die "unknown argument: $argument" ;;
     esac
   done
+  find_missing_packages
+  if [ "$colmap_dir" = "$host_prefix/share/colmap" ] &&
+    [ ! -f "$host_prefix/.complete" ]; then
+    host=whole
+    if [ "$for_demo" = 1 ]; then host=part; fi
+    if [ "$host" = part ] && [ -f "$host_prefix/.part" ]; then host=none; fi
+  fi
+  say_plan
   install_packages
-  if [ "$colmap_dir" = "$host_prefix/share/colmap" ]; then build_host; fi
-  if [ "$host_only" = 1 ]; then return; fi
-  say "Building the project into $build (about $((14 / jobs + 1)) minutes the first time, seconds later)"
-  cmake -S "$root" -B "$build" -G Ninja \
-    -DCMAKE_BUILD_TYPE="${ADASFM_BUILD_TYPE:-Release}" \
-    -DCOLMAP_DIR="$colmap_dir" -DADASFM_WERROR=ON "${cmake_arguments[@]}" > "$cache/configure.log" 2>&1 || {
-    tail -n 20 "$cache/configure.log" >&2
-    die "configuring failed; see $cache/configure.log"
-  }
-  if [ "$configure_only" = 1 ]; then return; fi
-  cmake --build "$build" --parallel "$jobs" ||
-    die 'building the project failed; the messages above say where'
+  if [ "$host" != none ]; then build_host "$host"; fi
+  if [ "$host_only" = 0 ]; then build_project; fi
 }
 
 main "$@"

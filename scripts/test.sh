@@ -14,6 +14,7 @@ scripts/setup.sh --for-tests
 printf '\n== Checking format and layers\n'
 scripts/checks/check_format.sh
 scripts/checks/check_layers.sh
+scripts/checks/check_host_part.sh
 
 if [ "${1:-}" != --no-sanitizers ]; then
   printf '\n== Building the pure layers with sanitizers (about 4 minutes the first time)\n'

@@ -24,13 +24,6 @@ constexpr char kSensorsFile[] = "sensors.yaml";
 // The share of the time that the pass for the logs takes.
 constexpr double kLogShare = 0.2;
 
-// Equal length: in the order of names photos are in the order of time.
-std::string PhotoStem(timestamp_t time_ns) {
-  char stem[24];
-  std::snprintf(stem, sizeof(stem), "%019lld", static_cast<long long>(time_ns));
-  return stem;
-}
-
 class BagExtractor {
  public:
   BagExtractor(const std::string& bag_path, const BagExtractionOptions& options,
@@ -224,6 +217,12 @@ StatusOr<BagExtraction> ExtractBag(const std::string& bag_path,
   return BagExtractor(bag_path, options, folder, progress).Run();
 }
 
+std::string PhotoStem(timestamp_t time_ns) {
+  char stem[24];
+  std::snprintf(stem, sizeof(stem), "%019lld", static_cast<long long>(time_ns));
+  return stem;
+}
+
 BagFiles FindBagFiles(const std::string& folder) {
   BagFiles files;
   const auto find = [&folder](const char* name) {
@@ -242,8 +241,8 @@ BagFiles FindBagFiles(const std::string& folder) {
 }
 
 Status RemoveBagFiles(const std::string& folder) {
-  for (const char* name : {kImageFolder, kTimesFile, kCameraFile, kSensorsFile,
-                           "imu.csv", "wheel.csv", "gnss.csv"}) {
+  for (const char* name : {kImageFolder, "new", kTimesFile, kCameraFile,
+                           kSensorsFile, "imu.csv", "wheel.csv", "gnss.csv"}) {
     std::error_code error;
     fs::remove_all(folder + "/" + name, error);
     if (error) {

@@ -10,6 +10,7 @@
 #include "core/progress.h"
 #include "core/sensor_log.h"
 #include "core/status.h"
+#include "core/types.h"
 #include "sensors/io/bag_topics.h"
 
 namespace adasfm {
@@ -49,6 +50,10 @@ StatusOr<BagExtraction> ExtractBag(const std::string& bag_path,
                                    const BagExtractionOptions& options,
                                    const std::string& folder,
                                    const ProgressCallback& progress);
+
+// The name of a photo without its extension: of equal length, so that the order
+// of names is that of time.
+std::string PhotoStem(timestamp_t time_ns);
 
 // The files of a finished extraction.
 BagFiles FindBagFiles(const std::string& folder);

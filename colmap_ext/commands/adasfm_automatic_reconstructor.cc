@@ -24,10 +24,11 @@ void AddBagOptions(BagExtractionOptions* bag,
                       "topic of the photos in the bag; when empty, the only "
                       "one");
   command->AddDefault("image_step", &bag->photos.image_step,
-                      "every so many photos of the bag are used");
+                      "every so many photos of the bag are used; of a video, "
+                      "the sharpest of every so many frames or half of them");
   command->AddDefault("image_distance_m", &bag->photos.image_distance_m,
-                      "photos of the bag are this far apart by its wheels, or "
-                      "10 degrees of turn [m]; 0: all");
+                      "photos of the bag or video are this far apart by the "
+                      "wheels, or 10 degrees of turn [m]; 0: all");
 }
 
 void AddPaths(AutomaticReconstructionOptions* options,
@@ -36,6 +37,12 @@ void AddPaths(AutomaticReconstructionOptions* options,
                       "folder of the photos or, with --data_format, root "
                       "folder of the recording");
   AddBagOptions(&options->bag, paths, command);
+  command->AddDefault("video_path", &paths->video_path,
+                      "in place of --image_path: a film, read by ffmpeg; times "
+                      "are the container's");
+  command->AddDefault("video_start_ns", &options->video_start_ns,
+                      "time of the video's beginning on the clock of the logs "
+                      "[ns]");
   command->AddRequired("workspace_path", &paths->workspace_path,
                        "folder for all results; the same command on it again "
                        "continues");
@@ -59,8 +66,9 @@ void AddFeatureOptions(FeatureOptions* features, CommandOptions* command) {
                       "empty, the focal length is EXIF's or 1.2 times the "
                       "longer side");
   command->AddDefault("single_camera", &features->single_camera,
-                      "1: one camera took all photos, 0: each its own, -1: "
-                      "photos of equal size and focal length share one");
+                      "1: one camera took all photos, 0: each its own, 2: one "
+                      "a folder, -1: photos of equal size and focal length "
+                      "share one");
   command->AddDefault("max_image_size", &features->max_image_size,
                       "larger photos are scaled down for the detector [px]");
   command->AddDefault("max_num_features", &features->max_num_features,
@@ -96,7 +104,8 @@ Status RunAdasfmAutomaticReconstructor(int argc, char** argv) {
   CommandOptions command(
       "adasfm_automatic_reconstructor",
       "From a folder of photos, and the logs of an IMU and wheels where there "
-      "are any, or from a ROS bag, to a model and a report about it.");
+      "are any, from a film or from a ROS bag, to a model and a report about "
+      "it.");
   AddPaths(&options, &paths, &command);
   AddFeatureOptions(&options.features, &command);
   command.AddDefault("refine_intrinsics", &options.refine_intrinsics,
@@ -107,6 +116,10 @@ Status RunAdasfmAutomaticReconstructor(int argc, char** argv) {
                      "every image is matched with so many of the next ones");
   command.AddDefault("num_similar_images", &options.pairs.num_similar_images,
                      "and with so many of the most similar ones beyond them");
+  command.AddDefault("guided_matching", &options.guided_matching,
+                     "1: where sensor logs predict the motion between two "
+                     "photos, compare only features near their epipolar "
+                     "lines; 0: compare all");
   command.AddDefault("restart", &options.restart,
                      "1: remove what earlier runs left in the workspace, and "
                      "do it all anew; 0: continue");

@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "colmap_ext/matching/motion_prediction.h"
 #include "core/progress.h"
 #include "core/status.h"
 #include "core/types.h"
@@ -21,8 +22,9 @@ struct FeatureOptions {
   // Comma-separated, in the model's order; empty: from EXIF, else 1.2 times the
   // longer side as focal length.
   std::string camera_params;
-  // 1: all photos are of one camera; 0: each of its own; -1: photos of equal
-  // size and equal first parameters share one.
+  // 1: all photos are of one camera; 0: each of its own; 2: those of equal size
+  // in a folder share one, as with a lens a folder; -1: photos of equal size
+  // and equal first parameters share one.
   int single_camera = -1;
   // Larger photos are scaled down for the detector.
   int max_image_size = 2000;
@@ -75,11 +77,15 @@ Status ExtractFeatures(const FeatureOptions& options,
                        const ProgressCallback& progress);
 
 // Matches the pairs and verifies them (two-view geometries), by
-// options.matcher. An error for descriptors that this matcher cannot compare.
+// options.matcher, "adasfm" with the help of the predictor if there is one. An
+// error for descriptors that this matcher cannot compare. num_guided: pairs
+// whose geometry is the predicted one.
 Status MatchPairs(const FeatureOptions& options,
                   const std::vector<ImagePair>& pairs,
                   const std::string& database_path, const std::string& log_path,
-                  const ProgressCallback& progress);
+                  const ProgressCallback& progress,
+                  const MotionPredictor& predictor = {},
+                  int* num_guided = nullptr);
 
 // An error when keypoints or descriptors of an image are missing: COLMAP
 // reports no failed write.

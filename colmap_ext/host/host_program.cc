@@ -15,6 +15,7 @@
 #include <thread>
 
 #include "colmap_ext/host/database_schema.h"
+#include "colmap_ext/io/run_program.h"
 
 namespace adasfm {
 namespace {
@@ -38,18 +39,6 @@ std::string FindOnPath() {
     if (IsProgram(candidate) && !IsThisProgram(candidate)) return candidate;
   }
   return "";
-}
-
-std::string Quote(const std::string& text) {
-  std::string quoted = "'";
-  for (const char c : text) {
-    if (c == '\'') {
-      quoted += "'\\''";
-    } else {
-      quoted += c;
-    }
-  }
-  return quoted + "'";
 }
 
 // The first version that opens a file of this form. The columns that COLMAP 3.8
@@ -85,7 +74,8 @@ std::string FindHostProgram() {
 std::string ReadHostHelp(const std::string& path,
                          const std::string& arguments) {
   if (!IsProgram(path) || IsThisProgram(path)) return "";
-  FILE* pipe = popen((Quote(path) + " " + arguments + " 2>&1").c_str(), "r");
+  FILE* pipe =
+      popen((QuoteForShell(path) + " " + arguments + " 2>&1").c_str(), "r");
   if (pipe == nullptr) return "";
   std::string text;
   char block[4096];

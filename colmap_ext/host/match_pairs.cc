@@ -73,7 +73,9 @@ Status MatchByHostClasses(const FeatureOptions& options,
 Status MatchPairs(const FeatureOptions& options,
                   const std::vector<ImagePair>& pairs,
                   const std::string& database_path, const std::string& log_path,
-                  const ProgressCallback& progress) {
+                  const ProgressCallback& progress,
+                  const MotionPredictor& predictor, int* num_guided) {
+  if (num_guided != nullptr) *num_guided = 0;
   if (UsesHostProgram()) {
     return MatchPairsByHost(options, pairs, database_path, log_path, progress);
   }
@@ -88,7 +90,7 @@ Status MatchPairs(const FeatureOptions& options,
     return MatchByHostClasses(options, pairs, &database, &cache, progress);
   }
   cache.Setup();
-  SiftPairMatcher matcher(options.num_threads, &cache);
+  SiftPairMatcher matcher(options.num_threads, &cache, predictor);
   try {
     MatchInBlocks(pairs,
                   kNumPairsPerThread * EffectiveNumThreads(options.num_threads),
@@ -97,6 +99,7 @@ Status MatchPairs(const FeatureOptions& options,
   } catch (const std::runtime_error& error) {
     return Status::Error(database_path + ": " + error.what());
   }
+  if (num_guided != nullptr) *num_guided = matcher.NumGuided();
   return Status::Ok();
 }
 

@@ -5,9 +5,11 @@
 #include <util/random.h>
 
 #include <algorithm>
+#include <map>
 #include <stdexcept>
 #include <string>
 
+#include "colmap_ext/host/verify_prediction.h"
 #include "colmap_ext/matching/match_descriptors.h"
 #include "core/parallel.h"
 
@@ -41,7 +43,110 @@ DescriptorMatchingOptions MatchingOptions() {
   return options;
 }
 
+PlaneKeypoints KeypointsOnPlane(const colmap::Camera& camera,
+                                const colmap::FeatureKeypoints& keypoints) {
+  PlaneKeypoints plane;
+  plane.pixel_size = camera.ImageToWorldThreshold(1.0);
+  plane.points.reserve(keypoints.size());
+  for (const colmap::FeatureKeypoint& keypoint : keypoints) {
+    plane.points.push_back(
+        camera.ImageToWorld(Eigen::Vector2d(keypoint.x, keypoint.y)));
+  }
+  return plane;
+}
+
+// Whether matches that were found without the prediction are among those found
+// with it: of an even sample of image 1's descriptors, compared with all of
+// image 2. A wrong prediction finds only matches that happen to agree with it.
+bool IsConfirmedByAll(const colmap::FeatureMatches& inlier_matches,
+                      const colmap::FeatureDescriptors& descriptors1,
+                      const colmap::FeatureDescriptors& descriptors2) {
+  constexpr int kMaxSampleSize = 512;
+  constexpr size_t kMinNumMatches = 8;
+  constexpr double kMinShare = 0.4;
+  const int num_all = descriptors1.rows();
+  const int count = std::min(num_all, kMaxSampleSize);
+  colmap::FeatureDescriptors sample(count, kSiftDimensions);
+  for (int k = 0; k < count; ++k) {
+    sample.row(k) = descriptors1.row(k * num_all / count);
+  }
+  const std::vector<FeatureMatch> matches =
+      MatchDescriptors(MatchingOptions(), sample.data(), count,
+                       descriptors2.data(), descriptors2.rows());
+  std::map<point2D_t, point2D_t> partners;
+  for (const colmap::FeatureMatch& match : inlier_matches) {
+    partners[match.point2D_idx1] = match.point2D_idx2;
+  }
+  size_t num_agreeing = 0;
+  for (const FeatureMatch& match : matches) {
+    const auto partner = partners.find(match.point2D_idx1 * num_all / count);
+    num_agreeing +=
+        partner != partners.end() && partner->second == match.point2D_idx2;
+  }
+  return matches.size() >= kMinNumMatches &&
+         num_agreeing >= kMinShare * matches.size();
+}
+
+colmap::FeatureMatches ForHost(const std::vector<FeatureMatch>& matches) {
+  colmap::FeatureMatches host_matches;
+  for (const FeatureMatch& match : matches) {
+    host_matches.emplace_back(match.point2D_idx1, match.point2D_idx2);
+  }
+  return host_matches;
+}
+
 }  // namespace
+
+std::optional<SiftPairMatcher::Result> SiftPairMatcher::MatchByPrediction(
+    const ImagePair& pair) {
+  if (!predictor_) return std::nullopt;
+  const auto& camera1 =
+      cache_->GetCamera(cache_->GetImage(pair.image_id1).CameraId());
+  const auto& camera2 =
+      cache_->GetCamera(cache_->GetImage(pair.image_id2).CameraId());
+  if (!camera1.HasPriorFocalLength() || !camera2.HasPriorFocalLength()) {
+    return std::nullopt;
+  }
+  const std::optional<PredictedMotion> prediction = predictor_(pair);
+  if (!prediction) return std::nullopt;
+  const auto keypoints1 = cache_->GetKeypoints(pair.image_id1);
+  const auto keypoints2 = cache_->GetKeypoints(pair.image_id2);
+  const PlaneKeypoints plane1 = KeypointsOnPlane(camera1, *keypoints1);
+  const PlaneKeypoints plane2 = KeypointsOnPlane(camera2, *keypoints2);
+  MatchCandidates candidates;
+  if (!FindCandidates(CandidateOptions(), *prediction, plane1, plane2,
+                      &candidates)) {
+    return std::nullopt;
+  }
+  const auto descriptors1 = cache_->GetDescriptors(pair.image_id1);
+  const auto descriptors2 = cache_->GetDescriptors(pair.image_id2);
+  Result result;
+  result.matches = ForHost(MatchCandidateDescriptors(
+      MatchingOptions(), descriptors1->data(), descriptors1->rows(),
+      descriptors2->data(), descriptors2->rows(), candidates));
+  MatchedPoints points;
+  for (const colmap::FeatureMatch& match : result.matches) {
+    const colmap::FeatureKeypoint& keypoint1 =
+        (*keypoints1)[match.point2D_idx1];
+    const colmap::FeatureKeypoint& keypoint2 =
+        (*keypoints2)[match.point2D_idx2];
+    points.pixels1.emplace_back(keypoint1.x, keypoint1.y);
+    points.pixels2.emplace_back(keypoint2.x, keypoint2.y);
+    points.points1.push_back(plane1.points[match.point2D_idx1]);
+    points.points2.push_back(plane2.points[match.point2D_idx2]);
+  }
+  colmap::SetPRNGSeed();
+  const std::optional<colmap::TwoViewGeometry> geometry =
+      VerifyPrediction(VerificationOptions(result.matches.size()), *prediction,
+                       camera1, camera2, result.matches, points);
+  if (!geometry || !IsConfirmedByAll(geometry->inlier_matches, *descriptors1,
+                                     *descriptors2)) {
+    return std::nullopt;
+  }
+  result.geometry = *geometry;
+  result.is_guided = true;
+  return result;
+}
 
 void SiftPairMatcher::Verify(const ImagePair& pair, Result* result) {
   const auto& camera1 =
@@ -68,13 +173,14 @@ SiftPairMatcher::Result SiftPairMatcher::MatchPair(const ImagePair& pair) {
                                " bytes are not SIFT's; use --matcher host");
     }
   }
+  if (const std::optional<Result> guided = MatchByPrediction(pair)) {
+    return *guided;
+  }
   const size_t min_num_matches = colmap::SiftMatchingOptions().min_num_inliers;
   Result result;
-  for (const FeatureMatch& match : MatchDescriptors(
-           MatchingOptions(), descriptors1->data(), descriptors1->rows(),
-           descriptors2->data(), descriptors2->rows())) {
-    result.matches.emplace_back(match.point2D_idx1, match.point2D_idx2);
-  }
+  result.matches = ForHost(MatchDescriptors(
+      MatchingOptions(), descriptors1->data(), descriptors1->rows(),
+      descriptors2->data(), descriptors2->rows()));
   // COLMAP writes neither matches nor a geometry for fewer.
   if (result.matches.size() < min_num_matches) return Result();
   Verify(pair, &result);
@@ -106,6 +212,7 @@ void SiftPairMatcher::Match(const std::vector<ImagePair>& pairs) {
   colmap::SetPRNGSeed();
   for (size_t i = 0; i < missing.size(); ++i) {
     const auto& [image_id1, image_id2] = missing[i];
+    num_guided_ += results[i].is_guided;
     cache_->WriteMatches(image_id1, image_id2, results[i].matches);
     cache_->WriteTwoViewGeometry(image_id1, image_id2, results[i].geometry);
   }

@@ -4,8 +4,11 @@
 #include <base/database.h>
 #include <feature/matching.h>
 
+#include <optional>
+#include <utility>
 #include <vector>
 
+#include "colmap_ext/matching/motion_prediction.h"
 #include "core/types.h"
 
 namespace adasfm {
@@ -18,26 +21,41 @@ namespace adasfm {
 // each pair from the same seed, with the confidence of COLMAP's defaults for
 // every geometry that has enough inliers to be accepted. So the result depends
 // neither on the threads nor on the order of the pairs.
-// Images must have descriptors of kSiftDimensions bytes, or none.
+// Where the motion between the images is predicted, only keypoints are compared
+// that it lets show the same point (matching/find_candidates.h), and the
+// geometry is sought next to it (verify_prediction.h). Where that finds none,
+// or one that a sample of matches found without the prediction does not
+// confirm, the pair is matched as any other. Images must have descriptors of
+// kSiftDimensions bytes, or none.
 class SiftPairMatcher {
  public:
   // The database and the cache over it must outlive the matcher.
-  SiftPairMatcher(int num_threads, colmap::FeatureMatcherCache* cache)
-      : num_threads_(num_threads), cache_(cache) {}
+  SiftPairMatcher(int num_threads, colmap::FeatureMatcherCache* cache,
+                  MotionPredictor predictor = {})
+      : num_threads_(num_threads),
+        cache_(cache),
+        predictor_(std::move(predictor)) {}
 
   // Throws std::runtime_error for descriptors of another length.
   void Match(const std::vector<ImagePair>& pairs);
+
+  // Of the pairs matched by Match, those whose geometry is the predicted one.
+  int NumGuided() const { return num_guided_; }
 
  private:
   struct Result {
     colmap::FeatureMatches matches;
     colmap::TwoViewGeometry geometry;
+    bool is_guided = false;
   };
   Result MatchPair(const ImagePair& pair);
+  std::optional<Result> MatchByPrediction(const ImagePair& pair);
   void Verify(const ImagePair& pair, Result* result);
 
   int num_threads_ = -1;
   colmap::FeatureMatcherCache* cache_ = nullptr;
+  MotionPredictor predictor_;
+  int num_guided_ = 0;
 };
 
 }  // namespace adasfm

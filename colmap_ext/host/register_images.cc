@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <exception>
+#include <filesystem>
 #include <map>
 #include <optional>
 #include <tuple>
@@ -91,8 +92,12 @@ class ImageWriter {
   ImageWriter(const FeatureOptions& options, const std::string& database_path)
       : options_(options), database_(database_path) {
     for (const colmap::Camera& camera : database_.ReadAllCameras()) {
-      cameras_.emplace(Key(camera), camera.CameraId());
       Count(camera);
+    }
+    for (const colmap::Image& image : database_.ReadAllImages()) {
+      cameras_.emplace(
+          Key(database_.ReadCamera(image.CameraId()), image.Name()),
+          image.CameraId());
     }
     result_.num_images = database_.NumImages();
   }
@@ -104,25 +109,22 @@ class ImageWriter {
   Status Write(const std::string& name, const PhotoHeader& header) {
     colmap::Camera camera = MakeCamera(options_, header);
     if (options_.single_camera == 1 && !cameras_.empty() &&
-        cameras_.count(Key(camera)) == 0) {
+        cameras_.count(Key(camera, name)) == 0) {
       return Status::Error("the photo " + name + " has " +
                            std::to_string(header.width) + "x" +
                            std::to_string(header.height) +
                            " pixels, others have other sizes; they cannot be "
                            "of one camera, use --single_camera -1");
     }
-    const auto [entry, is_new] = cameras_.emplace(Key(camera), 0);
-    const bool shares = options_.single_camera == 1
-                            ? result_.num_cameras > 0
-                            : options_.single_camera == -1 && !is_new;
+    const auto [entry, is_new] = cameras_.emplace(Key(camera, name), 0);
+    const bool shares = options_.single_camera != 0 && !is_new;
     if (!shares) {
       entry->second = database_.WriteCamera(camera);
       Count(camera);
     }
     colmap::Image image;
     image.SetName(name);
-    image.SetCameraId(options_.single_camera == 1 ? cameras_.begin()->second
-                                                  : entry->second);
+    image.SetCameraId(entry->second);
     // Where COLMAP's feature_extractor puts it.
     if (header.position.has_value()) image.SetTvecPrior(*header.position);
     database_.WriteImage(image);
@@ -138,15 +140,24 @@ class ImageWriter {
   ImageRegistration& Result() { return result_; }
 
  private:
-  using CameraKey = std::tuple<size_t, size_t, std::vector<double>, bool>;
+  // What photos of one camera have in common; the last one is the folder.
+  using CameraKey =
+      std::tuple<size_t, size_t, std::vector<double>, bool, std::string>;
 
-  CameraKey Key(const colmap::Camera& camera) const {
-    // One camera for all: EXIF may differ in its last digits.
+  CameraKey Key(const colmap::Camera& camera, const std::string& name) const {
+    // EXIF may differ in its last digits.
     if (options_.single_camera == 1) {
-      return {camera.Width(), camera.Height(), {}, false};
+      return {camera.Width(), camera.Height(), {}, false, ""};
+    }
+    if (options_.single_camera == 2) {
+      return {camera.Width(),
+              camera.Height(),
+              {},
+              false,
+              std::filesystem::path(name).parent_path().string()};
     }
     return {camera.Width(), camera.Height(), camera.Params(),
-            camera.HasPriorFocalLength()};
+            camera.HasPriorFocalLength(), ""};
   }
 
   void Count(const colmap::Camera& camera) {
@@ -173,9 +184,9 @@ bool FeatureOptions::IsValid(std::string* error) const {
              camera_model + ": " +
              colmap::CameraModelParamsInfo(
                  colmap::CameraModelNameToId(camera_model));
-  } else if (single_camera < -1 || single_camera > 1) {
+  } else if (single_camera < -1 || single_camera > 2) {
     *error = "single_camera = " + std::to_string(single_camera) +
-             " must be -1, 0 or 1";
+             " must be -1, 0, 1 or 2";
   } else if (use_gpu < -1 || use_gpu > 1) {
     *error = "use_gpu = " + std::to_string(use_gpu) + " must be -1, 0 or 1";
   } else if (matcher != "adasfm" && matcher != "host") {

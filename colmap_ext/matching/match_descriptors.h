@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "colmap_ext/matching/best_two.h"
+#include "colmap_ext/matching/find_candidates.h"
 #include "core/types.h"
 
 namespace adasfm {
@@ -28,5 +29,12 @@ std::vector<FeatureMatch> MatchDescriptors(
     const DescriptorMatchingOptions& options, const uint8_t* descriptors1,
     int count1, const uint8_t* descriptors2, int count2,
     ProductKernel kernel = ProductKernel::kAutomatic);
+
+// The same, of no other pairs of descriptors than the candidates: what is no
+// candidate counts neither as the nearest nor as the second nearest one.
+std::vector<FeatureMatch> MatchCandidateDescriptors(
+    const DescriptorMatchingOptions& options, const uint8_t* descriptors1,
+    int count1, const uint8_t* descriptors2, int count2,
+    const MatchCandidates& candidates);
 
 }  // namespace adasfm

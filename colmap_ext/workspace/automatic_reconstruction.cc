@@ -3,11 +3,13 @@
 
 #include <filesystem>
 #include <fstream>
+#include <functional>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <sstream>
 #include <stdexcept>
 
+#include "colmap_ext/bags/extract_video.h"
 #include "colmap_ext/coarse/global_report.h"
 #include "colmap_ext/database/prior_tables.h"
 #include "colmap_ext/host/color_points.h"
@@ -16,6 +18,7 @@
 #include "colmap_ext/io/folder_lock.h"
 #include "colmap_ext/io/output_files.h"
 #include "colmap_ext/io/step_journal.h"
+#include "colmap_ext/pairs/predict_motions.h"
 #include "colmap_ext/report/report.h"
 #include "colmap_ext/workspace/open_workspace.h"
 #include "colmap_ext/workspace/prepare_reconstruction.h"
@@ -54,6 +57,17 @@ StatusOr<StepInputs> DigestBag(const std::string& path,
       {"wheel_type", options.wheel_type.has_value()
                          ? std::to_string(static_cast<int>(*options.wheel_type))
                          : "by message"}};
+}
+
+StepInputs DigestVideo(const std::string& path,
+                       const VideoExtractionOptions& options) {
+  const std::filesystem::path video(path);
+  return {
+      {"video",
+       DigestFiles(video.parent_path().string(), {video.filename().string()})},
+      {"video_start_ns", std::to_string(options.start_ns)},
+      {"image_step", std::to_string(options.photos.image_step)},
+      {"image_distance_m", std::to_string(options.photos.image_distance_m)}};
 }
 
 // What the user gives wins.
@@ -138,10 +152,22 @@ class Reconstructor {
   }
 
   Status Prepare();
+  // Photos are taken out of a file first.
+  bool HasRecording() const {
+    return !paths_.bag_path.empty() || !paths_.video_path.empty();
+  }
   Status Bag();
+  Status Video();
+  // Does a step that takes photos out of a file.
+  Status RunExtraction(
+      const StepInputs& inputs,
+      const std::function<StatusOr<BagExtraction>(const std::string&)>&
+          extract);
   Status Features();
   Status ExtractAll(const std::vector<std::string>& names);
   Status Matching();
+  Status MatchSelected(const std::vector<ImagePair>& pairs,
+                       const ProgressCallback& progress);
   Status Priors();
   bool HasMotionLogs() const {
     return !paths_.imu_path.empty() || !paths_.wheel_path.empty();
@@ -172,9 +198,11 @@ class Reconstructor {
 Status Reconstructor::Prepare() {
   std::string error;
   if (!options_.IsValid(&error)) throw std::invalid_argument(error);
-  if (paths_.bag_path.empty() == paths_.image_path.empty()) {
+  if (paths_.bag_path.empty() + paths_.video_path.empty() +
+          paths_.image_path.empty() !=
+      2) {
     return Status::Error(
-        "give the photos as either --image_path or --bag_path");
+        "give the photos as one of --image_path, --video_path and --bag_path");
   }
   Status status = PrepareOutputFolder(InWorkspace("logs"));
   if (!status.ok()) return status;
@@ -183,8 +211,7 @@ Status Reconstructor::Prepare() {
   if (!lock.ok()) return lock.status();
   lock_ = *lock;
   // A bag's photos and logs are input as any others once they are files.
-  const bool has_bag = !paths_.bag_path.empty();
-  if (!has_bag) status = PrepareReconstruction(&options_, &paths_);
+  if (!HasRecording()) status = PrepareReconstruction(&options_, &paths_);
   if (!status.ok()) return status;
   database_path_ = InWorkspace("database.db");
   result_.model_path = InWorkspace("sparse/0");
@@ -193,8 +220,8 @@ Status Reconstructor::Prepare() {
       OpenWorkspace(paths_.workspace_path, options_.restart, message_);
   if (!journal.ok()) return journal.status();
   journal_ = std::move(journal).value();
-  if (!has_bag) return Status::Ok();
-  status = Bag();
+  if (!HasRecording()) return Status::Ok();
+  status = paths_.bag_path.empty() ? Video() : Bag();
   return status.ok() ? PrepareReconstruction(&options_, &paths_) : status;
 }
 
@@ -209,11 +236,40 @@ Status Reconstructor::Bag() {
   }
   StatusOr<StepInputs> inputs = DigestBag(paths_.bag_path, bag);
   if (!inputs.ok()) return inputs.status();
+  return RunExtraction(*inputs, [&](const std::string& folder) {
+    return ExtractBag(paths_.bag_path, bag, folder, ProgressIn(kBag, "bag"));
+  });
+}
+
+Status Reconstructor::Video() {
+  if (!std::filesystem::is_regular_file(paths_.video_path)) {
+    return Status::Error("the video " + paths_.video_path + " is not there");
+  }
+  VideoExtractionOptions video;
+  video.photos = options_.bag.photos;
+  video.start_ns = options_.video_start_ns;
+  video.wheel_path = paths_.wheel_path;
+  StepInputs inputs = DigestVideo(paths_.video_path, video);
+  if (video.photos.image_distance_m > 0.0) {
+    const StatusOr<StepInputs> wheel =
+        DigestPaths({{"wheel", paths_.wheel_path}});
+    if (!wheel.ok()) return wheel.status();
+    inputs.insert(wheel->begin(), wheel->end());
+  }
+  return RunExtraction(inputs, [&](const std::string& folder) {
+    return ExtractVideo(paths_.video_path, video, folder,
+                        InWorkspace("logs/video.log"),
+                        ProgressIn(kBag, "video"));
+  });
+}
+
+Status Reconstructor::RunExtraction(
+    const StepInputs& inputs,
+    const std::function<StatusOr<BagExtraction>(const std::string&)>& extract) {
   const std::string folder = BagFolder(paths_.workspace_path);
   const auto reset = [&folder] { return RemoveBagFiles(folder); };
   const auto work = [&]() -> Status {
-    const StatusOr<BagExtraction> extraction =
-        ExtractBag(paths_.bag_path, bag, folder, ProgressIn(kBag, "bag"));
+    const StatusOr<BagExtraction> extraction = extract(folder);
     if (!extraction.ok()) return extraction.status();
     Warn(extraction->warnings);
     message_(extraction->summary);
@@ -222,10 +278,10 @@ Status Reconstructor::Bag() {
   const auto check = [&folder] {
     const BagFiles files = FindBagFiles(folder);
     return files.image_path.empty() || files.image_times_path.empty()
-               ? Status::Error("the photos of the bag are not in " + folder)
+               ? Status::Error("there are no photos in " + folder)
                : Status::Ok();
   };
-  const Status status = RunStep(kBagStep, *inputs, {reset, work, check});
+  const Status status = RunStep(kBagStep, inputs, {reset, work, check});
   if (status.ok()) UseBagFiles(FindBagFiles(folder), &options_, &paths_);
   return status;
 }
@@ -264,7 +320,7 @@ Status Reconstructor::ExtractAll(const std::vector<std::string>& names) {
 Status Reconstructor::Features() {
   // The workspace may lie among the photos, or the photos of a bag in it.
   const StatusOr<std::vector<std::string>> names = ListFilesRecursively(
-      paths_.image_path, paths_.bag_path.empty() ? paths_.workspace_path : "");
+      paths_.image_path, HasRecording() ? "" : paths_.workspace_path);
   if (!names.ok()) return names.status();
   if (names->empty()) {
     return Status::Error("the folder " + paths_.image_path +
@@ -299,6 +355,7 @@ Status Reconstructor::Matching() {
   inputs.value()["num_similar_images"] =
       std::to_string(pairs.num_similar_images);
   inputs.value()["matcher"] = options_.features.matcher;
+  inputs.value()["guided_matching"] = std::to_string(options_.guided_matching);
   const auto reset = [this] {
     const Status status = ResetMatches(database_path_);
     return status.ok() ? ResetPriors(database_path_) : status;
@@ -319,16 +376,34 @@ Status Reconstructor::Matching() {
              std::to_string(selection->num_predicted) + " by the odometry, " +
              std::to_string(selection->num_similar) +
              " more of similar images");
-    const Status matched =
-        MatchPairs(options_.features, selection->pairs, database_path_,
-                   InWorkspace("logs/matching.log"),
-                   [&progress](const std::string& what, double share_done) {
-                     progress(what, 0.05 + 0.95 * share_done);
-                   });
-    return matched.ok() ? CheckMatches(database_path_, selection->pairs)
-                        : matched;
+    return MatchSelected(selection->pairs, progress);
   };
   return RunStep("matching", *inputs, {reset, work, &KeepAll});
+}
+
+Status Reconstructor::MatchSelected(const std::vector<ImagePair>& pairs,
+                                    const ProgressCallback& progress) {
+  MotionPredictor predictor;
+  if (options_.guided_matching) {
+    StatusOr<MotionPredictor> read = ReadMotionPredictor(database_path_);
+    if (!read.ok()) return read.status();
+    predictor = std::move(read).value();
+  }
+  int num_guided = 0;
+  const Status status = MatchPairs(
+      options_.features, pairs, database_path_,
+      InWorkspace("logs/matching.log"),
+      [&progress](const std::string& what, double share_done) {
+        progress(what, 0.05 + 0.95 * share_done);
+      },
+      predictor, &num_guided);
+  if (!status.ok()) return status;
+  if (num_guided > 0) {
+    message_("matching: " + std::to_string(num_guided) + " of " +
+             std::to_string(pairs.size()) + " pairs along their predicted " +
+             "epipolar lines");
+  }
+  return CheckMatches(database_path_, pairs);
 }
 
 Status Reconstructor::ImportForPairs(const ProgressCallback& progress) const {

@@ -18,8 +18,14 @@ struct AutomaticReconstructionOptions {
   // Of what is taken out of a bag; the calibration's part follows from the
   // paths.
   BagExtractionOptions bag;
+  // Of a video's time 0 on the clock of the logs [ns]. Which frames are taken
+  // out is bag.photos.
+  timestamp_t video_start_ns = 0;
   FeatureOptions features;
   PairSelectionOptions pairs;
+  // Where priors predict the motion between two images, compares only keypoints
+  // near their epipolar lines (host/match_sift_pairs.h).
+  bool guided_matching = false;
   PriorImportOptions priors;
   GlobalStageOptions global;
   MapOptions map;
@@ -40,6 +46,8 @@ struct AutomaticReconstructionPaths {
   // A recording that gives everything that is not given here, in place of
   // image_path (sensors/bags/bag_reader.h).
   std::string bag_path;
+  // A film in place of image_path (bags/extract_video.h), for photos and times.
+  std::string video_path;
   std::string image_path;
   std::string workspace_path;
   // euroc, 4seasons, kitti or tum: image_path is the root folder of such a
@@ -70,6 +78,7 @@ struct AutomaticReconstructionResult {
 // From a folder of photos, and sensor logs where there are any, to the model
 // and its report, in the workspace:
 //   0  bag        photos, logs, calibration of a bag   bag/
+//                 (or photos of a video)
 //   1  features   cameras, keypoints, descriptors      database.db
 //   2  matching   pair selection, matches, geometries  database.db
 //   3  priors     sensor logs                          database.db

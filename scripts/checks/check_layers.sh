@@ -36,14 +36,14 @@ global                         core global/...
 
 colmap_ext/io                  core
 colmap_ext/matching            core
-colmap_ext/host                core colmap_ext/io colmap_ext/matching
+colmap_ext/host                core global/view_graph global/two_view colmap_ext/io colmap_ext/matching
 colmap_ext/database            core colmap_ext/io colmap_ext/host global/calibration
 colmap_ext/bundle_adjustment   core colmap_ext/host
 colmap_ext/scene               core colmap_ext/io colmap_ext/host colmap_ext/database global/view_graph global/two_view
 colmap_ext/priors              core colmap_ext/host colmap_ext/database colmap_ext/scene sensors sensors/... global/two_view
 colmap_ext/coarse              core colmap_ext/host colmap_ext/bundle_adjustment colmap_ext/scene global global/...
 colmap_ext/mapper              core colmap_ext/host colmap_ext/bundle_adjustment colmap_ext/scene partition
-colmap_ext/pairs               core colmap_ext/host colmap_ext/database colmap_ext/scene sensors/io global/odometry
+colmap_ext/pairs               core colmap_ext/matching colmap_ext/host colmap_ext/database colmap_ext/scene sensors/io global/odometry
 colmap_ext/evaluation          core colmap_ext/host colmap_ext/scene sensors/io
 colmap_ext/datasets            core colmap_ext/io synthetic
 colmap_ext/bags                core sensors/bags sensors/io colmap_ext/io colmap_ext/datasets

@@ -2,10 +2,13 @@
 // adasfm_automatic_reconstructor and adasfm_prior_importer with --bag_path as a
 // user calls them, on a small rendered drive recorded as a ROS 2 bag.
 
+#include <algorithm>
 #include <filesystem>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <opencv2/imgcodecs.hpp>
+#include <string>
+#include <vector>
 
 #include "colmap_ext/host/model.h"
 #include "sensors/io/calibration.h"
@@ -167,10 +170,10 @@ TEST_F(BagTest, WhatIsWrongIsSaidInOneLineWithTheRemedy) {
   ExpectError(clear, "'imu_link' and 'camera_optical'");
   ExpectError(clear + " --image_step 0", "image_step = 0");
   ExpectError(clear + " --image_path " + drive_->File("images"),
-              "either --image_path or --bag_path");
+              "one of --image_path, --video_path and --bag_path");
   ExpectError(FromBag(folder_.File("none.mcap")), "no such file");
   ExpectError("adasfm_automatic_reconstructor --workspace_path " + workspace_,
-              "either --image_path or --bag_path");
+              "one of --image_path, --video_path and --bag_path");
   // Somebody's own folder is not touched.
   const std::string mine = folder_.File("mine");
   fs::create_directories(mine + "/bag/images");
@@ -178,6 +181,52 @@ TEST_F(BagTest, WhatIsWrongIsSaidInOneLineWithTheRemedy) {
                   " --workspace_path " + mine,
               "did not make");
   EXPECT_TRUE(fs::exists(mine + "/bag/images"));
+}
+
+// A film of the drive's photos, five a second.
+TEST_F(BagTest, AVideoBecomesPhotosWithItsTimes) {
+  if (std::system("command -v ffmpeg > /dev/null") != 0) {
+    GTEST_SKIP() << "ffmpeg is missing (scripts/setup.sh --for-tests)";
+  }
+  const std::string video = folder_.File("the drive.mp4");
+  ASSERT_EQ(std::system(("cat " + drive_->File("images") +
+                         "/*.png | ffmpeg -v error -f image2pipe -framerate 5 "
+                         "-i - -c:v mpeg4 -q:v 1 '" +
+                         video + "'")
+                            .c_str()),
+            0);
+  const std::string command =
+      "adasfm_automatic_reconstructor --video_path '" + video +
+      "' --workspace_path " + workspace_ +
+      " --max_num_features 100 --video_start_ns 7000000000";
+  // The model of so few features is none of this test's.
+  Run run = Call(command);
+  EXPECT_TRUE(Contains(run.out, "video: 14 of 14 frames")) << run.out;
+  std::vector<fs::path> truths;
+  for (const auto& entry : fs::directory_iterator(drive_->File("images"))) {
+    truths.push_back(entry.path());
+  }
+  std::sort(truths.begin(), truths.end());
+  for (int i = 0; i < kNumImages; ++i) {
+    const std::string name =
+        std::to_string(int64_t{200000000} * (35 + i)) + ".jpg";
+    const cv::Mat photo = cv::imread(workspace_ + "/bag/images/" +
+                                     std::string(23 - name.size(), '0') + name);
+    ASSERT_FALSE(photo.empty()) << name;
+    const cv::Mat truth = cv::imread(truths[i].string());
+    EXPECT_LT(cv::norm(photo, truth, cv::NORM_L1) / (3.0 * truth.total()), 4.0);
+  }
+  run = Call(command);
+  EXPECT_TRUE(Contains(run.out, "bag: done before")) << run.out;
+  run = Call(command + " --image_step 5");
+  EXPECT_TRUE(Contains(run.out, "video: 3 of 14 frames")) << run.out;
+
+  ExpectError(command + " --image_distance_m 1", "with a video --wheel_path");
+  ExpectError(command, "ffprobe is not on the PATH", "PATH=/nowhere");
+  ExpectError("adasfm_automatic_reconstructor --video_path " +
+                  folder_.Write("no.mp4", "This is no film.") +
+                  " --workspace_path " + workspace_,
+              "ffprobe failed");
 }
 
 TEST_F(BagTest, ACutBagIsUsedAsFarAsItGoes) {

@@ -4,6 +4,10 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <filesystem>
+#include <opencv2/imgcodecs.hpp>
+#include <utility>
+
 #include "colmap_ext/datasets/write_synthetic_world.h"
 #include "core/sqlite.h"
 #include "tests/testing/colmap_ext/temporary_folder.h"
@@ -46,6 +50,32 @@ TEST(Features, MissingRowsAreFound) {
       "DELETE FROM matches WHERE pair_id = (SELECT MAX(pair_id) FROM matches)");
   EXPECT_THAT(CheckMatches(path, pairs).message(),
               HasSubstr("2 of " + std::to_string(pairs.size()) + " pairs"));
+}
+
+TEST(Features, CamerasAreSharedAsAsked) {
+  const TemporaryFolder folder;
+  std::filesystem::create_directories(folder.File("left"));
+  std::filesystem::create_directories(folder.File("right"));
+  const std::vector<std::string> names = {"left/1.png", "left/2.png",
+                                          "right/1.png", "right/2.png"};
+  for (const std::string& name : names) {
+    cv::imwrite(folder.File(name), cv::Mat::zeros(30, 40, CV_8UC1));
+  }
+  for (const auto& [single_camera, num_cameras] :
+       {std::pair(-1, 1), {0, 4}, {1, 1}, {2, 2}}) {
+    FeatureOptions options;
+    options.single_camera = single_camera;
+    const std::string path = folder.File(std::to_string(single_camera) + ".db");
+    const auto progress = [](const std::string&, double) {};
+    // In two runs, as after an interruption.
+    ASSERT_TRUE(RegisterImages(options, folder.Path(), {names[0], names[2]},
+                               path, progress)
+                    .ok());
+    const StatusOr<ImageRegistration> images =
+        RegisterImages(options, folder.Path(), names, path, progress);
+    ASSERT_TRUE(images.ok()) << images.status().message();
+    EXPECT_EQ(images->num_cameras, num_cameras) << single_camera;
+  }
 }
 
 TEST(Features, CameraParamsMustBeUsable) {

@@ -3,11 +3,13 @@
 
 #include <set>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "colmap_ext/datasets/write_synthetic_world.h"
 #include "colmap_ext/host/database.h"
 #include "colmap_ext/host/features.h"
+#include "core/so3.h"
 #include "core/sqlite.h"
 #include "tests/testing/colmap_ext/landmark_descriptors.h"
 #include "tests/testing/colmap_ext/temporary_folder.h"
@@ -42,15 +44,50 @@ class MatchPairsTest : public testing::Test {
     return path;
   }
 
-  void Match(const std::string& path, const std::vector<ImagePair>& pairs,
-             const std::string& matcher, int num_threads) {
+  // The number of pairs that the predictor guided.
+  int Match(const std::string& path, const std::vector<ImagePair>& pairs,
+            const std::string& matcher, int num_threads,
+            const MotionPredictor& predictor = {}) {
     FeatureOptions options;
     options.matcher = matcher;
     options.num_threads = num_threads;
-    const Status status =
-        MatchPairs(options, pairs, path, folder_.File("matching.log"),
-                   [](const std::string&, double) {});
+    int num_guided = 0;
+    const Status status = MatchPairs(
+        options, pairs, path, folder_.File("matching.log"),
+        [](const std::string&, double) {}, predictor, &num_guided);
     EXPECT_TRUE(status.ok()) << status.message();
+    return num_guided;
+  }
+
+  // The true motions, `error` off, as if known to half a milliradian and a
+  // hundredth of a metre.
+  MotionPredictor Predict(const Rigid3d& error) {
+    return [this, error](const ImagePair& pair) {
+      PredictedMotion motion;
+      motion.cam2_from_cam1 =
+          error * world_.images[pair.image_id2 - 1].cam_from_world *
+          world_.images[pair.image_id1 - 1].cam_from_world.Inverse();
+      motion.covariance.diagonal() << Eigen::Vector3d::Constant(25e-8),
+          Eigen::Vector3d::Constant(1e-4);
+      return motion;
+    };
+  }
+
+  // Inlier matches, and those of them that are true.
+  std::pair<int, int> CountInliers(const std::string& path) {
+    SqliteConnection database(path, SqliteConnection::Mode::kRead);
+    int num_all = 0, num_true = 0;
+    for (const ImagePair& pair : pairs_) {
+      const auto& landmarks1 = world_.images[pair.image_id1 - 1].landmark_ids;
+      const auto& landmarks2 = world_.images[pair.image_id2 - 1].landmark_ids;
+      for (const FeatureMatch& match :
+           ReadMatchesOfPair(&database, "two_view_geometries", pair)) {
+        ++num_all;
+        num_true +=
+            landmarks1[match.point2D_idx1] == landmarks2[match.point2D_idx2];
+      }
+    }
+    return {num_all, num_true};
   }
 
   // All that the matcher writes, bit by bit.
@@ -128,6 +165,29 @@ TEST_F(MatchPairsTest, MatchesAreTrueAndCompareWithTheHosts) {
   EXPECT_GT(num_all, 1000);
   EXPECT_GT(num_true, 0.99 * num_all);
   EXPECT_GT(num_both, 0.98 * num_host);
+}
+
+TEST_F(MatchPairsTest, AGoodPredictionGuides) {
+  const std::string plain = MakeDatabase("plain.db");
+  const std::string guided = MakeDatabase("guided.db");
+  Match(plain, pairs_, "adasfm", 2);
+  EXPECT_GT(Match(guided, pairs_, "adasfm", 2, Predict(Rigid3d())), 10);
+  EXPECT_TRUE(CheckMatches(guided, pairs_).ok());
+  const auto [num_plain, num_true_plain] = CountInliers(plain);
+  const auto [num_guided, num_true_guided] = CountInliers(guided);
+  EXPECT_GT(num_true_guided, 0.99 * num_guided);
+  EXPECT_GE(num_true_guided, num_true_plain);
+}
+
+// Elsewhere than predicted: as if nothing had been predicted.
+TEST_F(MatchPairsTest, AWrongPredictionChangesNothing) {
+  const std::string plain = MakeDatabase("plain.db");
+  const std::string misled = MakeDatabase("misled.db");
+  Match(plain, pairs_, "adasfm", 2);
+  const Rigid3d error(ExpSo3(Eigen::Vector3d(0.15, 0.1, 0.1)),
+                      Eigen::Vector3d(0.0, 0.3, 0.0));
+  EXPECT_EQ(Match(misled, pairs_, "adasfm", 2, Predict(error)), 0);
+  EXPECT_TRUE(Rows(misled) == Rows(plain));
 }
 
 TEST_F(MatchPairsTest, OtherDescriptorsAreRefused) {

@@ -56,6 +56,18 @@ class Oracle {
     }
   }
 
+  // Makes all pairs but the candidates as far apart as can be.
+  void KeepOnly(const MatchCandidates& candidates) {
+    std::vector<int> kept(products_.size(), 0);
+    for (int i = 0; i < count1_; ++i) {
+      for (int k = candidates.begins[i]; k < candidates.begins[i + 1]; ++k) {
+        kept[i * count2_ + candidates.indices[k]] =
+            At(i, candidates.indices[k]);
+      }
+    }
+    products_ = kept;
+  }
+
   std::vector<FeatureMatch> Match(const DescriptorMatchingOptions& options) {
     std::vector<FeatureMatch> matches;
     for (int i = 0; i < count1_; ++i) {
@@ -159,6 +171,41 @@ INSTANTIATE_TEST_SUITE_P(Kernels, MatchDescriptorsTest,
                                          ProductKernel::kPortable,
                                          ProductKernel::kAvx2,
                                          ProductKernel::kAvx512Vnni));
+
+TEST(MatchCandidateDescriptors, EqualsTheDoubleLoopOverTheCandidates) {
+  constexpr int kCount1 = 80;
+  constexpr int kCount2 = 60;
+  size_t num_matches = 0;
+  size_t num_without_candidates = 0;
+  for (const uint64_t seed : {1, 2, 3}) {
+    Random random(seed);
+    // Hardly any descriptor twice: a candidate's product is its own.
+    const Bytes all = DrawDescriptors(kCount1 + kCount2, 90, &random);
+    const Bytes first(all.begin(), all.begin() + kCount1 * kSiftDimensions);
+    const Bytes second(all.begin() + kCount1 * kSiftDimensions, all.end());
+    for (const int chance : {1, 3, 20}) {
+      MatchCandidates candidates;
+      candidates.begins.push_back(0);
+      for (int i = 0; i < kCount1; ++i) {
+        for (int k = 0; k < kCount2; ++k) {
+          if (random.UniformInt(1, chance) == 1) {
+            candidates.indices.push_back(k);
+          }
+        }
+        candidates.begins.push_back(candidates.indices.size());
+      }
+      Oracle oracle(first, second);
+      num_without_candidates += oracle.Match({}).size();
+      oracle.KeepOnly(candidates);
+      const std::vector<FeatureMatch> matches = MatchCandidateDescriptors(
+          {}, first.data(), kCount1, second.data(), kCount2, candidates);
+      EXPECT_EQ(matches, oracle.Match({})) << "seed " << seed;
+      num_matches += matches.size();
+    }
+  }
+  EXPECT_GT(num_matches, 30);
+  EXPECT_NE(num_matches, num_without_candidates);
+}
 
 TEST(MatchDescriptors, EveryOptionCounts) {
   Random random(7);
