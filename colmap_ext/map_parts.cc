@@ -187,7 +187,7 @@ void AlignCoarseModel(double final_loss_scale, ComponentToMap* component,
 
 Status AssessAndWrite(const MapRequest& request, const CoarseModels& coarse,
                       const std::vector<MappedComponent>& mapped,
-                      const DatabaseFrames& frames, MapReport* report) {
+                      const ModelFrames& frames, MapReport* report) {
   std::vector<const colmap::Reconstruction*> models;
   for (const MappedComponent& component : mapped) {
     if (component.model.NumRegImages() == 0) continue;
@@ -200,7 +200,7 @@ Status AssessAndWrite(const MapRequest& request, const CoarseModels& coarse,
   StatusOr<std::vector<LostImage>> lost = FindLost(request, coarse, mapped);
   if (!lost.ok()) return lost.status();
   report->verdict = Assess(request, coarse, mapped, std::move(*lost));
-  Status status = WriteModelFolder(request.output_path, models, frames.frames);
+  Status status = WriteModelFolder(request.output_path, models, frames);
   if (status.ok()) {
     const bool is_georeferenced = std::any_of(
         mapped.begin(), mapped.end(), [](const MappedComponent& component) {
@@ -248,20 +248,25 @@ StatusOr<MapReport> MapParts(const MapOptions& options,
   if (!status.ok()) return status;
   MapReport report;
   const MapperStageOptions stage_options = ResolveOptions(options, *scene);
-  const bool has_priors = !scene->priors.empty() || !scene->positions.empty();
+  const bool has_priors = !scene->priors.empty() || !scene->positions.empty() ||
+                          !scene->frame_priors.empty();
+  std::vector<std::string> frame_warnings;
+  const StatusOr<ModelFrames> frames =
+      ReadModelFrames(request.database_path, *scene, &frame_warnings);
+  if (!frames.ok()) return frames.status();
   StatusOr<CoarseModels> coarse =
       ReadCoarseModels(request.input_path, std::move(*scene));
   if (!coarse.ok()) return coarse.status();
   for (ComponentToMap& component : coarse->components) {
+    EstimateUnknownRigCameras(component.coarse, &component.data.rigs);
+    component.data.frame_priors = ComputeFramePriors(component.data.rigs);
     AlignCoarseModel(stage_options.refine.position_loss_scale, &component,
                      &coarse->warnings);
   }
   report.warnings = coarse->warnings;
   if (!has_priors) report.warnings.push_back(kNoPriorsWarning);
-  const StatusOr<DatabaseFrames> frames =
-      ReadDatabaseFrames(request.database_path);
-  if (!frames.ok()) return frames.status();
-  if (frames->has_camera_rigs) report.warnings.push_back(kCameraRigsWarning);
+  report.warnings.insert(report.warnings.end(), frame_warnings.begin(),
+                         frame_warnings.end());
   const StatusOr<std::vector<MappedComponent>> mapped =
       MapComponents(stage_options, coarse->components, request.output_path,
                     request.steps, request.part_index, progress);

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <map>
 #include <optional>
+#include <utility>
 
 #include "core/parallel.h"
 #include "core/so3.h"
@@ -189,7 +190,7 @@ void MatchImages(const StreetGrid& grid, const LandmarkMap& map,
       FindRevisits(*world, arc_lengths_m);
   candidates.insert(candidates.end(), revisits.begin(), revisits.end());
   std::map<ImagePair, SyntheticPair> pairs;
-  MatchAll(matcher, candidates, &pairs);
+  MatchAll(matcher, AddSecondCamera(*world, std::move(candidates)), &pairs);
   MatchAliases(matcher, grid, *world, &pairs);
   for (auto& [key, pair] : pairs) world->pairs.push_back(std::move(pair));
 }

@@ -204,7 +204,8 @@ void ObserveLandmarks(const StreetGrid& grid, const LandmarkMap& map,
                       SyntheticWorld* world) {
   const Observer observer(grid, map, *world);
   ParallelFor(-1, world->images.size(), [&](size_t i) {
-    if (!is_blacked_out[i]) observer.Observe(&world->images[i]);
+    if (!is_blacked_out[i % is_blacked_out.size()])
+      observer.Observe(&world->images[i]);
   });
 }
 

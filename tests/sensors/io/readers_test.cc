@@ -86,6 +86,14 @@ TEST_F(Readers, ImageTimesOfAllFormats) {
   EXPECT_EQ((*seasons)[1].name, "1611.png");
 }
 
+TEST_F(Readers, ImagesOfARigHaveEqualTimes) {
+  const auto times =
+      ReadImageTimes(Write("data.csv", "10,cam0/a.png\n10,cam1/a.png\n"));
+  ASSERT_TRUE(times.ok()) << times.status().message();
+  EXPECT_EQ((*times)[1].timestamp_ns, 10);
+  EXPECT_EQ((*times)[1].name, "cam1/a.png");
+}
+
 TEST_F(Readers, ImageTimesErrors) {
   std::string path = folder_ + "/absent.csv";
   ExpectError(ReadImageTimes(path).status(), path, {"no such file"});
