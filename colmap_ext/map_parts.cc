@@ -185,6 +185,22 @@ void AlignCoarseModel(double final_loss_scale, ComponentToMap* component,
   data.positions.clear();
 }
 
+// The priors within the frames; relative poses that nobody knows come from the
+// coarse model, and measure no metres then.
+void CompleteRigs(const CoarsePoseMap& coarse, SceneData* data) {
+  const CameraRigs known = data->rigs;
+  EstimateUnknownRigCameras(coarse, &data->rigs);
+  data->frame_priors = ComputeFramePriors(data->rigs);
+  const auto is_known = [&known](image_t image_id) {
+    return known.cameras.at(known.images.at(image_id).camera_id)
+        .cam_from_rig.has_value();
+  };
+  for (RelativePosePrior& prior : data->frame_priors) {
+    if (is_known(prior.image_id1) && is_known(prior.image_id2)) continue;
+    prior.flags &= ~kPriorLength;
+  }
+}
+
 Status AssessAndWrite(const MapRequest& request, const CoarseModels& coarse,
                       const std::vector<MappedComponent>& mapped,
                       const ModelFrames& frames, MapReport* report) {
@@ -258,8 +274,7 @@ StatusOr<MapReport> MapParts(const MapOptions& options,
       ReadCoarseModels(request.input_path, std::move(*scene));
   if (!coarse.ok()) return coarse.status();
   for (ComponentToMap& component : coarse->components) {
-    EstimateUnknownRigCameras(component.coarse, &component.data.rigs);
-    component.data.frame_priors = ComputeFramePriors(component.data.rigs);
+    CompleteRigs(component.coarse, &component.data);
     AlignCoarseModel(stage_options.refine.position_loss_scale, &component,
                      &coarse->warnings);
   }

@@ -67,20 +67,19 @@ class RigTest : public CommandLineTest {
   double Scale() const {
     const StatusOr<NamedPoses> truth =
         ReadGroundTruth(folder_.File("gt.txt"), {}, {});
+    const auto way = [](const Rigid3d& first, const Rigid3d& pose) {
+      return (pose.TargetOriginInSource() - first.TargetOriginInSource())
+          .norm();
+    };
+    const auto true_pose = [&](image_t image_id) {
+      return truth->at(model_.Image(image_id).Name());
+    };
     double sum = 0.0;
     double sum_of_truth = 0.0;
-    Eigen::Vector3d first, true_first;
-    for (image_t image_id = 1; image_id <= kNumFrames; ++image_id) {
-      const colmap::Image& image = model_.Image(image_id);
-      const Eigen::Vector3d center = CamFromWorld(image).TargetOriginInSource();
-      const Eigen::Vector3d true_center =
-          truth->at(image.Name()).TargetOriginInSource();
-      if (image_id == 1) {
-        first = center;
-        true_first = true_center;
-      }
-      sum += (center - first).norm();
-      sum_of_truth += (true_center - true_first).norm();
+    for (image_t image_id = 2; image_id <= kNumFrames; ++image_id) {
+      sum += way(CamFromWorld(model_.Image(1)),
+                 CamFromWorld(model_.Image(image_id)));
+      sum_of_truth += way(true_pose(1), true_pose(image_id));
     }
     return sum / sum_of_truth;
   }
