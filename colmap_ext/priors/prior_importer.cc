@@ -52,9 +52,8 @@ StatusOr<std::vector<ImageStamp>> StampsFromFile(
       const std::string& name = scene.images.at(image_id).name;
       const ImageStamp stamp{image_id, name, time.timestamp_ns};
       const auto [known, is_new] = stamps.emplace(image_id, stamp);
-      // Lists of several cameras may name the same file once for each.
-      if (!is_new && (image_ids.size() == 1 ||
-                      known->second.timestamp_ns != time.timestamp_ns)) {
+      // Lists of several cameras name the same file once for each.
+      if (!is_new && known->second.timestamp_ns != time.timestamp_ns) {
         return Status::Error(path + ": image " + name + " has two times");
       }
     }
