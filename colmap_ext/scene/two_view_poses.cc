@@ -159,9 +159,16 @@ InitialViewGraph BuildInitialViewGraph(
     const std::map<image_t, std::vector<Bearing>>& bearings) {
   InitialViewGraph initial;
   std::vector<CapturedImage> captured;
+  const std::map<uint32_t, image_t> leaders = FindFrameLeaders(scene.rigs);
   for (const auto& [image_id, image] : scene.images) {
     initial.graph.images.push_back(image_id);
     captured.push_back({image_id, image.name, image.timestamp_ns});
+    // Frames of a rig stay together where names are the order.
+    const auto rig_image = scene.rigs.images.find(image_id);
+    if (rig_image == scene.rigs.images.end()) continue;
+    const auto leader = leaders.find(rig_image->second.frame_id);
+    if (leader == leaders.end()) continue;
+    captured.back().name = scene.images.at(leader->second).name;
   }
   initial.graph.capture_ranks.resize(captured.size());
   int64_t rank = 0;
