@@ -47,3 +47,6 @@ then priors=1; fi
 mkdir -p "$cleaned.coarse"
 "$colmap" adasfm_global --database_path "$cleaned" \
   --output_path "$cleaned.coarse" --AdaSfmGlobal.write_pose_priors "$priors"
+
+# Joins that vision cannot measure: COLMAP's mappers have no sensors for them.
+"$(dirname "${BASH_SOURCE[0]}")/drop_weak_joins.py" "$cleaned"
