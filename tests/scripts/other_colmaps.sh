@@ -245,6 +245,15 @@ for name in "${hosts[@]:1}"; do
   grep -q 'Registered images: 8' "$work/log" || fail "images are missing"
 done
 
+# Those of COLMAP 3.8 are run with the documentation test.
+if [[ $newest == 4.* ]]; then
+  echo "== The guides' commands with COLMAP $newest"
+  guides=$here/../../docs/guide
+  ADASFM_HOST_COLMAP=${programs[$newest]} call check_docs.py \
+    python3 "$here/../../scripts/checks/check_docs.py" "$ours" --run \
+    "$guides"/tutorial.md "$guides"/pair_selection.md "$guides"/cleaner.md
+fi
+
 if [ -n "${programs[3.10]:-}" ] && [[ $newest == 4.* ]]; then
   echo '== Warnings'
   warns 3.8 "$work/3.10/original.db" '3.10 or later'
