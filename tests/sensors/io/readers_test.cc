@@ -305,6 +305,26 @@ std::string Replaced(std::string text, const std::string& from,
   return text.replace(text.find(from), from.size(), to);
 }
 
+TEST_F(Readers, CalibrationOfARig) {
+  const std::string second =
+      "cam1:\n  T_cam_imu: [[0, -1, 0, -0.4], [0, 0, -1, 0.2], "
+      "[1, 0, 0, 0.3], [0, 0, 0, 1]]\n";
+  const auto rig = ReadSensorCalibration(
+      Write("rig.yaml", kCalibration + second +
+                            "  timeshift_cam_imu: 0.0625\n"
+                            "cam2:\n  resolution: [800, 500]\n"));
+  ASSERT_TRUE(rig.ok()) << rig.status().message();
+  // cam2 has no mount.
+  ASSERT_EQ(rig->other_cams_from_imu.size(), 1u);
+  EXPECT_EQ(rig->other_cams_from_imu[0].translation.x(), -0.4);
+  EXPECT_TRUE(ReadSensorCalibration(Write("one.yaml", kCalibration))
+                  ->other_cams_from_imu.empty());
+  const std::string path =
+      Write("apart.yaml", kCalibration + second + "  timeshift_cam_imu: 0.1\n");
+  ExpectError(ReadSensorCalibration(path).status(), path,
+              {"cam1/timeshift_cam_imu", "millisecond"});
+}
+
 TEST_F(Readers, Calibration) {
   const auto calibration =
       ReadSensorCalibration(Write("sensors.yaml", kCalibration));
