@@ -141,7 +141,7 @@ Status WritePosePriorsTo(const std::string& database_path,
 Status WriteGlobalResult(const GlobalStageOptions& options,
                          const std::string& database_path,
                          const std::string& output_path, const SceneData& scene,
-                         const DatabaseFrames& frames,
+                         const ModelFrames& frames,
                          const CoarseModelReport& report) {
   const GlobalStageResult& result = report.result;
   if (ChangesDatabase(options)) {
@@ -155,7 +155,7 @@ Status WriteGlobalResult(const GlobalStageOptions& options,
   for (const CoarseModel& model : result.models) {
     models.push_back(&model.reconstruction);
   }
-  Status status = WriteModelFolder(output_path, models, frames.frames);
+  Status status = WriteModelFolder(output_path, models, frames);
   if (status.ok()) {
     const bool is_georeferenced = std::any_of(
         result.models.begin(), result.models.end(),
@@ -221,8 +221,6 @@ StatusOr<CoarseModelReport> EstimateCoarseModel(
   scene_options.min_num_matches = options.poses.min_num_inliers;
   StatusOr<SceneData> scene = ReadSceneData(database_path, scene_options);
   if (!scene.ok()) return scene.status();
-  const StatusOr<DatabaseFrames> frames = ReadDatabaseFrames(database_path);
-  if (!frames.ok()) return frames.status();
   std::ostringstream text;
   text << scene->images.size() << " images, " << scene->pairs.size()
        << " verified pairs, " << scene->priors.size() << " priors";
@@ -236,8 +234,11 @@ StatusOr<CoarseModelReport> EstimateCoarseModel(
        CalibrateFocalLengths(options.focal_lengths, &*scene)) {
     report.warnings.push_back(DescribeFocalLength(calibrated));
   }
-  if (frames->has_camera_rigs) report.warnings.push_back(kCameraRigsWarning);
-  if (scene->priors.empty() && scene->positions.empty()) {
+  const StatusOr<ModelFrames> frames =
+      ReadModelFrames(database_path, *scene, &report.warnings);
+  if (!frames.ok()) return frames.status();
+  if (scene->priors.empty() && scene->positions.empty() &&
+      scene->frame_priors.empty()) {
     report.warnings.push_back(kNoPriorsWarning);
   }
   StatusOr<GlobalStageResult> result =

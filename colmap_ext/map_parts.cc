@@ -178,9 +178,25 @@ void AlignCoarseModel(ComponentToMap* component,
   data.positions.clear();
 }
 
+// The priors within the frames; relative poses that nobody knows come from the
+// coarse model, and measure no metres then.
+void CompleteRigs(const CoarsePoseMap& coarse, SceneData* data) {
+  const CameraRigs known = data->rigs;
+  EstimateUnknownRigCameras(coarse, &data->rigs);
+  data->frame_priors = ComputeFramePriors(data->rigs);
+  const auto is_known = [&known](image_t image_id) {
+    return known.cameras.at(known.images.at(image_id).camera_id)
+        .cam_from_rig.has_value();
+  };
+  for (RelativePosePrior& prior : data->frame_priors) {
+    if (is_known(prior.image_id1) && is_known(prior.image_id2)) continue;
+    prior.flags &= ~kPriorLength;
+  }
+}
+
 Status AssessAndWrite(const MapRequest& request, const CoarseModels& coarse,
                       const std::vector<MappedComponent>& mapped,
-                      const DatabaseFrames& frames, MapReport* report) {
+                      const ModelFrames& frames, MapReport* report) {
   std::vector<const colmap::Reconstruction*> models;
   for (const MappedComponent& component : mapped) {
     if (component.model.NumRegImages() == 0) continue;
@@ -193,7 +209,7 @@ Status AssessAndWrite(const MapRequest& request, const CoarseModels& coarse,
   StatusOr<std::vector<LostImage>> lost = FindLost(request, coarse, mapped);
   if (!lost.ok()) return lost.status();
   report->verdict = Assess(request, coarse, mapped, std::move(*lost));
-  Status status = WriteModelFolder(request.output_path, models, frames.frames);
+  Status status = WriteModelFolder(request.output_path, models, frames);
   if (status.ok()) {
     const bool is_georeferenced = std::any_of(
         mapped.begin(), mapped.end(), [](const MappedComponent& component) {
@@ -241,19 +257,23 @@ StatusOr<MapReport> MapParts(const MapOptions& options,
   if (!status.ok()) return status;
   MapReport report;
   const MapperStageOptions stage_options = ResolveOptions(options, *scene);
-  const bool has_priors = !scene->priors.empty() || !scene->positions.empty();
+  const bool has_priors = !scene->priors.empty() || !scene->positions.empty() ||
+                          !scene->frame_priors.empty();
+  std::vector<std::string> frame_warnings;
+  const StatusOr<ModelFrames> frames =
+      ReadModelFrames(request.database_path, *scene, &frame_warnings);
+  if (!frames.ok()) return frames.status();
   StatusOr<CoarseModels> coarse =
       ReadCoarseModels(request.input_path, std::move(*scene));
   if (!coarse.ok()) return coarse.status();
   for (ComponentToMap& component : coarse->components) {
+    CompleteRigs(component.coarse, &component.data);
     AlignCoarseModel(&component, &coarse->warnings);
   }
   report.warnings = coarse->warnings;
   if (!has_priors) report.warnings.push_back(kNoPriorsWarning);
-  const StatusOr<DatabaseFrames> frames =
-      ReadDatabaseFrames(request.database_path);
-  if (!frames.ok()) return frames.status();
-  if (frames->has_camera_rigs) report.warnings.push_back(kCameraRigsWarning);
+  report.warnings.insert(report.warnings.end(), frame_warnings.begin(),
+                         frame_warnings.end());
   const StatusOr<std::vector<MappedComponent>> mapped =
       MapComponents(stage_options, coarse->components, request.output_path,
                     request.steps, request.part_index, progress);

@@ -17,10 +17,12 @@ class CoarsePoseEstimator {
  public:
   CoarsePoseEstimator(const CoarsePoseOptions& options, const ViewGraph& graph,
                       const GlobalCorrespondences& correspondences,
-                      const std::vector<RelativePosePrior>& priors)
+                      const std::vector<RelativePosePrior>& priors,
+                      const std::vector<RelativePosePrior>& frame_priors)
       : options_(options),
         correspondences_(correspondences),
         priors_(priors),
+        frame_priors_(frame_priors),
         graph_(graph),
         step_start_(std::chrono::steady_clock::now()) {}
 
@@ -36,6 +38,7 @@ class CoarsePoseEstimator {
   bool IsSequence(const OdometryChain& chain) const;
   DriveOdometry BuildDriveOdometry(std::string* summary) const;
   int AddSensors();
+  std::vector<RelativePosePrior> AllPriors() const;
   void EstimateRotations();
   void FilterByRotation();
   void RepeatRotations();
@@ -58,6 +61,7 @@ class CoarsePoseEstimator {
   const CoarsePoseOptions& options_;
   const GlobalCorrespondences& correspondences_;
   std::vector<RelativePosePrior> priors_;
+  const std::vector<RelativePosePrior>& frame_priors_;
   ViewGraph graph_;
   OdometryChain chain_;
   EdgeLengths lengths_;

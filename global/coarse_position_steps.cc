@@ -55,7 +55,7 @@ void CoarsePoseEstimator::EstimateTranslations() {
                                           correspondences_, &graph_);
   }
   const int num_augmented =
-      AugmentTranslations(options_.augmentation, priors_, &graph_);
+      AugmentTranslations(options_.augmentation, AllPriors(), &graph_);
   EndStep("relative translations",
           std::to_string(report.num_refined) + " refined, " +
               std::to_string(report.num_without_direction) +
@@ -220,7 +220,7 @@ EdgeLengths CoarsePoseEstimator::EstimateLengths() const {
 
 std::map<ImagePair, double> CoarsePoseEstimator::KnownLengths() const {
   std::map<ImagePair, double> known_lengths_m;
-  for (const RelativePosePrior& prior : priors_) {
+  for (const RelativePosePrior& prior : AllPriors()) {
     const double length = prior.cam2_from_cam1.translation.norm();
     if (prior.HasLength() && length >= options_.min_known_length_m &&
         IsKnownMotion(options_.augmentation, prior)) {

@@ -60,7 +60,7 @@ void CoarsePoseEstimator::RefinePairs() {
 
 // The chain, after vision has corrected the camera's mount and the rotations.
 void CoarsePoseEstimator::BuildChain() {
-  chain_ = OdometryChain(priors_, options_.chain);
+  chain_ = OdometryChain(priors_, options_.chain, frame_priors_);
   const CameraMountOptions& mount = options_.camera_mount;
   const RotationRateOptions& rates = options_.rotation_rates;
   if (chain_.empty() || !options_.relative_poses.enabled ||
@@ -73,7 +73,9 @@ void CoarsePoseEstimator::BuildChain() {
       std::remove_if(
           near.edges.begin(), near.edges.end(),
           [&](const ViewGraphEdge& edge) {
-            return !chain_.IsConnected(edge.image_id1, edge.image_id2) ||
+            return chain_.IsFollower(edge.image_id1) ||
+                   chain_.IsFollower(edge.image_id2) ||
+                   !chain_.IsConnected(edge.image_id1, edge.image_id2) ||
                    std::abs(chain_.NumSteps(edge.image_id1, edge.image_id2)) >
                        max_num_steps;
           }),
@@ -82,12 +84,12 @@ void CoarsePoseEstimator::BuildChain() {
   if (mount.enabled) {
     result_.camera_mount =
         CorrectCameraMount(mount, chain_, near, correspondences_, &priors_);
-    chain_ = OdometryChain(priors_, options_.chain);
+    chain_ = OdometryChain(priors_, options_.chain, frame_priors_);
   }
   if (rates.enabled) {
     result_.rotation_rates =
         CorrectRotationRates(rates, chain_, near, &priors_);
-    chain_ = OdometryChain(priors_, options_.chain);
+    chain_ = OdometryChain(priors_, options_.chain, frame_priors_);
   }
 }
 
@@ -161,7 +163,7 @@ DriveOdometry CoarsePoseEstimator::BuildDriveOdometry(
     const int num_dropped =
         DropContradictedSteps(options_.visual_steps, options_.loops, options,
                               graph_, priors_.size(), &steps);
-    odometry.chain = OdometryChain(steps.priors, options);
+    odometry.chain = OdometryChain(steps.priors, options, frame_priors_);
     odometry.unit = steps.unit_m;
     lengths = steps.lengths;
     *summary = "; vision added " + std::to_string(steps.num_by_vision) +
@@ -190,16 +192,23 @@ bool CoarsePoseEstimator::IsSequence(const OdometryChain& chain) const {
 
 // Empty where the sensors saw every step.
 VisualSteps CoarsePoseEstimator::CompleteSteps() const {
-  const bool is_complete = priors_.size() + 1 >= graph_.images.size() &&
-                           std::all_of(priors_.begin(), priors_.end(),
-                                       [](const RelativePosePrior& prior) {
-                                         return prior.HasRotation() &&
-                                                prior.HasDirection() &&
-                                                prior.HasLength();
-                                       });
+  const bool is_complete =
+      priors_.size() + frame_priors_.size() + 1 >= graph_.images.size() &&
+      std::all_of(priors_.begin(), priors_.end(),
+                  [](const RelativePosePrior& prior) {
+                    return prior.HasRotation() && prior.HasDirection() &&
+                           prior.HasLength();
+                  });
   if (is_complete || !options_.visual_steps.enabled) return VisualSteps();
   return AddVisualSteps(options_.visual_steps, options_.lengths, graph_,
-                        correspondences_, KnownLengths(), priors_);
+                        correspondences_, KnownLengths(), priors_,
+                        frame_priors_);
+}
+
+std::vector<RelativePosePrior> CoarsePoseEstimator::AllPriors() const {
+  std::vector<RelativePosePrior> all = priors_;
+  all.insert(all.end(), frame_priors_.begin(), frame_priors_.end());
+  return all;
 }
 
 // Lengths found before keep to their edges.
@@ -208,7 +217,8 @@ int CoarsePoseEstimator::AddSensors() {
   for (size_t e = 0; e < lengths_.lengths.size(); ++e) {
     lengths[graph_.edges[e].Pair()] = lengths_.lengths[e];
   }
-  const int num_added = AddSensorEdges(options_.augmentation, priors_, &graph_);
+  const int num_added =
+      AddSensorEdges(options_.augmentation, AllPriors(), &graph_);
   if (lengths.empty()) return num_added;
   lengths_.lengths.clear();
   for (const ViewGraphEdge& edge : graph_.edges) {

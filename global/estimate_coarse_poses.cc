@@ -73,10 +73,11 @@ bool CoarsePoseOptions::IsValid(std::string* error) const {
          positions.IsValid(error) && position_filter.IsValid(error);
 }
 
-CoarsePoses EstimateCoarsePoses(const CoarsePoseOptions& options,
-                                const ViewGraph& initial_graph,
-                                const GlobalCorrespondences& correspondences,
-                                const std::vector<RelativePosePrior>& priors) {
+CoarsePoses EstimateCoarsePoses(
+    const CoarsePoseOptions& options, const ViewGraph& initial_graph,
+    const GlobalCorrespondences& correspondences,
+    const std::vector<RelativePosePrior>& priors,
+    const std::vector<RelativePosePrior>& frame_priors) {
   std::string error;
   if (!options.IsValid(&error)) {
     throw std::invalid_argument("EstimateCoarsePoses: " + error);
@@ -88,7 +89,7 @@ CoarsePoses EstimateCoarsePoses(const CoarsePoseOptions& options,
   step_options.lengths.num_threads = options.num_threads;
   step_options.translations.num_threads = options.num_threads;
   return CoarsePoseEstimator(step_options, initial_graph, correspondences,
-                             priors)
+                             priors, frame_priors)
       .Run();
 }
 

@@ -110,8 +110,10 @@ struct CoarsePoses {
 
 // Steps 2.1 to 2.6 of the coarse stage (design 7.2), from an initial view
 // graph (relative poses of verified pairs) to camera poses. Priors may be
-// empty. Throws std::invalid_argument for invalid options or an inconsistent
-// graph. Numbered steps:
+// empty. frame_priors are those between the cameras of a rig
+// (ComputeFramePriors); they take part wherever priors do, and the odometry of
+// a frame's leader is that of its other images. Throws std::invalid_argument
+// for invalid options or an inconsistent graph. Numbered steps:
 //   1 least-squares relative poses            RefineRelativePoses
 //     the camera's mount                      CorrectCameraMount
 //     odometry's rotation rates               CorrectRotationRates
@@ -121,9 +123,10 @@ struct CoarsePoses {
 //   4 edges off the rotations                 FilterEdgesByRotation
 //   5 directions, sensor translations         EstimateRelativeTranslations
 //   6 positions, edges off the positions      EstimateGlobalPositions
-CoarsePoses EstimateCoarsePoses(const CoarsePoseOptions& options,
-                                const ViewGraph& initial_graph,
-                                const GlobalCorrespondences& correspondences,
-                                const std::vector<RelativePosePrior>& priors);
+CoarsePoses EstimateCoarsePoses(
+    const CoarsePoseOptions& options, const ViewGraph& initial_graph,
+    const GlobalCorrespondences& correspondences,
+    const std::vector<RelativePosePrior>& priors,
+    const std::vector<RelativePosePrior>& frame_priors = {});
 
 }  // namespace adasfm

@@ -8,10 +8,9 @@ Option = collections.namedtuple('Option', 'name default help')
 Command = collections.namedtuple('Command', 'name summary description options')
 
 
-def run(*arguments):
+def run(*arguments, stderr=subprocess.DEVNULL):
     return subprocess.run(arguments, check=False, text=True,
-                          stdout=subprocess.PIPE,
-                          stderr=subprocess.DEVNULL).stdout
+                          stdout=subprocess.PIPE, stderr=stderr).stdout
 
 
 def parse_options(text):
@@ -42,5 +41,7 @@ def read_commands(colmap):
 
 
 def read_host_options(colmap, name):
-    """The names of the options of one of COLMAP's own commands."""
-    return [option.name for option in parse_options(run(colmap, name, '-h'))]
+    """The names of the options of one of COLMAP's own commands, which COLMAP 4
+    prints on standard error."""
+    text = run(colmap, name, '-h', stderr=subprocess.STDOUT)
+    return [option.name for option in parse_options(text)]

@@ -18,7 +18,9 @@ StatusOr<std::vector<ImageStamp>> OrderImages(std::vector<ImageStamp> images) {
     if (images[i].timestamp_ns == images[i - 1].timestamp_ns) {
       return Status::Error("images '" + images[i - 1].name + "' and '" +
                            images[i].name +
-                           "' have the same time; one camera is expected");
+                           "' have the same time; one camera is expected, or "
+                           "cam1, cam2, ... in the calibration for the others "
+                           "of a rig");
     }
   }
   return images;

@@ -6,6 +6,7 @@
 #include <limits>
 #include <map>
 #include <optional>
+#include <utility>
 
 #include "core/parallel.h"
 #include "core/so3.h"
@@ -284,7 +285,7 @@ double MatchImages(const StreetGrid& grid, const LandmarkMap& map,
       FindRevisits(*world, arc_lengths_m);
   candidates.insert(candidates.end(), revisits.begin(), revisits.end());
   std::map<ImagePair, SyntheticPair> pairs;
-  MatchAll(matcher, candidates, &pairs);
+  MatchAll(matcher, AddSecondCamera(*world, std::move(candidates)), &pairs);
   const size_t num_true_pairs = pairs.size();
   const int num_aliases =
       NumWrongPairs(options, options.alias_pair_ratio, num_true_pairs);

@@ -320,7 +320,7 @@ void ObserveLandmarks(const StreetGrid& grid, const LandmarkMap& map,
                       SyntheticWorld* world) {
   const Observer observer(grid, map, *world);
   ParallelFor(-1, world->images.size(), [&](size_t i) {
-    observer.Observe(max_num_keypoints[i],
+    observer.Observe(max_num_keypoints[i % max_num_keypoints.size()],
                      exposures.empty() ? nullptr : &exposures[i],
                      &world->images[i]);
   });

@@ -42,7 +42,7 @@ PairCandidate TrueCandidate(const SyntheticWorld& world, int first,
 std::vector<std::pair<double, int>> ImagesInStreet(const SyntheticWorld& world,
                                                    const Street& street) {
   std::vector<std::pair<double, int>> images;
-  for (size_t i = 0; i < world.images.size(); ++i) {
+  for (int i = 0; i < world.options.num_images; ++i) {
     const Rigid3d& pose = world.images[i].cam_from_world;
     const Eigen::Vector3d uvz =
         street.LocalFromWorld(pose.TargetOriginInSource());
@@ -51,7 +51,7 @@ std::vector<std::pair<double, int>> ImagesInStreet(const SyntheticWorld& world,
     if (uvz.x() > -10.0 && uvz.x() < kBlockSize && std::abs(uvz.y()) < 3.0 &&
         std::abs(uvz.z() - kCameraHeight) < kCameraHeight &&
         forward.head<2>().dot(street.Direction()) > 0.9) {
-      images.emplace_back(uvz.x(), static_cast<int>(i));
+      images.emplace_back(uvz.x(), i);
     }
   }
   return images;
@@ -121,13 +121,30 @@ void FindTwinAliases(const StreetGrid& grid, const SyntheticWorld& world,
 
 std::vector<PairCandidate> FindSequentialPairs(const SyntheticWorld& world) {
   std::vector<PairCandidate> candidates;
-  const int num_images = static_cast<int>(world.images.size());
+  const int num_images = world.options.num_images;
   for (int i = 0; i < num_images; ++i) {
     const int end =
         std::min(num_images, i + world.options.num_sequential_neighbors + 1);
     for (int j = i + 1; j < end; ++j) {
       candidates.push_back(TrueCandidate(world, i, j));
     }
+  }
+  return candidates;
+}
+
+std::vector<PairCandidate> AddSecondCamera(
+    const SyntheticWorld& world, std::vector<PairCandidate> candidates) {
+  const int num_frames = world.options.num_images;
+  if (world.images.size() == num_frames) return candidates;
+  const size_t num_of_first = candidates.size();
+  for (size_t k = 0; k < num_of_first; ++k) {
+    const int first = candidates[k].first;
+    const int second = candidates[k].second + num_frames;
+    candidates.push_back(TrueCandidate(world, first, second));
+    candidates.push_back(TrueCandidate(world, first + num_frames, second));
+  }
+  for (int i = 0; i < num_frames; ++i) {
+    candidates.push_back(TrueCandidate(world, i, i + num_frames));
   }
   return candidates;
 }
@@ -141,7 +158,7 @@ std::vector<PairCandidate> FindRevisits(
   };
   const double min_way_m = RevisitDistance(world.options);
   std::vector<PairCandidate> candidates;
-  for (size_t i = 0; i < world.images.size(); ++i) {
+  for (int i = 0; i < world.options.num_images; ++i) {
     const Rigid3d& pose = world.images[i].cam_from_world;
     const Eigen::Vector3d center = pose.TargetOriginInSource();
     const auto [column, row] = cell(center);
@@ -165,9 +182,9 @@ std::vector<PairCandidate> FindRevisits(
       near.resize(kMaxNumRevisitsPerImage);
     }
     for (const auto& [distance, j] : near) {
-      candidates.push_back(TrueCandidate(world, j, static_cast<int>(i)));
+      candidates.push_back(TrueCandidate(world, j, i));
     }
-    cells[{column, row}].push_back(static_cast<int>(i));
+    cells[{column, row}].push_back(i);
   }
   return candidates;
 }

@@ -27,11 +27,17 @@ struct PairCandidate {
   bool IsAlias() const { return street1 >= 0; }
 };
 
-// Each image with the next ones.
+// Each image of the first camera with the next ones.
 std::vector<PairCandidate> FindSequentialPairs(const SyntheticWorld& world);
 
+// The candidates of the first camera, then those of the second camera and
+// across: (l, r) gives (l, r'), (l', r') too, and each image its neighbour in
+// the frame. Unchanged without a second camera.
+std::vector<PairCandidate> AddSecondCamera(
+    const SyntheticWorld& world, std::vector<PairCandidate> candidates);
+
 // Images that stand close together and look the same way on another visit:
-// the nearest earlier ones of each image.
+// the nearest earlier ones of each image of the first camera.
 std::vector<PairCandidate> FindRevisits(
     const SyntheticWorld& world, const std::vector<double>& arc_lengths_m);
 

@@ -46,6 +46,14 @@ Rigid3d MakeCamFromImu() {
                                 Eigen::Vector3d(0.5, 0.05, 0.9));
 }
 
+// The second camera looks nearly the same way.
+Rigid3d MakeCam1FromCam0(double baseline_m) {
+  if (baseline_m == 0.0) return Rigid3d();
+  const Eigen::Quaterniond turn =
+      ExpSo3(Eigen::Vector3d(DegToRad(0.3), DegToRad(-0.5), DegToRad(0.2)));
+  return CamFromWorldWithCenter(turn, Eigen::Vector3d(baseline_m, 0.0, 0.0));
+}
+
 // Keypoints that each image may have.
 std::vector<int> DrawBlackouts(const SyntheticWorldOptions& options) {
   Random random = MakeRandom(options.seed, 12);
@@ -112,6 +120,11 @@ std::vector<ExposurePoses> TakeRows(const Drive& drive,
   for (const double time_s : times_s) {
     exposures.push_back({pose_at(time_s - half_s), pose_at(time_s + half_s)});
   }
+  while (exposures.size() < world.images.size()) {
+    const ExposurePoses& first = exposures[exposures.size() - times_s.size()];
+    exposures.push_back({world.cam1_from_cam0 * first.first_cam_from_world,
+                         world.cam1_from_cam0 * first.last_cam_from_world});
+  }
   return exposures;
 }
 
@@ -148,6 +161,20 @@ void FillImagesAndPairs(const std::vector<ExposurePoses>& exposures,
   }
 }
 
+// The second camera's images, at the first one's times.
+void AddSecondCamera(SyntheticWorld* world) {
+  const size_t num_frames = world->images.size();
+  for (size_t i = 0; i < num_frames; ++i) {
+    SyntheticImage image = world->images[i];
+    world->images[i].name = "cam0/" + image.name;
+    image.name = "cam1/" + image.name;
+    image.image_id = static_cast<image_t>(num_frames + i + 1);
+    image.camera_index = 1;
+    image.cam_from_world = world->cam1_from_cam0 * image.cam_from_world;
+    world->images.push_back(std::move(image));
+  }
+}
+
 // Reports the first rule that is broken.
 template <typename T>
 bool Require(bool is_valid, const char* name, const T& value,
@@ -181,6 +208,7 @@ bool SyntheticWorldOptions::IsValid(std::string* error) const {
                  std::min(image_width, image_height), "at least 64 px",
                  error) &&
          positive(spacing_m, "spacing_m") &&
+         not_negative(stereo_baseline_m, "stereo_baseline_m") &&
          not_negative(image_interval_s, "image_interval_s") &&
          positive(num_keypoints_per_image, "num_keypoints_per_image") &&
          not_negative(pixel_noise_px, "pixel_noise_px") &&
@@ -250,6 +278,7 @@ SyntheticWorld BuildSyntheticWorld(const SyntheticWorldOptions& options) {
   world.options = options;
   world.camera = MakeCamera(options);
   world.cam_from_imu = MakeCamFromImu();
+  world.cam1_from_cam0 = MakeCam1FromCam0(options.stereo_baseline_m);
   world.imu_from_wheel = Rigid3d(Eigen::Quaterniond::Identity(),
                                  Eigen::Vector3d(-0.4, 0.05, -0.3));
   // 1. The streets and the drive through them.
@@ -260,6 +289,7 @@ SyntheticWorld BuildSyntheticWorld(const SyntheticWorldOptions& options) {
   for (const double time_s : times_s) {
     arc_lengths_m.push_back(drive.ArcLengthAt(time_s));
   }
+  if (options.stereo_baseline_m > 0.0) AddSecondCamera(&world);
   // 2. The logs.
   const double first_s = drive.FirstImageTime();
   const double end_s = times_s.back() + kTail;

@@ -20,6 +20,7 @@ enum class SyntheticTrajectory { kTown, kStraight, kParallel, kFloors, kLanes };
 // A drive through streets with facades. One generator serves the tests, the
 // benchmarks and the demo; equal options give equal worlds.
 struct SyntheticWorldOptions {
+  // Of each camera.
   int num_images = 100;
   uint64_t seed = 1;
   // Mean distance between images along the path.
@@ -45,6 +46,9 @@ struct SyntheticWorldOptions {
   int num_spins = 0;
   double spin_duration_s = 8.0;
   SyntheticCameraModel camera_model = SyntheticCameraModel::kPinhole;
+  // Above 0, a second camera takes its images at the same times, this far to
+  // the right of the first one.
+  double stereo_baseline_m = 0.0;
 
   // The focal length follows the width.
   int image_width = 800;
@@ -118,10 +122,12 @@ struct SyntheticCamera {
 };
 
 struct SyntheticImage {
-  image_t image_id = kInvalidImageId;  // 1, 2, ... in order of time
-  std::string name;                    // "<timestamp_ns>.png"
-  timestamp_t timestamp_ns = 0;        // the camera's clock
-  Rigid3d cam_from_world;              // true pose; world is z-up, in metres
+  image_t image_id = kInvalidImageId;  // 1, 2, ... in order of the list
+  int camera_index = 0;
+  // "<timestamp_ns>.png"; below cam0/ and cam1/ where there are two cameras.
+  std::string name;
+  timestamp_t timestamp_ns = 0;  // the camera's clock
+  Rigid3d cam_from_world;        // true pose; world is z-up, in metres
   std::vector<Eigen::Vector2d> keypoints;
   // The landmark each keypoint sees; numbers of their own beyond all landmarks
   // for keypoints on cars.
@@ -156,9 +162,12 @@ struct SyntheticFix {
 struct SyntheticWorld {
   SyntheticWorldOptions options;
   SyntheticCamera camera;
-  Rigid3d cam_from_imu;
+  Rigid3d cam_from_imu;  // of the first camera
+  // Without a second camera the identity.
+  Rigid3d cam1_from_cam0;
   Rigid3d imu_from_wheel;
   double track_width_m = 1.2;
+  // In order of time; all of the first camera, then all of the second.
   std::vector<SyntheticImage> images;
   std::vector<Eigen::Vector3d> landmarks;
   // Sorted by (image_id1, image_id2).

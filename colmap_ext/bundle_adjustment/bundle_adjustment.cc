@@ -111,7 +111,8 @@ PosePriorEdge PosePriorEdgeFromPrior(const RelativePosePrior& prior) {
   edge.image_id1 = prior.image_id1;
   edge.image_id2 = prior.image_id2;
   edge.cam2_from_cam1 = prior.cam2_from_cam1;
-  edge.dt_s = SecondsFromNs(prior.dt_ns);
+  // Within a frame of a rig no time passes, and no log measured the motion.
+  if (prior.dt_ns > 0) edge.dt_s = SecondsFromNs(prior.dt_ns);
   const auto sigma_or_infinity = [](double variance) {
     return std::isfinite(variance) && variance > 0.0
                ? std::sqrt(variance)

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "colmap_ext/bundle_adjustment/shared_errors.h"
+#include "core/camera_rig.h"
 #include "core/position_prior.h"
 #include "core/relative_pose_prior.h"
 #include "core/rigid3d.h"
@@ -110,6 +111,11 @@ struct PriorBundleAdjustmentProblem {
   // positions only.
   std::map<image_t, Eigen::Vector3d> gravity_in_cam;
   double gravity_sigma_rad = std::numeric_limits<double>::infinity();
+  // Each frame of these rigs has one pose, and the cam_from_rig of each camera,
+  // which the rigs know up to their sigmas, is estimated; priors within a frame
+  // are passed over. Cameras without cam_from_rig, and all of them beside
+  // constant images, have a pose for each image.
+  CameraRigs rigs;
 };
 
 struct PriorBundleAdjustmentSummary {

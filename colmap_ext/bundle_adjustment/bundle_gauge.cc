@@ -23,7 +23,7 @@ void BundleProblem::FixFirstPose() {
   }
   if (first == nullptr) return;
   first->is_constant = true;
-  problem_->SetParameterBlockConstant(first->pose->parameters);
+  problem_->SetParameterBlockConstant(first->SolvedPose()->parameters);
 }
 
 void BundleProblem::FixDistanceToFarthestPose(double sigma_ratio) {

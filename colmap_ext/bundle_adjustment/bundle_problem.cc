@@ -74,13 +74,22 @@ BundleProblem::BundleProblem(const PriorBundleAdjustmentOptions& options,
   AddImages(problem, reconstruction);
   AddPoints(reconstruction);
   AddPriors(problem.priors);
+  AddMountPriors(problem.rigs);
   AddSharedErrorPriors(problem.priors);
   SetConstantBlocks(reconstruction);
 }
 
 void BundleProblem::PrepareForEvaluation(bool, bool new_evaluation_point) {
   if (!new_evaluation_point) return;
-  for (auto& [image_id, block] : images_) block.pose->Update();
+  UpdatePoses();
+}
+
+void BundleProblem::UpdatePoses() {
+  for (auto& [camera_id, mount] : mounts_) mount.Update();
+  for (auto& [image_id, block] : images_) {
+    block.SolvedPose()->Update();
+    if (block.IsDerived()) block.RigPose::Update();
+  }
 }
 
 void BundleProblem::AddImages(const PriorBundleAdjustmentProblem& problem,
@@ -96,11 +105,79 @@ void BundleProblem::AddImages(const PriorBundleAdjustmentProblem& problem,
   };
   for (const image_t image_id : problem.images) add(image_id, false);
   for (const image_t image_id : problem.constant_images) add(image_id, true);
-  poses_.reserve(images_.size());
+  poses_.reserve(2 * images_.size());  // As many frames at most.
   for (auto& [image_id, block] : images_) {
     poses_.emplace_back(CamFromWorld(reconstruction.Image(image_id)));
     block.pose = &poses_.back();
   }
+  if (problem.constant_images.empty()) AddRigs(problem.rigs, reconstruction);
+}
+
+void BundleProblem::AddRigs(const CameraRigs& rigs,
+                            const colmap::Reconstruction& reconstruction) {
+  CameraRigs rigs_here = rigs;
+  rigs_here.images.clear();
+  for (const auto& [image_id, block] : images_) {
+    const auto image = rigs.images.find(image_id);
+    if (image != rigs.images.end()) rigs_here.images.insert(*image);
+  }
+  for (const auto& [frame_id, leader] : FindFrameLeaders(rigs_here)) {
+    const RigCamera& camera = rigs.cameras.at(rigs.images.at(leader).camera_id);
+    ImageBlock& block = images_.at(leader);
+    if (!camera.is_reference) {
+      poses_.emplace_back(camera.cam_from_rig->Inverse() *
+                          CamFromWorld(reconstruction.Image(leader)));
+    }
+    block.frame = camera.is_reference ? block.pose : &poses_.back();
+    for (const auto& [image_id, image] : rigs_here.images) {
+      if (image.frame_id == frame_id) images_.at(image_id).frame = block.frame;
+    }
+  }
+  for (const auto& [image_id, image] : rigs_here.images) {
+    const RigCamera& camera = rigs.cameras.at(image.camera_id);
+    ImageBlock& block = images_.at(image_id);
+    if (camera.is_reference || !camera.cam_from_rig || !block.frame) continue;
+    block.mount =
+        &mounts_.emplace(image.camera_id, *camera.cam_from_rig).first->second;
+  }
+  UpdatePoses();
+}
+
+void BundleProblem::AddMountPriors(const CameraRigs& rigs) {
+  for (auto& [camera_id, mount] : mounts_) {
+    if (!problem_->HasParameterBlock(mount.parameters)) continue;
+    const RigCamera& camera = rigs.cameras.at(camera_id);
+    Eigen::Matrix<double, 6, 1> sigmas;
+    sigmas << Eigen::Vector3d::Constant(camera.rotation_sigma_rad),
+        Eigen::Vector3d::Constant(camera.translation_sigma_m);
+    other_costs_.push_back(std::make_unique<ceres::NormalPrior>(
+        Eigen::MatrixXd(sigmas.cwiseInverse().asDiagonal()),
+        Eigen::VectorXd::Zero(6)));
+    problem_->AddResidualBlock(other_costs_.back().get(), nullptr,
+                               mount.parameters);
+  }
+}
+
+void BundleProblem::AddCost(ceres::CostFunction* cost,
+                            ceres::LossFunction* loss,
+                            const std::vector<const ImageBlock*>& images,
+                            const std::vector<double*>& others) {
+  std::vector<double*> parameters;
+  bool is_derived = false;
+  for (const ImageBlock* image : images) {
+    parameters.push_back(image->pose->parameters);
+    is_derived |= image->IsDerived();
+  }
+  if (is_derived) {
+    std::vector<RigPose> poses;
+    for (const ImageBlock* image : images) poses.push_back(*image);
+    auto rig_cost = std::make_unique<RigCost>(cost, std::move(poses));
+    parameters = rig_cost->Blocks();
+    cost = rig_cost.get();
+    other_costs_.push_back(std::move(rig_cost));
+  }
+  parameters.insert(parameters.end(), others.begin(), others.end());
+  problem_->AddResidualBlock(cost, loss, parameters);
 }
 
 std::vector<BundleProblem::Observation> BundleProblem::FindObservations(
@@ -166,9 +243,8 @@ void BundleProblem::AddObservation(const colmap::Reconstruction& reconstruction,
   block.num_observations += 1;
   if (!options_.RefinesCameras()) {
     reprojection_costs_.emplace_back(observation.keypoint, block.pose);
-    problem_->AddResidualBlock(&reprojection_costs_.back(),
-                               reprojection_loss_.get(), block.pose->parameters,
-                               point->xyz.data());
+    AddCost(&reprojection_costs_.back(), reprojection_loss_.get(), {&block},
+            {point->xyz.data()});
     return;
   }
   const camera_t camera_id =
@@ -178,9 +254,8 @@ void BundleProblem::AddObservation(const colmap::Reconstruction& reconstruction,
   other_costs_.push_back(
       CreateCameraCost(reconstruction.Camera(camera_id), observation.xy,
                        options_.keypoint_sigma_px, block.pose));
-  problem_->AddResidualBlock(other_costs_.back().get(),
-                             reprojection_loss_.get(), block.pose->parameters,
-                             point->xyz.data(), camera.params.data());
+  AddCost(other_costs_.back().get(), reprojection_loss_.get(), {&block},
+          {point->xyz.data(), camera.params.data()});
 }
 
 void BundleProblem::AddPriors(const std::vector<PosePriorEdge>& edges) {
@@ -196,7 +271,7 @@ void BundleProblem::AddPriors(const std::vector<PosePriorEdge>& edges) {
     const auto image1 = images_.find(edge.image_id1);
     const auto image2 = images_.find(edge.image_id2);
     if (image1 == images_.end() || image2 == images_.end() ||
-        image1 == image2 ||
+        image1->second.SolvedPose() == image2->second.SolvedPose() ||
         (image1->second.is_constant && image2->second.is_constant)) {
       continue;
     }
@@ -217,12 +292,9 @@ void BundleProblem::AddPrior(const PosePriorEdge& edge,
                              ImageBlock* image2, ceres::LossFunction* loss) {
   auto cost =
       std::make_unique<PosePriorCost>(edge, term, image1->pose, image2->pose);
-  std::vector<double*> parameters = {image1->pose->parameters,
-                                     image2->pose->parameters};
   const std::vector<double*> shared = SharedParameters(edge, *cost, term);
-  parameters.insert(parameters.end(), shared.begin(), shared.end());
   other_costs_.push_back(std::move(cost));
-  problem_->AddResidualBlock(other_costs_.back().get(), loss, parameters);
+  AddCost(other_costs_.back().get(), loss, {image1, image2}, shared);
   image1->num_priors += 1;
   image2->num_priors += 1;
 }
@@ -366,8 +438,10 @@ std::shared_ptr<ceres::ParameterBlockOrdering> BundleProblem::Ordering() {
   for (PointBlock& point : points_) {
     ordering->AddElementToGroup(point.xyz.data(), 0);
   }
-  for (auto& [image_id, block] : images_) {
-    if (block.IsUsed()) ordering->AddElementToGroup(block.pose->parameters, 1);
+  for (AdjustedPose& pose : poses_) {
+    if (problem_->HasParameterBlock(pose.parameters)) {
+      ordering->AddElementToGroup(pose.parameters, 1);
+    }
   }
   for (auto& [camera_id, block] : cameras_) {
     if (block.is_used) ordering->AddElementToGroup(block.params.data(), 1);
@@ -377,6 +451,11 @@ std::shared_ptr<ceres::ParameterBlockOrdering> BundleProblem::Ordering() {
   for (SharedBlock& block : shared_) {
     if (block.is_used) ordering->AddElementToGroup(block.values, 2);
   }
+  for (auto& [camera_id, mount] : mounts_) {
+    if (problem_->HasParameterBlock(mount.parameters)) {
+      ordering->AddElementToGroup(mount.parameters, 3);
+    }
+  }
   return ordering;
 }
 
@@ -385,8 +464,11 @@ bool BundleProblem::IsFinite() const {
     return std::all_of(values, values + size,
                        [](double value) { return std::isfinite(value); });
   };
-  for (const auto& [image_id, block] : images_) {
-    if (!all_finite(block.pose->parameters, 6)) return false;
+  for (const AdjustedPose& pose : poses_) {
+    if (!all_finite(pose.parameters, 6)) return false;
+  }
+  for (const auto& [camera_id, mount] : mounts_) {
+    if (!all_finite(mount.parameters, 6)) return false;
   }
   for (const PointBlock& point : points_) {
     if (!point.xyz.allFinite()) return false;
@@ -399,10 +481,17 @@ bool BundleProblem::IsFinite() const {
 
 void BundleProblem::WriteTo(colmap::Reconstruction* reconstruction) const {
   for (const auto& [image_id, block] : images_) {
-    if (block.is_constant || !block.IsUsed()) continue;
-    AdjustedPose pose = *block.pose;
+    AdjustedPose pose = *block.SolvedPose();
     pose.Update();
-    SetCamFromWorld(pose.CamFromWorld(), &reconstruction->Image(image_id));
+    Rigid3d cam_from_world = pose.CamFromWorld();
+    if (block.IsDerived()) {
+      AdjustedPose mount = *block.mount;
+      mount.Update();
+      cam_from_world = mount.CamFromWorld() * cam_from_world;
+    } else if (block.is_constant || !block.IsUsed()) {
+      continue;
+    }
+    SetCamFromWorld(cam_from_world, &reconstruction->Image(image_id));
   }
   for (const PointBlock& point : points_) {
     reconstruction->Point3D(point.id).SetXYZ(point.xyz);

@@ -12,6 +12,7 @@
 #include "colmap_ext/bundle_adjustment/bundle_adjustment.h"
 #include "colmap_ext/bundle_adjustment/pose_prior_cost.h"
 #include "colmap_ext/bundle_adjustment/reprojection_cost.h"
+#include "colmap_ext/bundle_adjustment/rig_cost.h"
 
 namespace adasfm {
 
@@ -57,12 +58,14 @@ class BundleProblem final : private ceres::EvaluationCallback {
   void WriteTo(colmap::Reconstruction* reconstruction) const;
 
  private:
-  struct ImageBlock {
-    AdjustedPose* pose = nullptr;  // in poses_
+  // Its pose, and the frame's, are in poses_, its mount in mounts_.
+  struct ImageBlock : RigPose {
     bool is_constant = false;
     int num_observations = 0;
     int num_priors = 0;
     bool IsUsed() const { return num_observations > 0 || num_priors > 0; }
+    // What the solver changes: the image's own pose or that of its frame.
+    AdjustedPose* SolvedPose() const { return IsDerived() ? frame : pose; }
   };
   struct PointBlock {
     colmap::point3D_t id = 0;
@@ -86,6 +89,16 @@ class BundleProblem final : private ceres::EvaluationCallback {
                             bool new_evaluation_point) override;
   void AddImages(const PriorBundleAdjustmentProblem& problem,
                  const colmap::Reconstruction& reconstruction);
+  // Gives the images of rigs their frames and mounts.
+  void AddRigs(const CameraRigs& rigs,
+               const colmap::Reconstruction& reconstruction);
+  void AddMountPriors(const CameraRigs& rigs);
+  void UpdatePoses();
+  // Adds a residual on the poses of images and on other parameters; `cost` is
+  // owned by this object already.
+  void AddCost(ceres::CostFunction* cost, ceres::LossFunction* loss,
+               const std::vector<const ImageBlock*>& images,
+               const std::vector<double*>& others = {});
   void AddPoints(const colmap::Reconstruction& reconstruction);
   // The usable observations of a point, in order of image ids.
   std::vector<Observation> FindObservations(
@@ -119,6 +132,7 @@ class BundleProblem final : private ceres::EvaluationCallback {
   // Ceres orders the blocks of a group by address: contiguous and in the order
   // of ids, so that every run adds in the same order.
   std::vector<AdjustedPose> poses_;
+  std::map<camera_t, AdjustedPose> mounts_;
   std::vector<PointBlock> points_;
   // Parameters of shared_errors.h; those used by a prior take part.
   static constexpr size_t kExtrinsicRotation = 0;

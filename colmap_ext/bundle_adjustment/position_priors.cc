@@ -182,12 +182,12 @@ bool BundleProblem::IsConstant(image_t image_id) const {
 void BundleProblem::AddResidual(std::unique_ptr<ceres::CostFunction> cost,
                                 std::unique_ptr<ceres::LossFunction> loss,
                                 const std::vector<image_t>& image_ids) {
-  std::vector<double*> parameters;
+  std::vector<const ImageBlock*> images;
   for (const image_t image_id : image_ids) {
-    parameters.push_back(images_.at(image_id).pose->parameters);
+    images.push_back(&images_.at(image_id));
   }
-  problem_->AddResidualBlock(cost.get(), loss.get(), parameters);
   other_costs_.push_back(std::move(cost));
+  AddCost(other_costs_.back().get(), loss.get(), images);
   if (loss != nullptr) other_losses_.push_back(std::move(loss));
 }
 

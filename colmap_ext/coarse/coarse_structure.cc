@@ -51,13 +51,17 @@ void AddPoints(const std::vector<TriangulatedTrack>& points,
 }
 
 PriorBundleAdjustmentProblem CreateProblem(
-    const CoarseStructureOptions& options, const CoarseModelInput& input) {
+    const CoarseStructureOptions& options, const SceneData& scene,
+    const CoarseModelInput& input) {
   PriorBundleAdjustmentProblem problem;
   for (const auto& [image_id, pose] : input.cams_from_world) {
     problem.images.insert(image_id);
   }
   if (!options.use_priors) return problem;
-  for (const RelativePosePrior& prior : input.priors) {
+  std::vector<RelativePosePrior> priors = input.priors;
+  priors.insert(priors.end(), scene.frame_priors.begin(),
+                scene.frame_priors.end());
+  for (const RelativePosePrior& prior : priors) {
     if (problem.images.count(prior.image_id1) == 0 ||
         problem.images.count(prior.image_id2) == 0) {
       continue;
@@ -286,7 +290,7 @@ CoarseModel BuildCoarseModel(
   const bool is_georeferenced = model.positions.success;
   model.metric = input.metric || is_georeferenced;
   model.max_track_bytes = EstimateTrackBytes(input.matches);
-  PriorBundleAdjustmentProblem problem = CreateProblem(options, input);
+  PriorBundleAdjustmentProblem problem = CreateProblem(options, scene, input);
   if (is_georeferenced) AddPositions(scene, input, &problem);
   const RoundTracks tracks = BuildRoundTracks(options, input, problem.images);
   model.num_tracks = tracks.all.size();

@@ -192,8 +192,9 @@ StatusOr<GlobalStageResult> RunGlobalStage(
 
   // 2.1-2.6 Coarse poses.
   begin("coarse poses", 0.1);
-  result.poses = EstimateCoarsePoses(options.poses, initial.graph,
-                                     correspondences, scene.priors);
+  result.poses =
+      EstimateCoarsePoses(options.poses, initial.graph, correspondences,
+                          scene.priors, scene.frame_priors);
   AppendSteps(result.poses.steps, &result.steps);
   if (result.poses.components.empty()) return NothingHoldsTogether();
 

@@ -107,6 +107,13 @@ void AddOptions(PriorImportOptions* options, CommandOptions* command) {
       "error of its rotation between two images, 1 sigma [deg/m]");
   command->AddDefault("AdaSfmTrajectory.max_gap_s", &trajectory->max_gap_s,
                       "longest gap of the trajectory to bridge [s]");
+  command->AddDefault("AdaSfmRig.rotation_sigma_deg",
+                      &options->rig.rotation_sigma_deg,
+                      "error of the cameras of a rig against each other, 1 "
+                      "sigma per axis [deg]");
+  command->AddDefault("AdaSfmRig.translation_sigma_m",
+                      &options->rig.translation_sigma_m,
+                      "the same for their distances [m]");
   PositionPriorOptions* positions = &options->positions;
   command->AddDefault("AdaSfmGnss.max_fix_gap_s", &positions->max_fix_gap_s,
                       "longest gap of the positions to bridge [s]");

@@ -33,7 +33,11 @@ void AddOptions(SynthesizerOptions* options, CommandOptions* command) {
   SyntheticWorldOptions* world = &options->world;
   command->AddRequired("output_path", &options->output_path,
                        "folder for the world");
-  command->AddDefault("num_images", &world->num_images, "images of the drive");
+  command->AddDefault("num_images", &world->num_images,
+                      "images of the drive, of each camera");
+  command->AddDefault("stereo_baseline", &world->stereo_baseline_m,
+                      "above 0: a second camera so far to the right of the "
+                      "first, with images at the same times [m]");
   command->AddDefault("seed", &world->seed, "equal seeds give equal worlds");
   command->AddDefault("spacing", &world->spacing_m,
                       "mean distance between images [m]");
@@ -186,6 +190,7 @@ Status WritePhotos(const SyntheticWorld& world, const fs::path& folder) {
   WorldRenderer renderer(world);
   for (size_t i = 0; i < world.images.size(); ++i) {
     const fs::path path = folder / world.images[i].name;
+    fs::create_directories(path.parent_path());
     bool written = false;
     try {
       written = cv::imwrite(path.string(), renderer.Render(i));

@@ -17,8 +17,8 @@ using Row = std::map<std::string, SqliteValue>;
 // The ids that a column's values are looked up in; null for other columns.
 const std::map<int64_t, int64_t>* IdsOfColumn(const std::string& column,
                                               const MergedIds& ids) {
-  for (const char* name :
-       {"camera_id", "sensor_id", "ref_sensor_id", "corr_sensor_id"}) {
+  for (const char* name : {"camera_id", "sensor_id", "ref_sensor_id",
+                           "corr_sensor_id", "reference_camera_id"}) {
     if (column == name) return &ids.cameras;
   }
   for (const char* name :

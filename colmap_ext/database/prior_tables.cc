@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "colmap_ext/database/prior_corrections.h"
+#include "colmap_ext/database/rig_table.h"
 #include "colmap_ext/host/database.h"
 #include "colmap_ext/io/double_blob.h"
 
@@ -167,6 +168,7 @@ Status WritePriorTables(const std::string& database_path,
     WriteGravity(names, tables.gravity, &database);
     WritePositions(names, tables.positions, &database);
     WritePositionOrigin(tables.position_origin, &database);
+    WriteRigCameras(tables.rig_cameras, &database);
     RemovePriorCorrections(&database);
     transaction.Commit();
   } catch (const SqliteError& error) {

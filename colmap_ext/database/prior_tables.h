@@ -2,10 +2,12 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <map>
 #include <optional>
 #include <string>
 #include <vector>
 
+#include "core/camera_rig.h"
 #include "core/position_prior.h"
 #include "core/relative_pose_prior.h"
 #include "core/sqlite.h"
@@ -14,10 +16,10 @@
 
 namespace adasfm {
 
-// The tables adasfm_image_times, adasfm_relative_pose_priors, adasfm_gravity
-// and adasfm_position_priors inside a COLMAP database
-// (docs/reference/formats.md). Databases of before the last one are read as
-// having no positions.
+// The tables adasfm_image_times, adasfm_relative_pose_priors, adasfm_gravity,
+// adasfm_position_priors and adasfm_rig_cameras inside a COLMAP database
+// (docs/reference/formats.md). Databases of before the last two are read as
+// having no positions and no rig.
 
 struct ImageTimeRow {
   image_t image_id = kInvalidImageId;
@@ -38,6 +40,9 @@ struct PriorTables {
   std::vector<PositionPrior> positions;
   // Of the positions' ENU frame; none for positions in a frame of their own.
   std::optional<GeodeticPosition> position_origin;
+  // Of one rig of several cameras; all known. Written here, and read by
+  // ReadCameraRigs.
+  std::map<camera_t, RigCamera> rig_cameras;
 };
 
 // Replaces all rows, in one transaction. An error, and no change, when the

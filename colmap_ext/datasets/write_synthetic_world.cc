@@ -27,7 +27,6 @@ namespace fs = std::filesystem;
 
 colmap::Camera ConvertCamera(const SyntheticCamera& synthetic) {
   colmap::Camera camera;
-  camera.SetCameraId(1);
   camera.SetWidth(synthetic.width);
   camera.SetHeight(synthetic.height);
   camera.SetPriorFocalLength(true);
@@ -59,7 +58,7 @@ void WriteImages(const SyntheticWorld& world, colmap::Database* database) {
     colmap::Image image;
     image.SetImageId(synthetic.image_id);
     image.SetName(synthetic.name);
-    image.SetCameraId(1);
+    image.SetCameraId(1 + synthetic.camera_index);
     database->WriteImage(image, true);
     colmap::FeatureKeypoints keypoints;
     for (const Eigen::Vector2d& keypoint : synthetic.keypoints) {
@@ -92,10 +91,14 @@ Status WriteText(const fs::path& path,
   return WriteTextFile(path.string(), text.str());
 }
 
+size_t NumCameras(const SyntheticWorld& world) {
+  return 1 + world.images.back().camera_index;
+}
+
 // COLMAP's class prints that a write has failed and goes on.
 bool HasAllRows(const SyntheticWorld& world, const std::string& path) {
   const std::pair<const char*, size_t> tables[] = {
-      {"cameras", 1},
+      {"cameras", NumCameras(world)},
       {"images", world.images.size()},
       {"keypoints", world.images.size()},
       {"matches", world.pairs.size()},
@@ -146,8 +149,13 @@ void WriteWheels(const SyntheticWorld& world, std::ostream* file) {
 
 void WriteTimes(const SyntheticWorld& world, std::ostream* file) {
   *file << "#timestamp [ns],filename\n";
+  std::vector<std::pair<timestamp_t, std::string>> times;
   for (const SyntheticImage& image : world.images) {
-    *file << image.timestamp_ns << "," << image.name << "\n";
+    times.emplace_back(image.timestamp_ns, image.name);
+  }
+  std::sort(times.begin(), times.end());
+  for (const auto& [time_ns, name] : times) {
+    *file << time_ns << "," << name << "\n";
   }
 }
 
@@ -183,22 +191,31 @@ void WriteTransform(const char* key, const Rigid3d& transform,
   *file << "    - [0.0, 0.0, 0.0, 1.0]\n";
 }
 
-void WriteSensors(const SyntheticWorld& world, std::ostream* file) {
-  const SyntheticWorldOptions& options = world.options;
+void WriteCamera(const SyntheticWorld& world, int index,
+                 const Rigid3d& cam_from_imu, std::ostream* file) {
   const SyntheticCamera& camera = world.camera;
   const bool is_fisheye = camera.model == SyntheticCameraModel::kFisheye;
   const Eigen::Vector4d& k = camera.fisheye_coeffs;
-  *file << std::setprecision(12) << "cam0:\n  camera_model: pinhole\n"
+  *file << "cam" << index << ":\n  camera_model: pinhole\n"
         << "  intrinsics: [" << camera.focal_px << ", " << camera.focal_px
         << ", " << camera.principal_x_px << ", " << camera.principal_y_px
         << "]\n  distortion_model: " << (is_fisheye ? "equidistant" : "radtan")
         << "\n  distortion_coeffs: [" << k[0] << ", " << k[1] << ", " << k[2]
         << ", " << k[3] << "]\n  resolution: [" << camera.width << ", "
         << camera.height << "]\n";
-  WriteTransform("T_cam_imu", world.cam_from_imu, file);
+  WriteTransform("T_cam_imu", cam_from_imu, file);
+  *file << "  timeshift_cam_imu: " << world.options.timeshift_cam_imu_s << "\n";
+}
+
+void WriteSensors(const SyntheticWorld& world, std::ostream* file) {
+  const SyntheticWorldOptions& options = world.options;
+  *file << std::setprecision(12);
+  WriteCamera(world, 0, world.cam_from_imu, file);
+  if (NumCameras(world) > 1) {
+    WriteCamera(world, 1, world.cam1_from_cam0 * world.cam_from_imu, file);
+  }
   const ImuNoise& noise = options.imu_noise;
-  *file << "  timeshift_cam_imu: " << options.timeshift_cam_imu_s
-        << "\nimu0:\n  update_rate: " << options.imu_rate_hz
+  *file << "imu0:\n  update_rate: " << options.imu_rate_hz
         << "\n  gyroscope_noise_density: " << noise.gyroscope_noise_density
         << "\n  gyroscope_random_walk: " << noise.gyroscope_random_walk
         << "\n  accelerometer_noise_density: "
@@ -251,7 +268,11 @@ Status WriteSyntheticDatabase(const SyntheticWorld& world,
   {
     colmap::Database database(temporary);
     colmap::DatabaseTransaction transaction(&database);
-    database.WriteCamera(ConvertCamera(world.camera), true);
+    for (size_t i = 0; i < NumCameras(world); ++i) {
+      colmap::Camera camera = ConvertCamera(world.camera);
+      camera.SetCameraId(1 + i);
+      database.WriteCamera(camera, true);
+    }
     WriteImages(world, &database);
     WritePairs(world, &database);
   }

@@ -1,12 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "colmap_ext/evaluation/evaluation.h"
 
-#include <base/projection.h>
-
 #include <algorithm>
 #include <cmath>
 #include <utility>
 
+#include "colmap_ext/host/reprojection.h"
 #include "core/median.h"
 #include "core/nearest_rotation.h"
 #include "core/random.h"
@@ -168,19 +167,6 @@ std::vector<RelativePoseAuc> ComputeAuc(const std::vector<PosePair>& poses) {
   return counter.Result();
 }
 
-// COLMAP's error of a point: the mean over its observations.
-double MeanError(const colmap::Reconstruction& reconstruction,
-                 const colmap::Point3D& point) {
-  double sum_px = 0.0;
-  for (const colmap::TrackElement& element : point.Track().Elements()) {
-    const colmap::Image& image = reconstruction.Image(element.image_id);
-    sum_px += std::sqrt(colmap::CalculateSquaredReprojectionError(
-        image.Point2D(element.point2D_idx).XY(), point.XYZ(), image.Qvec(),
-        image.Tvec(), reconstruction.Camera(image.CameraId())));
-  }
-  return sum_px / point.Track().Length();
-}
-
 }  // namespace
 
 StatusOr<Evaluation> EvaluatePoses(const NamedPoses& cams_from_world,
@@ -237,7 +223,8 @@ double ComputeReprojectionRmse(const colmap::Reconstruction& reconstruction) {
   double sum_squares = 0.0;
   for (const auto& [point3D_id, point] : points) {
     const double error_px =
-        point->HasError() ? point->Error() : MeanError(reconstruction, *point);
+        point->HasError() ? point->Error()
+                          : ComputeReprojectionError(reconstruction, *point);
     num_observations += point->Track().Length();
     sum_squares += error_px * error_px * point->Track().Length();
   }

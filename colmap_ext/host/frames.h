@@ -7,6 +7,8 @@
 #include <map>
 #include <string>
 
+#include "core/camera_rig.h"
+#include "core/sqlite.h"
 #include "core/status.h"
 #include "core/types.h"
 
@@ -22,26 +24,27 @@ struct FrameOfImage {
   uint32_t rig_id = 0;
 };
 
-struct DatabaseFrames {
-  // Of every image; empty when a model needs no files of frames.
+// What a model's two files say; no files where `frames` is empty.
+struct ModelFrames {
+  // Of every image.
   std::map<image_t, FrameOfImage> frames;
-  // Some rig has several cameras, whose relative poses are not kept: `frames`
-  // is empty.
-  bool has_camera_rigs = false;
+  // Rigs of several cameras.
+  CameraRigs rigs;
 };
 
-// Of a database without frames: the default. An error for a file that cannot be
-// read.
-StatusOr<DatabaseFrames> ReadDatabaseFrames(const std::string& database_path);
+// The frames and rigs of the host's own tables, and whether there are such
+// tables. `frames` is empty when a model needs no files. Throws SqliteError.
+struct DatabaseFrames : ModelFrames {
+  bool has_tables = false;
+};
+DatabaseFrames ReadDatabaseFrames(SqliteConnection* database);
 
 // Writes rigs.bin and frames.bin for the registered images into a model's
-// folder. False when an image has no frame or the files cannot be written.
+// folder. The pose of a frame is that of its reference camera or, where that is
+// missing, of another one through cam_from_rig; cameras whose cam_from_rig no
+// frame of the model shows have that of the rigs. False when an image has no
+// frame or the files cannot be written.
 bool WriteFrameFiles(const colmap::Reconstruction& model,
-                     const std::map<image_t, FrameOfImage>& frames,
-                     const std::string& folder);
-
-inline constexpr char kCameraRigsWarning[] =
-    "the database has rigs of several cameras; every image is placed on its "
-    "own, and the model does not say its rigs to COLMAP 3.12 and later";
+                     const ModelFrames& frames, const std::string& folder);
 
 }  // namespace adasfm

@@ -39,14 +39,13 @@ bool HasRecords(const fs::path& path, uint64_t num_records) {
 }
 
 Status WriteModels(const std::vector<const colmap::Reconstruction*>& models,
-                   const std::map<image_t, FrameOfImage>& frames,
-                   const fs::path& temporary) {
+                   const ModelFrames& frames, const fs::path& temporary) {
   for (size_t i = 0; i < models.size(); ++i) {
     const fs::path path = temporary / std::to_string(i);
     fs::create_directories(path);
     const Status status = WriteBinaryModel(*models[i], path.string());
     if (!status.ok()) return status;
-    if (frames.empty()) continue;
+    if (frames.frames.empty()) continue;
     if (!WriteFrameFiles(*models[i], frames, path.string())) {
       return Status::Error("cannot write the frames of a model to " +
                            path.string() + "; check the free space");
@@ -100,7 +99,7 @@ Status WriteBinaryModel(const colmap::Reconstruction& model,
 Status WriteModelFolder(
     const std::string& output_path,
     const std::vector<const colmap::Reconstruction*>& models,
-    const std::map<image_t, FrameOfImage>& frames) {
+    const ModelFrames& frames) {
   const fs::path folder(output_path);
   const fs::path temporary = folder / kTemporaryName;
   Status status = CheckModelFolders(output_path);

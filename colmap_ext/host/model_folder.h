@@ -3,7 +3,6 @@
 
 #include <base/reconstruction.h>
 
-#include <map>
 #include <string>
 #include <vector>
 
@@ -27,7 +26,7 @@ Status WriteBinaryModel(const colmap::Reconstruction& model,
 Status WriteModelFolder(
     const std::string& output_path,
     const std::vector<const colmap::Reconstruction*>& models,
-    const std::map<image_t, FrameOfImage>& frames = {});
+    const ModelFrames& frames = {});
 
 // An error when something at output_path/0, 1, ... is no folder of a COLMAP
 // model and nothing else: it would be in the way. Links are not followed.

@@ -39,6 +39,19 @@ void AddMatches(const SceneData& data, MapperScene* scene) {
   }
 }
 
+void AddPriors(const std::vector<RelativePosePrior>& priors,
+               MapperScene* scene) {
+  for (const RelativePosePrior& prior : priors) {
+    if (!scene->images.count(prior.image_id1) ||
+        !scene->images.count(prior.image_id2)) {
+      continue;
+    }
+    scene->priors_of_image[prior.image_id1].push_back(scene->priors.size());
+    scene->priors_of_image[prior.image_id2].push_back(scene->priors.size());
+    scene->priors.push_back(prior);
+  }
+}
+
 }  // namespace
 
 std::unique_ptr<MapperScene> BuildMapperScene(const SceneData& data,
@@ -53,15 +66,8 @@ std::unique_ptr<MapperScene> BuildMapperScene(const SceneData& data,
   AddImages(data, scene.get());
   AddMatches(data, scene.get());
   scene->mapper.Begin();
-  for (const RelativePosePrior& prior : data.priors) {
-    if (!scene->images.count(prior.image_id1) ||
-        !scene->images.count(prior.image_id2)) {
-      continue;
-    }
-    scene->priors_of_image[prior.image_id1].push_back(scene->priors.size());
-    scene->priors_of_image[prior.image_id2].push_back(scene->priors.size());
-    scene->priors.push_back(prior);
-  }
+  AddPriors(data.priors, scene.get());
+  AddPriors(data.frame_priors, scene.get());
   return scene;
 }
 

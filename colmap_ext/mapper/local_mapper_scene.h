@@ -30,7 +30,8 @@ struct MapperScene {
   // Matched images and the number of their matches, strongest first, ties by
   // id.
   std::map<image_t, std::vector<std::pair<image_t, int>>> neighbors;
-  // Of data->priors, those within the part; and for each image their indices.
+  // Of data->priors and frame_priors, those within the part; and for each image
+  // their indices.
   std::vector<RelativePosePrior> priors;
   std::map<image_t, std::vector<size_t>> priors_of_image;
 };

@@ -157,6 +157,10 @@ class ModelRefiner {
     problem.images = RegisteredImages();
     problem.priors = std::move(priors);
     AddCoarseEdges(&problem.priors);
+    // Frames of a rig become rigid once its parts and gaps are in place.
+    if (!is_tentative && local_.use_priors_in_adjustment) {
+      problem.rigs = scene_.data->rigs;
+    }
     PriorBundleAdjustmentOptions options;
     options.keypoint_sigma_px = local_.keypoint_sigma_px;
     options.shared_errors.enabled = !is_tentative;

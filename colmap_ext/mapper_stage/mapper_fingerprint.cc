@@ -44,12 +44,14 @@ void AddScene(const SceneData& data, Hash* hash) {
       hash->Add(match.point2D_idx2);
     }
   }
-  for (const RelativePosePrior& prior : data.priors) {
-    hash->Add(prior.image_id1);
-    hash->Add(prior.image_id2);
-    hash->Add(prior.cam2_from_cam1);
-    for (int i = 0; i < 36; ++i) hash->Add(prior.covariance(i));
-    hash->Add(prior.flags);
+  for (const auto* priors : {&data.priors, &data.frame_priors}) {
+    for (const RelativePosePrior& prior : *priors) {
+      hash->Add(prior.image_id1);
+      hash->Add(prior.image_id2);
+      hash->Add(prior.cam2_from_cam1);
+      for (int i = 0; i < 36; ++i) hash->Add(prior.covariance(i));
+      hash->Add(prior.flags);
+    }
   }
   for (const PositionPrior& prior : data.positions) {
     hash->Add(prior.image_id1);

@@ -40,11 +40,13 @@ LocalMapperOptions StricterOptions(LocalMapperOptions options) {
 // Lengths between other images, such as those of another coarse model, say
 // nothing.
 bool IsMetric(const SceneData& data, const CoarsePoseMap& coarse) {
-  return std::any_of(
-      data.priors.begin(), data.priors.end(), [&coarse](const auto& prior) {
-        return prior.HasLength() && coarse.count(prior.image_id1) > 0 &&
-               coarse.count(prior.image_id2) > 0;
-      });
+  const auto has_length = [&coarse](const RelativePosePrior& prior) {
+    return prior.HasLength() && coarse.count(prior.image_id1) > 0 &&
+           coarse.count(prior.image_id2) > 0;
+  };
+  return std::any_of(data.priors.begin(), data.priors.end(), has_length) ||
+         std::any_of(data.frame_priors.begin(), data.frame_priors.end(),
+                     has_length);
 }
 
 MapperStageOptions WithThreads(MapperStageOptions options) {

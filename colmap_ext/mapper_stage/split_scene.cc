@@ -87,6 +87,9 @@ SplitSceneData SplitScene(const std::vector<CoarsePoseMap>& coarse_models,
     if (component != component_of(prior.image_id2)) continue;
     scene_of(component)->priors.push_back(prior);
   }
+  for (const auto& [image_id, image] : scene.rigs.images) {
+    scene_of(component_of(image_id))->rigs.images[image_id] = image;
+  }
   for (const PositionPrior& position : scene.positions) {
     const int component = component_of(position.image_id1);
     if (component != component_of(position.image_id2)) continue;
@@ -94,6 +97,7 @@ SplitSceneData SplitScene(const std::vector<CoarsePoseMap>& coarse_models,
   }
   for (SceneData& component : split.components) {
     component.cameras = scene.cameras;
+    component.rigs.cameras = scene.rigs.cameras;
     component.position_origin = scene.position_origin;
   }
   split.rest.cameras = std::move(scene.cameras);

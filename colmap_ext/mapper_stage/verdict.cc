@@ -304,15 +304,30 @@ std::string OfModels(int num_models, int num_all_models) {
          std::to_string(num_all_models) + " models ";
 }
 
+bool HasLengths(const std::vector<RelativePosePrior>& priors) {
+  return std::any_of(
+      priors.begin(), priors.end(),
+      [](const RelativePosePrior& prior) { return prior.HasLength(); });
+}
+
 std::string MetricSource(const std::vector<AssessedModel>& models) {
-  bool has_metric_sensors = false;
+  bool has_wheels = false;
+  bool has_rig = false;
   bool is_georeferenced = false;
   for (const AssessedModel& model : models) {
-    has_metric_sensors |= model.summary->has_metric_sensors;
     is_georeferenced |= model.summary->is_georeferenced;
+    if (!model.summary->has_metric_sensors) continue;
+    has_wheels |= HasLengths(model.data->priors);
+    has_rig |= HasLengths(model.data->frame_priors);
   }
-  if (!is_georeferenced) return has_metric_sensors ? "wheels" : "";
-  return has_metric_sensors ? "wheels and positions" : "positions";
+  std::string source;
+  const auto add = [&source](bool has, const char* name) {
+    if (has) source += (source.empty() ? "" : " and ") + std::string(name);
+  };
+  add(has_wheels, "wheels");
+  add(has_rig, "the rig");
+  add(is_georeferenced, "positions");
+  return source;
 }
 
 void CollectFigures(const std::vector<AssessedModel>& models,
@@ -357,7 +372,8 @@ Verdict AssessModels(const std::vector<AssessedModel>& models,
     JudgeStage(models.size() == 1 ? "" : "model " + std::to_string(k) + ": ",
                *models[k].summary,
                static_cast<int>(models[k].model->NumRegImages()), &judge);
-    has_priors = has_priors || !models[k].data->priors.empty();
+    has_priors = has_priors || !models[k].data->priors.empty() ||
+                 !models[k].data->frame_priors.empty();
   }
   for (const std::string& warning : warnings) {
     judge.Doubt("an earlier step warned: " + warning);

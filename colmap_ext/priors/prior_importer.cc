@@ -13,6 +13,7 @@
 
 #include "colmap_ext/host/camera.h"
 #include "colmap_ext/host/database.h"
+#include "colmap_ext/host/frames.h"
 #include "colmap_ext/host/model.h"
 #include "colmap_ext/host/pose_conversion.h"
 #include "colmap_ext/priors/import_positions.h"
@@ -46,15 +47,16 @@ StatusOr<std::vector<ImageStamp>> StampsFromFile(
   std::map<image_t, ImageStamp> stamps;
   std::vector<std::string> unknown;
   for (const ImageTime& time : *times) {
-    const image_t image_id = finder.Find(time.name);
-    if (image_id == kInvalidImageId) {
-      unknown.push_back(time.name);
-      continue;
-    }
-    const std::string& name = scene.images.at(image_id).name;
-    if (!stamps.emplace(image_id, ImageStamp{image_id, name, time.timestamp_ns})
-             .second) {
-      return Status::Error(path + ": image " + name + " has two times");
+    const std::vector<image_t> image_ids = finder.FindAll(time.name);
+    if (image_ids.empty()) unknown.push_back(time.name);
+    for (const image_t image_id : image_ids) {
+      const std::string& name = scene.images.at(image_id).name;
+      const ImageStamp stamp{image_id, name, time.timestamp_ns};
+      const auto [known, is_new] = stamps.emplace(image_id, stamp);
+      // Lists of several cameras name the same file once for each.
+      if (!is_new && known->second.timestamp_ns != time.timestamp_ns) {
+        return Status::Error(path + ": image " + name + " has two times");
+      }
     }
   }
   if (stamps.empty()) {
@@ -108,10 +110,34 @@ StatusOr<std::vector<ImageStamp>> StampImages(const std::string& path,
               return std::tie(a.timestamp_ns, a.image_id) <
                      std::tie(b.timestamp_ns, b.image_id);
             });
+  return stamps;
+}
+
+// The calibration's rig, else the host's, whose reference camera is cam0 then.
+Status FindRig(const RigOptions& options, const SceneData& scene,
+               SensorCalibration* calibration, PriorImport* import) {
+  StatusOr<std::map<camera_t, RigCamera>> cameras =
+      FindRigCameras(options, scene, calibration, &import->warnings);
+  if (!cameras.ok()) return cameras.status();
+  import->tables.rig_cameras = std::move(*cameras);
+  return Status::Ok();
+}
+
+// Gives the images their times. Returns those that the motion between frames
+// belongs to: all but the other cameras of a rig.
+StatusOr<std::vector<ImageStamp>> StampFrames(const PriorImportPaths& paths,
+                                              const SceneData& scene,
+                                              PriorImport* import) {
+  StatusOr<std::vector<ImageStamp>> stamps =
+      StampImages(paths.image_times_path, scene, import);
+  if (!stamps.ok()) return stamps;
+  const auto& rig_cameras = import->tables.rig_cameras;
+  std::vector<ImageStamp> frames = GroupFrames(
+      scene, rig_cameras.empty() ? scene.rigs.cameras : rig_cameras, &*stamps);
   for (const ImageStamp& stamp : *stamps) {
     import->tables.image_times.push_back({stamp.image_id, stamp.timestamp_ns});
   }
-  return stamps;
+  return frames;
 }
 
 // Gives the logs of the bag as paths with their topics. Wheels only where the
@@ -204,10 +230,17 @@ StatusOr<SceneData> ReadScene(const std::string& database_path) {
   // They are about to be replaced, damaged or not.
   options.read_priors = false;
   StatusOr<SceneData> scene = ReadSceneData(database_path, options);
-  if (scene.ok() && scene->images.empty()) {
+  if (!scene.ok()) return scene;
+  if (scene->images.empty()) {
     return Status::Error("the database " + database_path +
                          " has no images; run COLMAP's feature_extractor "
                          "first");
+  }
+  try {
+    SqliteConnection database(database_path, SqliteConnection::Mode::kRead);
+    scene->rigs = ReadDatabaseFrames(&database).rigs;
+  } catch (const SqliteError& error) {
+    return Status::Error(database_path + ": " + error.what());
   }
   return scene;
 }
@@ -245,8 +278,9 @@ Status CheckEstimate(const PriorEstimate& estimate,
 
 // The poses of the images by a trajectory's times or a model's names.
 StatusOr<std::map<image_t, Rigid3d>> ReadTrajectoryPoses(
-    const PriorImportPaths& paths, const SceneData& scene,
-    const std::vector<ImageStamp>& stamps, double max_gap_s) {
+    const PriorImportPaths& paths, const SensorCalibration& calibration,
+    const SceneData& scene, const std::vector<ImageStamp>& stamps,
+    double max_gap_s) {
   const std::string& path = paths.trajectory_path;
   std::map<image_t, Rigid3d> poses;
   if (std::filesystem::is_directory(path)) {
@@ -258,13 +292,6 @@ StatusOr<std::map<image_t, Rigid3d>> ReadTrajectoryPoses(
       if (image_id != kInvalidImageId) poses[image_id] = cam_from_world;
     }
   } else {
-    SensorCalibration calibration;
-    if (!paths.sensors_path.empty()) {
-      StatusOr<SensorCalibration> read =
-          ReadSensorCalibration(paths.sensors_path);
-      if (!read.ok()) return read.status();
-      calibration = std::move(read).value();
-    }
     const StatusOr<std::vector<OdometryPose>> trajectory = ReadOdometry(path);
     if (!trajectory.ok()) return trajectory.status();
     poses = InterpolateTrajectory(
@@ -288,25 +315,27 @@ StatusOr<SensorCalibration> ReadCalibrationIfGiven(const std::string& path) {
   return ReadSensorCalibration(path);
 }
 
-// Positions alone, without logs of motions.
-StatusOr<PriorImport> ImportPositionsOnly(const PriorImportPaths& paths,
+// Positions or a rig, without logs of motions.
+StatusOr<PriorImport> ImportWithoutMotion(const PriorImportPaths& paths,
                                           const PriorImportOptions& options) {
   const auto start = std::chrono::steady_clock::now();
-  const StatusOr<SensorCalibration> calibration =
+  StatusOr<SensorCalibration> calibration =
       ReadCalibrationIfGiven(paths.sensors_path);
   if (!calibration.ok()) return calibration.status();
   const StatusOr<SceneData> scene = ReadScene(paths.database_path);
   if (!scene.ok()) return scene.status();
   PriorImport import;
+  Status status = FindRig(options.rig, *scene, &*calibration, &import);
+  if (!status.ok()) return status;
   // Stored positions need no times.
   StatusOr<std::vector<ImageStamp>> stamps = std::vector<ImageStamp>();
   if (paths.gnss_path != kStoredPositionsPath ||
-      !paths.image_times_path.empty()) {
-    stamps = StampImages(paths.image_times_path, *scene, &import);
+      !paths.image_times_path.empty() || !import.tables.rig_cameras.empty()) {
+    stamps = StampFrames(paths, *scene, &import);
   }
   if (!stamps.ok()) return stamps.status();
-  const Status status = ImportPositions(paths, options.positions, *calibration,
-                                        *scene, *stamps, &import);
+  status = ImportPositions(paths, options.positions, *calibration, *scene,
+                           *stamps, &import);
   if (!status.ok()) return status;
   import.summary.num_images = stamps->size();
   import.seconds =
@@ -326,20 +355,22 @@ StatusOr<PriorImport> ImportTrajectory(const PriorImportPaths& paths,
   const auto start = std::chrono::steady_clock::now();
   const StatusOr<SceneData> scene = ReadScene(paths.database_path);
   if (!scene.ok()) return scene.status();
+  StatusOr<SensorCalibration> calibration =
+      ReadCalibrationIfGiven(paths.sensors_path);
+  if (!calibration.ok()) return calibration.status();
   PriorImport import;
+  Status status = FindRig(options.rig, *scene, &*calibration, &import);
+  if (!status.ok()) return status;
   const StatusOr<std::vector<ImageStamp>> stamps =
-      StampImages(paths.image_times_path, *scene, &import);
+      StampFrames(paths, *scene, &import);
   if (!stamps.ok()) return stamps.status();
-  const StatusOr<std::map<image_t, Rigid3d>> poses =
-      ReadTrajectoryPoses(paths, *scene, *stamps, options.trajectory.max_gap_s);
+  const StatusOr<std::map<image_t, Rigid3d>> poses = ReadTrajectoryPoses(
+      paths, *calibration, *scene, *stamps, options.trajectory.max_gap_s);
   if (!poses.ok()) return poses.status();
   import.tables.priors =
       ComputeTrajectoryPriors(*stamps, *poses, options.trajectory);
-  const StatusOr<SensorCalibration> calibration =
-      ReadCalibrationIfGiven(paths.sensors_path);
-  if (!calibration.ok()) return calibration.status();
-  const Status status = ImportPositions(paths, options.positions, *calibration,
-                                        *scene, *stamps, &import);
+  status = ImportPositions(paths, options.positions, *calibration, *scene,
+                           *stamps, &import);
   if (!status.ok()) return status;
   SensorSummary& summary = import.summary;
   summary.num_images = stamps->size();
@@ -364,8 +395,8 @@ bool PriorImportOptions::IsValid(std::string* error) const {
              std::to_string(max_visual_gap) + "; it must be positive";
     return false;
   }
-  return estimation.IsValid(error) && trajectory.IsValid(error) &&
-         positions.IsValid(error);
+  return rig.IsValid(error) && estimation.IsValid(error) &&
+         trajectory.IsValid(error) && positions.IsValid(error);
 }
 
 StatusOr<PriorImport> ComputePriorImport(const PriorImportPaths& given_paths,
@@ -375,22 +406,28 @@ StatusOr<PriorImport> ComputePriorImport(const PriorImportPaths& given_paths,
   if (!status.ok()) return status;
   if (!paths.trajectory_path.empty()) return ImportTrajectory(paths, options);
   if (!HasMotionLogs(paths) && paths.bag_path.empty()) {
-    if (!paths.gnss_path.empty()) return ImportPositionsOnly(paths, options);
+    const StatusOr<SensorCalibration> calibration =
+        ReadCalibrationIfGiven(paths.sensors_path);
+    if (!calibration.ok()) return calibration.status();
+    if (!paths.gnss_path.empty() || !calibration->other_cams_from_imu.empty()) {
+      return ImportWithoutMotion(paths, options);
+    }
     return Status::Error(
         "no sensor log; give --imu_path, --wheel_path or both, --gnss_path, "
-        "--bag_path or --trajectory_path");
+        "--bag_path or --trajectory_path, or the --sensors_path of a rig of "
+        "cameras");
   }
   if (paths.sensors_path.empty()) {
     return Status::Error(
         "sensor logs need the calibration of the sensors; give --sensors_path");
   }
-  const StatusOr<SensorCalibration> calibration =
+  StatusOr<SensorCalibration> calibration =
       ReadSensorCalibration(paths.sensors_path);
   if (!calibration.ok()) return calibration.status();
   const auto start = std::chrono::steady_clock::now();
   if (!paths.bag_path.empty()) status = UseBag(*calibration, &paths);
   if (!status.ok()) return status;
-  if (!HasMotionLogs(paths)) return ImportPositionsOnly(paths, options);
+  if (!HasMotionLogs(paths)) return ImportWithoutMotion(paths, options);
   PriorImport import;
   SensorLogs logs;
   status = ReadSensorLogs(paths, *calibration, &logs, &import);
@@ -398,8 +435,10 @@ StatusOr<PriorImport> ComputePriorImport(const PriorImportPaths& given_paths,
   StatusOr<SceneData> scene = ReadScene(paths.database_path);
   if (!scene.ok()) return scene.status();
 
+  status = FindRig(options.rig, *scene, &*calibration, &import);
+  if (!status.ok()) return status;
   const StatusOr<std::vector<ImageStamp>> stamps =
-      StampImages(paths.image_times_path, *scene, &import);
+      StampFrames(paths, *scene, &import);
   if (!stamps.ok()) return stamps.status();
   status = ImportPositions(paths, options.positions, *calibration, *scene,
                            *stamps, &import);

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "colmap_ext/database/prior_tables.h"
+#include "colmap_ext/priors/rig_frames.h"
 #include "core/status.h"
 #include "sensors/estimate_priors.h"
 #include "sensors/io/bag_topics.h"
@@ -37,6 +38,7 @@ struct PriorImportOptions {
   PriorEstimationOptions estimation;
   TrajectoryPriorOptions trajectory;
   PositionPriorOptions positions;
+  RigOptions rig;
   // Two-view rotations are taken from images at most this many apart in time:
   // rotations grow with the gap, but so does the chance of a wrong pair.
   int max_visual_gap = 3;

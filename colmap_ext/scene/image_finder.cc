@@ -12,15 +12,20 @@ std::string FileName(const std::string& path) {
 
 void ImageFinder::Add(image_t image_id, const std::string& name) {
   by_name_[name] = image_id;
-  const auto [entry, is_new] = by_file_name_.emplace(FileName(name), image_id);
-  if (!is_new) entry->second = kInvalidImageId;
+  by_file_name_[FileName(name)].push_back(image_id);
 }
 
 image_t ImageFinder::Find(const std::string& name) const {
+  const std::vector<image_t> found = FindAll(name);
+  return found.size() == 1 ? found.front() : kInvalidImageId;
+}
+
+std::vector<image_t> ImageFinder::FindAll(const std::string& name) const {
   const auto exact = by_name_.find(name);
-  if (exact != by_name_.end()) return exact->second;
+  if (exact != by_name_.end()) return {exact->second};
   const auto similar = by_file_name_.find(FileName(name));
-  return similar == by_file_name_.end() ? kInvalidImageId : similar->second;
+  return similar == by_file_name_.end() ? std::vector<image_t>()
+                                        : similar->second;
 }
 
 }  // namespace adasfm

@@ -3,6 +3,7 @@
 
 #include <map>
 #include <string>
+#include <vector>
 
 #include "core/types.h"
 
@@ -16,11 +17,13 @@ class ImageFinder {
 
   // kInvalidImageId when there is no such image.
   image_t Find(const std::string& name) const;
+  // The image of the name or, where there is none, all images of its file name:
+  // cameras of a rig often give theirs the same ones.
+  std::vector<image_t> FindAll(const std::string& name) const;
 
  private:
   std::map<std::string, image_t> by_name_;
-  // kInvalidImageId: several images have that file name.
-  std::map<std::string, image_t> by_file_name_;
+  std::map<std::string, std::vector<image_t>> by_file_name_;
 };
 
 }  // namespace adasfm

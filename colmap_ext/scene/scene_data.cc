@@ -6,6 +6,7 @@
 
 #include "colmap_ext/database/prior_corrections.h"
 #include "colmap_ext/database/prior_tables.h"
+#include "colmap_ext/database/rig_table.h"
 #include "colmap_ext/database/two_view_geometry_backup.h"
 #include "colmap_ext/host/camera.h"
 #include "colmap_ext/host/camera_models.h"
@@ -51,6 +52,8 @@ void ReadScenePriors(SqliteConnection* database,
   scene->priors = std::move(loaded.tables.priors);
   scene->positions = std::move(loaded.tables.positions);
   scene->position_origin = loaded.tables.position_origin;
+  scene->rigs = ReadCameraRigs(database);
+  scene->frame_priors = ComputeFramePriors(scene->rigs);
   if (!options.use_original_two_view_geometries) {
     ApplyPriorCorrections(database, &scene->priors);
     camera_mount = ReadCameraMount(database).value_or(camera_mount);
@@ -220,6 +223,38 @@ StatusOr<SceneData> ReadSceneData(const std::string& database_path,
                          "itself, extract and match again");
   }
   return scene;
+}
+
+StatusOr<ModelFrames> ReadModelFrames(const std::string& database_path,
+                                      const SceneData& scene,
+                                      std::vector<std::string>* warnings) {
+  DatabaseFrames frames;
+  try {
+    SqliteConnection database(database_path, SqliteConnection::Mode::kRead);
+    frames = ReadDatabaseFrames(&database);
+  } catch (const SqliteError& error) {
+    return Status::Error(database_path + ": " + error.what());
+  }
+  if (scene.rigs.empty()) return ModelFrames(frames);
+  if (frames.has_tables && frames.rigs.empty()) {
+    warnings->push_back(
+        "the database's own frames have one image each, and so has the model; "
+        "COLMAP's rig_configurator makes them frames of the rig");
+    return ModelFrames(frames);
+  }
+  frames.rigs = scene.rigs;
+  if (frames.has_tables) return ModelFrames(frames);
+  const std::map<uint32_t, image_t> leaders = FindFrameLeaders(scene.rigs);
+  for (const auto& [image_id, image] : scene.images) {
+    FrameOfImage frame{image_id, image.camera_id};
+    const auto rig_image = scene.rigs.images.find(image_id);
+    if (rig_image != scene.rigs.images.end()) {
+      frame = {leaders.at(rig_image->second.frame_id),
+               scene.rigs.cameras.at(image.camera_id).rig_id};
+    }
+    frames.frames[image_id] = frame;
+  }
+  return ModelFrames(frames);
 }
 
 }  // namespace adasfm

@@ -9,6 +9,8 @@
 #include <string>
 #include <vector>
 
+#include "colmap_ext/host/frames.h"
+#include "core/camera_rig.h"
 #include "core/position_prior.h"
 #include "core/relative_pose_prior.h"
 #include "core/rigid3d.h"
@@ -51,8 +53,12 @@ struct SceneData {
   std::map<image_t, SceneImage> images;
   // Sorted by (image_id1, image_id2).
   std::vector<ScenePair> pairs;
-  // Consecutive images, sorted by time. Empty without sensors.
+  // Consecutive images, sorted by time; of a rig's frames, their leaders. Empty
+  // without sensors.
   std::vector<RelativePosePrior> priors;
+  // Cameras that are mounted together, and ComputeFramePriors of them.
+  CameraRigs rigs;
+  std::vector<RelativePosePrior> frame_priors;
   // Of GNSS or the like, in the ENU frame of the origin or, without one, in a
   // metric frame of their own.
   std::vector<PositionPrior> positions;
@@ -66,7 +72,7 @@ struct SceneDataOptions {
   // Start from the two-view geometries, the priors and gravity as they were
   // before adasfm_global changed them, where it did.
   bool use_original_two_view_geometries = false;
-  // Times, priors and gravity of the images.
+  // Times, priors, gravity and rigs of the images.
   bool read_priors = true;
   // Pairs with fewer inlier matches are left out.
   int min_num_matches = 15;
@@ -77,5 +83,13 @@ struct SceneDataOptions {
 // database is not changed.
 StatusOr<SceneData> ReadSceneData(const std::string& database_path,
                                   const SceneDataOptions& options);
+
+// What models of the scene say of frames and rigs (host/frames.h): the rigs of
+// the scene, with the host's frames or, where the host has none, with frames of
+// our own. `warnings` gets one where the host's frames are not those of the
+// scene's rigs, which models then do not say.
+StatusOr<ModelFrames> ReadModelFrames(const std::string& database_path,
+                                      const SceneData& scene,
+                                      std::vector<std::string>* warnings);
 
 }  // namespace adasfm

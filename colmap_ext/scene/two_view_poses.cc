@@ -1,14 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "colmap_ext/scene/two_view_poses.h"
 
-#include <base/essential_matrix.h>
-#include <estimators/pose.h>
-#include <estimators/two_view_geometry.h>
-#include <util/random.h>
-
 #include <algorithm>
 #include <cmath>
 
+#include "colmap_ext/host/two_view.h"
 #include "colmap_ext/scene/capture_order.h"
 #include "core/parallel.h"
 #include "global/view_graph/epipolar.h"
@@ -52,36 +48,18 @@ std::optional<Rigid3d> EstimateFromMatches(const TwoViewPoseOptions& options,
     points2.push_back(point2);
   }
   if (points1.size() < 8) return std::nullopt;
-  colmap::RANSACOptions ransac;
-  ransac.max_error =
+  const double max_error =
       0.5 * options.max_error_px *
       (1.0 / camera1.MeanFocalLength() + 1.0 / camera2.MeanFocalLength()) / 2.0;
-  ransac.min_inlier_ratio = 0.3;
-  ransac.max_num_trials = 1000;
-  ransac.confidence = 0.999;
-  colmap::SetPRNGSeed(pair.image_id1 * 40503u + pair.image_id2);
-  Eigen::Vector4d qvec;
-  Eigen::Vector3d tvec;
-  if (colmap::EstimateRelativePose(ransac, points1, points2, &qvec, &tvec) ==
-          0 ||
-      !qvec.allFinite() || !tvec.allFinite() || tvec.norm() < 1e-9) {
-    return std::nullopt;
-  }
-  return Rigid3d(Eigen::Quaterniond(qvec(0), qvec(1), qvec(2), qvec(3)),
-                 tvec.normalized());
-}
-
-bool IsUsable(const ScenePair& pair) {
-  return pair.config != colmap::TwoViewGeometry::UNDEFINED &&
-         pair.config != colmap::TwoViewGeometry::DEGENERATE &&
-         pair.config != colmap::TwoViewGeometry::WATERMARK;
+  return EstimateRelativePose(points1, points2, max_error,
+                              pair.image_id1 * 40503u + pair.image_id2);
 }
 
 PoseOrigin FindPose(const TwoViewPoseOptions& options, const SceneData& scene,
                     const std::vector<Bearing>& bearings1,
                     const std::vector<Bearing>& bearings2,
                     const ScenePair& pair, Rigid3d* cam2_from_cam1) {
-  if (!IsUsable(pair)) return PoseOrigin::kNone;
+  if (!IsVerifiedConfiguration(pair.config)) return PoseOrigin::kNone;
   const EdgeBearings selected = SelectEdgeBearings(
       bearings1, bearings2, pair.inlier_matches, kMaxNumTestedMatches);
   const auto is_supported = [&] {
@@ -126,17 +104,14 @@ Rigid3d DecomposeEssential(const Eigen::Matrix3d& essential_matrix,
                            const std::vector<Bearing>& bearings1,
                            const std::vector<Bearing>& bearings2,
                            const std::vector<FeatureMatch>& matches) {
-  Eigen::Matrix3d rotations[2];
-  Eigen::Vector3d translation;
-  colmap::DecomposeEssentialMatrix(essential_matrix, &rotations[0],
-                                   &rotations[1], &translation);
+  const EssentialPoses poses = DecomposeEssentialMatrix(essential_matrix);
   const EdgeBearings selected =
       SelectEdgeBearings(bearings1, bearings2, matches, kMaxNumTestedMatches);
   int best_votes = -1;
   Rigid3d best;
-  for (const Eigen::Matrix3d& rotation : rotations) {
+  for (const Eigen::Matrix3d& rotation : poses.rotations) {
     for (const double sign : {1.0, -1.0}) {
-      const Eigen::Vector3d signed_translation = sign * translation;
+      const Eigen::Vector3d signed_translation = sign * poses.translation;
       int votes = 0;
       for (size_t k = 0; k < selected.bearings1.size(); ++k) {
         double depth1, depth2, sin_parallax;
@@ -159,9 +134,16 @@ InitialViewGraph BuildInitialViewGraph(
     const std::map<image_t, std::vector<Bearing>>& bearings) {
   InitialViewGraph initial;
   std::vector<CapturedImage> captured;
+  const std::map<uint32_t, image_t> leaders = FindFrameLeaders(scene.rigs);
   for (const auto& [image_id, image] : scene.images) {
     initial.graph.images.push_back(image_id);
     captured.push_back({image_id, image.name, image.timestamp_ns});
+    // Frames of a rig stay together where names are the order.
+    const auto rig_image = scene.rigs.images.find(image_id);
+    if (rig_image == scene.rigs.images.end()) continue;
+    const auto leader = leaders.find(rig_image->second.frame_id);
+    if (leader == leaders.end()) continue;
+    captured.back().name = scene.images.at(leader->second).name;
   }
   initial.graph.capture_ranks.resize(captured.size());
   int64_t rank = 0;

@@ -90,8 +90,13 @@ bool OdometryChainOptions::IsValid(std::string* error) const {
 }
 
 OdometryChain::OdometryChain(const std::vector<RelativePosePrior>& priors,
-                             const OdometryChainOptions& options)
+                             const OdometryChainOptions& options,
+                             const std::vector<RelativePosePrior>& frame_priors)
     : options_(options) {
+  for (const RelativePosePrior& prior : frame_priors) {
+    followers_[prior.image_id2] = {prior.image_id1,
+                                   {prior.cam2_from_cam1, prior.covariance}};
+  }
   std::vector<RelativePosePrior> sorted = priors;
   std::sort(sorted.begin(), sorted.end(), [](const auto& a, const auto& b) {
     return std::tie(a.image_id1, a.image_id2) <
@@ -154,7 +159,9 @@ void OdometryChain::AppendPiece(image_t first,
 }
 
 int OdometryChain::Index(image_t image_id) const {
-  const auto it = index_.find(image_id);
+  const auto follower = followers_.find(image_id);
+  const auto it = index_.find(
+      follower == followers_.end() ? image_id : follower->second.leader);
   return it == index_.end() ? -1 : it->second;
 }
 
@@ -176,7 +183,26 @@ int OdometryChain::NumSteps(image_t image_id1, image_t image_id2) const {
 }
 
 Rigid3d OdometryChain::CamFromStart(image_t image_id) const {
-  return nodes_.at(index_.at(image_id)).cam_from_start;
+  return FromLeader(image_id).cam2_from_cam1 *
+         nodes_.at(Index(image_id)).cam_from_start;
+}
+
+UncertainMotion OdometryChain::FromLeader(image_t image_id) const {
+  const auto follower = followers_.find(image_id);
+  return follower == followers_.end() ? UncertainMotion()
+                                      : follower->second.follower_from_leader;
+}
+
+ChainMotion OdometryChain::Motion(image_t image_id1, image_t image_id2) const {
+  ChainMotion motion = MotionOfLeaders(image_id1, image_id2);
+  if (!IsFollower(image_id1) && !IsFollower(image_id2)) return motion;
+  const UncertainMotion motion_of_followers =
+      FromLeader(image_id2) *
+      UncertainMotion{motion.cam2_from_cam1, motion.covariance} *
+      FromLeader(image_id1).Inverse();
+  motion.cam2_from_cam1 = motion_of_followers.cam2_from_cam1;
+  motion.covariance = motion_of_followers.covariance;
+  return motion;
 }
 
 // A change e of the scale at a place moves the later end by e times the way
@@ -202,7 +228,8 @@ OdometryChain::Matrix6d OdometryChain::SumOfWalks(const Node& earlier,
          earlier.walk.square_sum;
 }
 
-ChainMotion OdometryChain::Motion(image_t image_id1, image_t image_id2) const {
+ChainMotion OdometryChain::MotionOfLeaders(image_t image_id1,
+                                           image_t image_id2) const {
   const int num_steps = NumSteps(image_id1, image_id2);
   const Node& node1 = nodes_[Index(image_id1)];
   const Node& node2 = nodes_[Index(image_id2)];

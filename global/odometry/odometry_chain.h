@@ -8,6 +8,7 @@
 #include "core/relative_pose_prior.h"
 #include "core/rigid3d.h"
 #include "core/types.h"
+#include "global/odometry/uncertain_motion.h"
 
 namespace adasfm {
 
@@ -55,9 +56,12 @@ class OdometryChain {
   OdometryChain() = default;
   // Priors of consecutive images in any order; each image has at most one
   // prior to a later and one from an earlier image (else the first by ids
-  // counts). Missing priors split the chain.
+  // counts). Missing priors split the chain. frame_priors: from an image to
+  // those of other cameras of the same frame (core/camera_rig.h), which follow
+  // it: they have its place in the chain and their own pose.
   OdometryChain(const std::vector<RelativePosePrior>& priors,
-                const OdometryChainOptions& options);
+                const OdometryChainOptions& options,
+                const std::vector<RelativePosePrior>& frame_priors = {});
 
   bool empty() const { return nodes_.empty(); }
   // Whether the chain leads from one image to the other.
@@ -70,6 +74,9 @@ class OdometryChain {
   // The position of an image in the whole sequence, pieces one after the
   // other; -1 when it is in no piece.
   int Index(image_t image_id) const;
+  bool IsFollower(image_t image_id) const {
+    return followers_.count(image_id) > 0;
+  }
   int Piece(image_t image_id) const;  // -1 when absent
   // Poses in the frame of the piece's first image.
   Rigid3d CamFromStart(image_t image_id) const;
@@ -109,7 +116,17 @@ class OdometryChain {
   void AppendPiece(image_t first, const std::map<image_t, int>& next,
                    const std::vector<RelativePosePrior>& priors);
 
+  struct Follower {
+    image_t leader = kInvalidImageId;
+    UncertainMotion follower_from_leader;
+  };
+  // The motion between the images that these follow.
+  ChainMotion MotionOfLeaders(image_t image_id1, image_t image_id2) const;
+  // The identity, with no error, for an image that follows none.
+  UncertainMotion FromLeader(image_t image_id) const;
+
   OdometryChainOptions options_;
+  std::map<image_t, Follower> followers_;
   std::vector<Node> nodes_;
   std::map<image_t, int> index_;
   int num_pieces_ = 0;

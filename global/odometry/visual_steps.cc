@@ -40,13 +40,22 @@ std::vector<image_t> InOrderOfCapture(const ViewGraph& graph) {
 // Neighbours in the order of capture that share a pair, where one piece of the
 // chain ends and another begins. A step without anything, to be filled.
 std::vector<RelativePosePrior> ContinueChain(
-    const ViewGraph& graph, std::vector<RelativePosePrior> priors) {
-  std::set<image_t> has_next, has_previous;
+    const ViewGraph& graph, std::vector<RelativePosePrior> priors,
+    const std::vector<RelativePosePrior>& frame_priors) {
+  std::set<image_t> has_next, has_previous, followers;
+  for (const RelativePosePrior& prior : frame_priors) {
+    followers.insert(prior.image_id2);
+  }
   for (const RelativePosePrior& prior : priors) {
     has_next.insert(prior.image_id1);
     has_previous.insert(prior.image_id2);
   }
-  const std::vector<image_t> images = InOrderOfCapture(graph);
+  std::vector<image_t> images = InOrderOfCapture(graph);
+  images.erase(std::remove_if(images.begin(), images.end(),
+                              [&followers](image_t image_id) {
+                                return followers.count(image_id) > 0;
+                              }),
+               images.end());
   for (size_t k = 0; k + 1 < images.size(); ++k) {
     RelativePosePrior step;
     step.image_id1 = images[k];
@@ -214,10 +223,11 @@ VisualSteps AddVisualSteps(const VisualStepOptions& options,
                            const ViewGraph& graph,
                            const GlobalCorrespondences& correspondences,
                            const std::map<ImagePair, double>& known_lengths_m,
-                           const std::vector<RelativePosePrior>& priors) {
+                           const std::vector<RelativePosePrior>& priors,
+                           const std::vector<RelativePosePrior>& frame_priors) {
   VisualSteps steps;
-  steps.priors = ContinueChain(graph, priors);
-  const OdometryChain chain(steps.priors, OdometryChainOptions());
+  steps.priors = ContinueChain(graph, priors, frame_priors);
+  const OdometryChain chain(steps.priors, OdometryChainOptions(), frame_priors);
   const EdgeLengths lengths = EstimateEdgeLengths(
       length_options, SequenceGraph(graph, chain, options.max_num_steps),
       known_lengths_m, correspondences);

@@ -60,12 +60,13 @@ struct VisualSteps {
 // (a gap of the logs) or there is none, neighbours in the order of capture
 // continue it that share a pair. The result serves to exclude pairs and never
 // as an edge. known_lengths_m: metres of the priors' pairs, as for
-// EstimateEdgeLengths.
-VisualSteps AddVisualSteps(const VisualStepOptions& options,
-                           const EdgeLengthOptions& length_options,
-                           const ViewGraph& graph,
-                           const GlobalCorrespondences& correspondences,
-                           const std::map<ImagePair, double>& known_lengths_m,
-                           const std::vector<RelativePosePrior>& priors);
+// EstimateEdgeLengths. frame_priors: as for OdometryChain; followers make no
+// steps.
+VisualSteps AddVisualSteps(
+    const VisualStepOptions& options, const EdgeLengthOptions& length_options,
+    const ViewGraph& graph, const GlobalCorrespondences& correspondences,
+    const std::map<ImagePair, double>& known_lengths_m,
+    const std::vector<RelativePosePrior>& priors,
+    const std::vector<RelativePosePrior>& frame_priors = {});
 
 }  // namespace adasfm

@@ -47,8 +47,9 @@ def parse_arguments():
   parser.add_argument('--timeout', type=float, default=3600,
                       help='a command that takes longer is stopped [s]')
   parser.add_argument('--peer', action='append', default=[],
-                      metavar='NAME=PATH:COMMAND',
-                      help='another colmap executable and its mapping command')
+                      metavar='NAME=PATH:COMMAND[:cleaned]',
+                      help='another colmap executable and its mapping command; '
+                      'cleaned: on the database that adasfm_global has cleaned')
   parser.add_argument('--colmap', default=os.path.join(ROOT, 'build', 'bin',
                                                        'colmap'),
                       help='our launcher')
@@ -62,10 +63,11 @@ def parse_arguments():
   args = parser.parse_args()
   args.peers = {}
   for peer in args.peer:
-    match = re.fullmatch(r'([^=]+)=(.+):([^:]+)', peer)
+    match = re.fullmatch(r'([^=]+)=([^:]+):([^:]+)(:cleaned)?', peer)
     if not match:
-      parser.error('--peer takes NAME=PATH:COMMAND, not ' + peer)
-    args.peers[match.group(1)] = (match.group(2), match.group(3))
+      parser.error('--peer takes NAME=PATH:COMMAND[:cleaned], not ' + peer)
+    args.peers[match.group(1)] = (match.group(2), match.group(3),
+                                  bool(match.group(4)))
   args.sets = expand_sets(args, parser)
   for method in args.methods.split(',') if args.methods else []:
     if method not in METHODS and method not in ABLATIONS:

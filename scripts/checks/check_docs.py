@@ -12,7 +12,8 @@ text, in a stand-in for a checkout, with a small rendered drive under the names
 that the documentation uses; SMALLER lists the arguments that keep this short.
 ```console REASON is shown only, and listed. ```python is run as well where the
 modules that it wants are installed, ```cmake in a project of its own against what
-`cmake --install` has installed before."""
+`cmake --install` has installed before. With a host COLMAP (ADASFM_HOST_COLMAP) of 3.13
+or later the options of NEWER_NAMES are spelt as that one does."""
 import argparse
 import importlib.util
 import os
@@ -62,6 +63,9 @@ SMALLER = {
         '--benchmark_min_time=0 --benchmark_filter=/100/',
     'sudo apt install': '--simulate',
 }
+# Options that COLMAP 3.13 has moved, which the text names beside the older ones.
+NEWER_NAMES = {'SiftExtraction.use_gpu': 'FeatureExtraction.use_gpu',
+               'SiftMatching.use_gpu': 'FeatureMatching.use_gpu'}
 # Run where nothing has been built yet.
 FRESH = re.compile(r'scripts/setup\.sh|cmake -[SB]')
 # Blocks that are left out, and said to be, where what they need is missing.
@@ -103,6 +107,18 @@ def read_blocks(path):
     return blocks
 
 
+def spell_for(colmap):
+    """A function that gives lines the host's names of options."""
+    is_newer = ('FeatureExtraction.use_gpu' in
+                set(read_host_options(colmap, 'feature_extractor')))
+
+    def spell(line):
+        for older, newer in NEWER_NAMES.items() if is_newer else ():
+            line = line.replace(older, newer)
+        return line
+    return spell
+
+
 def read_lines(lines):
     """Logical lines: continuations joined, comments and empty ones left out."""
     text = '\n'.join(lines).replace('\\\n', ' ')
@@ -118,7 +134,9 @@ class Checker:
             sys.exit('%s lists no commands' % colmap)
         self.host_options = {}
         self.shown = []  # where, and why not run
-        self.known = set(OTHER_OPTIONS)
+        self.known = set(OTHER_OPTIONS).union(
+            NEWER_NAMES, NEWER_NAMES.values())
+        self.spell = spell_for(colmap)
         for script in sorted((ROOT / 'scripts').rglob('*.[ps][yh]')):
             self.known.update(re.findall(r'--([a-z][\w-]+)',
                                          script.read_text()))
@@ -152,7 +170,7 @@ class Checker:
         number, language, lines = block
         where = '%s:%d' % (path.name, number)
         language, _, reason = language.partition(' ')
-        lines = read_lines(lines)
+        lines = list(map(self.spell, read_lines(lines)))
         if language == 'console':
             self.shown.append('%s: %s' % (where, reason))
             if not reason:
@@ -244,6 +262,7 @@ class Runner:
         build = colmap.parent.parent
         make_checkout(ROOT, folder, build)
         self.words = {'FX,FY,CX,CY': make_drive(colmap, folder)}
+        self.spell = spell_for(colmap)
         cache = (build / 'CMakeCache.txt').read_text()
         self.colmap_dir = re.search(r'^COLMAP_DIR:\w+=(.*)$', cache,
                                     re.MULTILINE)[1]
@@ -292,7 +311,7 @@ class Runner:
             return self.call([sys.executable, '-c', text], self.folder), ''
         if language == 'cmake':
             return self.build_project(lines), ''
-        text = '\n'.join(map(make_smaller, read_lines(lines)))
+        text = self.spell('\n'.join(map(make_smaller, read_lines(lines))))
         for word, value in self.words.items():
             text = text.replace(word, value)
         if 'PREFIX' in text:

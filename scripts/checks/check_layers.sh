@@ -64,7 +64,6 @@ colmap_ext/bundle_adjustment/find_focal_length_error.h
 colmap_ext/coarse/coarse_structure.h
 colmap_ext/datasets/write_synthetic_world.cc
 colmap_ext/datasets/write_synthetic_world.h
-colmap_ext/evaluation/evaluation.cc
 colmap_ext/evaluation/evaluation.h
 colmap_ext/mapper/align_parts.h
 colmap_ext/mapper/local_mapper.h
@@ -77,7 +76,6 @@ colmap_ext/report/report_scene.h
 colmap_ext/scene/align_to_gravity.h
 colmap_ext/scene/scene_bearings.h
 colmap_ext/scene/scene_data.h
-colmap_ext/scene/two_view_poses.cc
 '
 
 # COLMAP 3.8's unprefixed include folders, and the prefix of newer versions.

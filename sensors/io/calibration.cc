@@ -131,6 +131,30 @@ class CalibrationReader {
   std::string path_;
 };
 
+// Cameras that are triggered together have one clock.
+constexpr double kMaxTimeshiftDifference = 1e-3;
+
+void ReadOtherCameras(const CalibrationReader& reader, const YAML::Node& root,
+                      SensorCalibration* calibration) {
+  for (int k = 1;; ++k) {
+    const std::string name = "cam" + std::to_string(k);
+    const YAML::Node camera = root[name];
+    if (!camera || !camera.IsMap()) return;
+    // Without a mount of its own it is somebody else's camera.
+    if (!camera["T_cam_imu"]) return;
+    calibration->other_cams_from_imu.push_back(
+        reader.Transform(camera, "T_cam_imu"));
+    const double shift = reader.NumberOr(camera, "timeshift_cam_imu",
+                                         calibration->timeshift_cam_imu_s);
+    if (std::abs(shift - calibration->timeshift_cam_imu_s) >
+        kMaxTimeshiftDifference) {
+      reader.Fail(name + "/timeshift_cam_imu",
+                  "differs from cam0's by more than a millisecond; cameras of "
+                  "a rig take their images at the same times");
+    }
+  }
+}
+
 void ReadImuSection(const CalibrationReader& reader, const YAML::Node& imu,
                     SensorCalibration* calibration) {
   calibration->has_imu = true;
@@ -239,6 +263,7 @@ StatusOr<SensorCalibration> ReadSensorCalibration(const std::string& path) {
     calibration.cam_from_imu = reader.Transform(root["cam0"], "T_cam_imu");
     calibration.timeshift_cam_imu_s =
         reader.NumberOr(root["cam0"], "timeshift_cam_imu", 0.0);
+    ReadOtherCameras(reader, root, &calibration);
     if (root["imu0"] && root["imu0"].IsMap()) {
       ReadImuSection(reader, root["imu0"], &calibration);
     }

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <string>
+#include <vector>
 
 #include "core/rigid3d.h"
 #include "core/sensor_log.h"
@@ -14,6 +15,8 @@ namespace adasfm {
 // Body frame = IMU frame; wheel frame: x forward, y left, z up.
 struct SensorCalibration {
   Rigid3d cam_from_imu;
+  // cam1, cam2, ... of a rig; their clock is cam0's.
+  std::vector<Rigid3d> other_cams_from_imu;
   // t_imu = t_cam + shift; the wheel log runs on the IMU's clock.
   double timeshift_cam_imu_s = 0.0;
 

@@ -67,10 +67,11 @@ StatusOr<std::vector<ImageTime>> ReadImageTimes(const std::string& path) {
       return file.Error(line.number, "image '" + time.name +
                                          "' has a time already; remove one");
     }
-    if (!times.empty() && time.timestamp_ns <= times.back().timestamp_ns) {
+    // Cameras of a rig take their images at one time.
+    if (!times.empty() && time.timestamp_ns < times.back().timestamp_ns) {
       return file.Error(line.number,
-                        "the time does not increase over the line before it; "
-                        "sort the file and remove duplicates");
+                        "times must increase, and this one is before the line "
+                        "above it; sort the file");
     }
     times.push_back(std::move(time));
   }

@@ -9,8 +9,9 @@
 
 namespace adasfm {
 
-// Reads image times in order of time: EuRoC data.csv ("ns,filename"), 4Seasons
-// times.txt ("id seconds exposure"; the name is "<id>.png") or TUM rgb.txt
+// Reads image times in order of time, those of a rig's frame equal: EuRoC
+// data.csv ("ns,filename"), 4Seasons times.txt ("id seconds exposure"; the name
+// is "<id>.png") or TUM rgb.txt
 // ("seconds filename"; the name is without its folder).
 StatusOr<std::vector<ImageTime>> ReadImageTimes(const std::string& path);
 

@@ -4,6 +4,7 @@
 import json
 import math
 import os
+import re
 import subprocess
 import sys
 import tempfile
@@ -117,6 +118,38 @@ class WholeBenchmarkTest(unittest.TestCase):
         self.assertLess(tables.sim3_error(records[method]), 0.1, method)
       with open(os.path.join(folder, 'results.md')) as file:
         self.assertIn('**AdaSfM**', file.read())
+
+  def test_a_peer_runs_on_the_raw_and_on_the_cleaned_database(self):
+    launcher = os.environ.get('ADASFM_LAUNCHER')
+    if not launcher:
+      self.skipTest('ADASFM_LAUNCHER is not set')
+    with tempfile.TemporaryDirectory() as folder:
+      # A peer that only says how many verified pairs it was given.
+      peer = os.path.join(folder, 'peer')
+      with open(peer, 'w') as file:
+        file.write('#!%s\nimport sqlite3, sys\n'
+                   'database = sys.argv[sys.argv.index("--database_path") + 1]\n'
+                   'print("pairs", sqlite3.connect(database).execute('
+                   '"SELECT COUNT(*) FROM two_view_geometries")'
+                   '.fetchone()[0])\n' % sys.executable)
+      os.chmod(peer, 0o755)
+      command = [sys.executable, os.path.join(SCRIPTS, 'benchmark.py'),
+                 'alias-100', '--methods', 'adasfm', '--colmap', launcher,
+                 '--peer', 'raw=%s:count' % peer,
+                 '--peer', 'clean=%s:count:cleaned' % peer,
+                 '--output_path', folder]
+      result = subprocess.run(command, capture_output=True, text=True)
+      self.assertEqual(result.returncode, 0, result.stderr)
+      pairs = {}
+      for method in ('raw', 'clean'):
+        with open(os.path.join(folder, 'alias-100', method, 'run.log')) as log:
+          pairs[method] = int(re.search(r'pairs (\d+)', log.read()).group(1))
+      self.assertLess(pairs['clean'], pairs['raw'])
+      with open(os.path.join(folder, 'results.jsonl')) as file:
+        records = {r['method']: r for r in map(json.loads, file)}
+      self.assertEqual(set(records['clean']['step_seconds']),
+                       {'import', 'global', 'count'})
+      self.assertGreater(records['clean']['peak_mib'], 0)
 
   def test_an_unknown_set_or_method_is_refused(self):
     for arguments in (['nowhere-1'], ['clean-50', '--methods', 'magic'],

@@ -172,6 +172,60 @@ if [[ $newest == 4.* ]]; then
   takes_model "$newest" "$folder/sparse/0"
   host 3.8 model_analyzer --path "$folder/sparse/0"
 fi
+# stereo FOLDER: a synthetic drive with two cameras.
+stereo() {
+  mkdir -p "$1"
+  call adasfm_synthesizer "$ours" adasfm_synthesizer --output_path "$1" \
+    --num_images 12 --num_neighbors 4 --stereo_baseline 0.5
+}
+
+# is_rig HOST MODEL: it has one rig of two cameras, and 12 frames of two images
+# each, for this COLMAP.
+is_rig() {
+  rm -rf "$work/out"
+  mkdir -p "$work/out"
+  host "$1" model_converter --input_path "$2" --output_path "$work/out" \
+    --output_type TXT
+  awk '!/^#/ { rigs++; cameras += $2 } END { exit !(rigs == 1 && cameras == 2) }' \
+    "$work/out/rigs.txt" || fail "COLMAP $1 sees no rig of two cameras in $2"
+  awk '!/^#/ { frames++; images += $10 }
+    END { exit !(frames == 12 && images == 24) }' "$work/out/frames.txt" ||
+    fail "COLMAP $1 sees other frames in $2"
+}
+
+if [[ $newest == 4.* ]]; then
+  echo "== A stereo rig of the calibration"
+  folder=$work/calibrated
+  stereo "$folder"
+  call adasfm_prior_importer "$ours" adasfm_prior_importer \
+    --database_path "$folder/database.db" --image_times_path "$folder/times.csv" \
+    --sensors_path "$folder/sensors.yaml"
+  call adasfm_global "$ours" adasfm_global \
+    --database_path "$folder/database.db" --output_path "$folder/global"
+  call adasfm_mapper "$ours" adasfm_mapper \
+    --database_path "$folder/database.db" --input_path "$folder/global/0" \
+    --output_path "$folder/sparse"
+  is_rig "$newest" "$folder/sparse/0"
+  takes_model "$newest" "$folder/sparse/0"
+  takes_model 3.8 "$folder/sparse/0"
+
+  echo "== A stereo rig of COLMAP $newest, of which the relative pose is unknown"
+  folder=$work/configured
+  stereo "$folder"
+  echo '[{"cameras": [{"image_prefix": "cam0/", "ref_sensor": true},
+                      {"image_prefix": "cam1/"}]}]' > "$folder/rig.json"
+  host "$newest" rig_configurator --database_path "$folder/database.db" \
+    --rig_config_path "$folder/rig.json"
+  call adasfm_global "$ours" adasfm_global \
+    --database_path "$folder/database.db" --output_path "$folder/global"
+  call adasfm_mapper "$ours" adasfm_mapper \
+    --database_path "$folder/database.db" --input_path "$folder/global/0" \
+    --output_path "$folder/sparse"
+  is_rig "$newest" "$folder/sparse/0"
+  takes_model "$newest" "$folder/sparse/0"
+  continues_model "$newest" "$folder/database.db" "$folder/sparse/0"
+fi
+
 for name in "${hosts[@]}"; do
   echo "== scripts/adasfm.sh with COLMAP $name"
   COLMAP=$ours ADASFM_HOST_COLMAP=${programs[$name]} call adasfm.sh \
@@ -190,6 +244,15 @@ for name in "${hosts[@]:1}"; do
   call model_analyzer "$ours" model_analyzer --path "$work/auto-$name/sparse/0"
   grep -q 'Registered images: 8' "$work/log" || fail "images are missing"
 done
+
+# Those of COLMAP 3.8 are run with the documentation test.
+if [[ $newest == 4.* ]]; then
+  echo "== The guides' commands with COLMAP $newest"
+  guides=$here/../../docs/guide
+  ADASFM_HOST_COLMAP=${programs[$newest]} call check_docs.py \
+    python3 "$here/../../scripts/checks/check_docs.py" "$ours" --run \
+    "$guides"/tutorial.md "$guides"/pair_selection.md "$guides"/cleaner.md
+fi
 
 if [ -n "${programs[3.10]:-}" ] && [[ $newest == 4.* ]]; then
   echo '== Warnings'

@@ -33,6 +33,36 @@ Rigid3d TrueCam2FromCam1(const SyntheticWorld& world,
                              ImageOf(world, pair.image_id2).cam_from_world);
 }
 
+TEST(BuildSyntheticWorld, ASecondCameraSeesTheSameFrames) {
+  SyntheticWorldOptions options;
+  options.num_images = 20;
+  const SyntheticWorld one = BuildSyntheticWorld(options);
+  options.stereo_baseline_m = 0.4;
+  const SyntheticWorld world = BuildSyntheticWorld(options);
+  ASSERT_EQ(world.images.size(), 40);
+  std::set<std::pair<int, int>> matched;  // cameras
+  for (const SyntheticPair& pair : world.pairs) {
+    const SyntheticImage& image1 = ImageOf(world, pair.image_id1);
+    const SyntheticImage& image2 = ImageOf(world, pair.image_id2);
+    matched.insert({image1.camera_index, image2.camera_index});
+    EXPECT_GT(CountTrueMatches(world, pair), 0.8 * pair.inlier_matches.size());
+  }
+  EXPECT_EQ(matched, (std::set<std::pair<int, int>>{{0, 0}, {0, 1}, {1, 1}}));
+  for (int i = 0; i < 20; ++i) {
+    const SyntheticImage& left = world.images[i];
+    const SyntheticImage& right = world.images[20 + i];
+    // The first camera's drive is the one without a second camera.
+    EXPECT_EQ(left.name, "cam0/" + one.images[i].name);
+    EXPECT_EQ(left.keypoints, one.images[i].keypoints);
+    EXPECT_EQ(right.name, "cam1/" + one.images[i].name);
+    EXPECT_EQ(right.timestamp_ns, left.timestamp_ns);
+    EXPECT_TRUE(PosesNear(
+        ComputeCam2FromCam1(left.cam_from_world, right.cam_from_world),
+        world.cam1_from_cam0, 1e-9, 1e-9));
+  }
+  EXPECT_NEAR(world.cam1_from_cam0.TargetOriginInSource().x(), 0.4, 1e-12);
+}
+
 TEST(BuildSyntheticWorld, KeypointsAreProjectionsOfTheirLandmarks) {
   for (const auto model :
        {SyntheticCameraModel::kPinhole, SyntheticCameraModel::kFisheye}) {

@@ -5,7 +5,7 @@ import json
 import os
 import shutil
 
-from benchmarking.host_options import solver_group
+from benchmarking.host_options import has_option, solver_group
 from benchmarking.limit import write_true_poses
 from benchmarking.process import Failed, run
 from benchmarking.trajectories import write_prior_trajectory
@@ -43,14 +43,17 @@ def run_mapper(command, executable, folder, source, args):
   os.makedirs(output)
   arguments = [executable, command, '--database_path',
                os.path.join(folder, 'database.db'), '--output_path', output]
-  if command in ('mapper', 'hierarchical_mapper'):
+  if command in ('mapper', 'hierarchical_mapper', 'global_mapper'):
     arguments += ['--image_path', images_of(folder, source)]
-    arguments += fixed_intrinsics('Mapper.ba_')
+    group = 'GlobalMapper' if command == 'global_mapper' else 'Mapper'
+    if has_option(executable, command, group + '.ba_refine_focal_length'):
+      arguments += fixed_intrinsics(group + '.ba_')
   usage = run(arguments, os.path.join(folder, 'run.log'), args.timeout)
   return output, {command: usage}
 
 
-def run_adasfm(folder, source, args, sensors, options):
+def clean_database(folder, source, args, sensors, options):
+  """Imports the logs and makes the coarse model, which cleans the matches."""
   database = os.path.join(folder, 'database.db')
   log_path = os.path.join(folder, 'run.log')
   steps = {}
@@ -66,6 +69,13 @@ def run_adasfm(folder, source, args, sensors, options):
                          database, '--output_path',
                          os.path.join(folder, 'global')] +
                         options.get('global', []), log_path, args.timeout)
+  return steps
+
+
+def run_adasfm(folder, source, args, sensors, options):
+  steps = clean_database(folder, source, args, sensors, options)
+  database = os.path.join(folder, 'database.db')
+  log_path = os.path.join(folder, 'run.log')
   output = os.path.join(folder, 'model')
   steps['mapper'] = run([args.colmap, 'adasfm_mapper', '--database_path',
                          database, '--input_path',
@@ -129,8 +139,13 @@ def _record(name, method, steps, evaluation):
 
 def _run_steps(method, folder, source, args):
   if method in args.peers:
-    executable, command = args.peers[method]
-    return run_mapper(command, executable, folder, source, args)
+    executable, command, cleaned = args.peers[method]
+    steps = {}
+    if cleaned:
+      sensors = os.path.isfile(os.path.join(source, 'sensors.yaml'))
+      steps = clean_database(folder, source, args, sensors, {})
+    output, own_steps = run_mapper(command, executable, folder, source, args)
+    return output, dict(steps, **own_steps)
   if method == 'limit':
     return run_limit(folder, source, args)
   if method.startswith('adasfm'):

@@ -281,6 +281,34 @@ TEST_F(MergeDatabasesTest, SessionsAreKeptApartByTheirPrefixes) {
       });
 }
 
+TEST_F(MergeDatabasesTest, CamerasOfRigsGetTheirNewIds) {
+  // A rig of the cameras 1 and 2; in the second session they have other ids.
+  const std::string rig =
+      "CREATE TABLE adasfm_rig_cameras (camera_id INTEGER PRIMARY KEY NOT "
+      "NULL, reference_camera_id INTEGER NOT NULL);"
+      "INSERT INTO adasfm_rig_cameras VALUES (1, 1), (2, 1);";
+  const std::string second_camera =
+      "INSERT INTO cameras SELECT 2, model, width + 1, height, params, "
+      "prior_focal_length FROM cameras;"
+      "UPDATE images SET camera_id = 2 WHERE image_id > 6;";
+  const std::string first = Copy("first.db", second_camera + rig);
+  const std::string other = Copy(
+      "other.db", second_camera + rig + "UPDATE cameras SET width = width + 9");
+  const std::string merged = folder_.File("merged.db");
+  ASSERT_NO_FATAL_FAILURE(Merge({{first, "a/"}, {other, "b/"}}, merged));
+  SqliteConnection database(merged, SqliteConnection::Mode::kRead);
+  SqliteStatement rows(&database,
+                       "SELECT camera_id, reference_camera_id FROM "
+                       "adasfm_rig_cameras ORDER BY camera_id");
+  std::vector<std::pair<int64_t, int64_t>> cameras;
+  while (rows.Step()) cameras.emplace_back(rows.Int(0), rows.Int(1));
+  ASSERT_EQ(cameras.size(), 4);
+  EXPECT_EQ(cameras[0].second, cameras[0].first);
+  EXPECT_EQ(cameras[1].second, cameras[0].first);
+  EXPECT_EQ(cameras[2].second, cameras[2].first);
+  EXPECT_EQ(cameras[3].second, cameras[2].first);
+}
+
 TEST_F(MergeDatabasesTest, CamerasAreSharedOrNot) {
   std::vector<DatabaseToMerge> shards = CutIntoShards();
   shards.resize(2);

@@ -31,9 +31,8 @@ class FramesTest : public testing::Test {
   }
 
   DatabaseFrames ReadFrames() {
-    const StatusOr<DatabaseFrames> frames = ReadDatabaseFrames(path_);
-    EXPECT_TRUE(frames.ok()) << frames.status().message();
-    return frames.ok() ? *frames : DatabaseFrames();
+    SqliteConnection database(path_, SqliteConnection::Mode::kRead);
+    return ReadDatabaseFrames(&database);
   }
 
   TemporaryFolder folder_;
@@ -46,23 +45,33 @@ TEST_F(FramesTest, AreNeededForOtherIdsOnly) {
   EXPECT_TRUE(ReadFrames().frames.empty());
   Execute("UPDATE rigs SET rig_id = 7; UPDATE frames SET rig_id = 7;");
   const DatabaseFrames frames = ReadFrames();
-  EXPECT_FALSE(frames.has_camera_rigs);
+  EXPECT_TRUE(frames.has_tables);
+  EXPECT_TRUE(frames.rigs.empty());
   ASSERT_EQ(frames.frames.size(), 4);
   EXPECT_EQ(frames.frames.at(3).frame_id, 3);
   EXPECT_EQ(frames.frames.at(3).rig_id, 7);
 }
 
 TEST_F(FramesTest, RigsOfSeveralCamerasAreFound) {
-  ReshapeDatabase(path_, "4.2, other frames");
-  // Two images in one frame.
-  Execute("UPDATE frame_data SET frame_id = 101 WHERE data_id = 2;");
-  EXPECT_TRUE(ReadFrames().has_camera_rigs);
-  EXPECT_TRUE(ReadFrames().frames.empty());
-  // An image of a camera whose rig has another one as reference.
+  ReshapeDatabase(path_, "4.2");
+  // Camera 2 is known, camera 3 is not.
   Execute(
-      "UPDATE frame_data SET frame_id = 102 WHERE data_id = 2;"
-      "UPDATE frame_data SET sensor_id = 9 WHERE data_id = 3;");
-  EXPECT_TRUE(ReadFrames().has_camera_rigs);
+      "INSERT INTO rig_sensors VALUES "
+      "(1, 2, 0, X'000000000000F03F000000000000000000000000000000000000000000"
+      "000000000000000000E0BF00000000000000000000000000000000'), "
+      "(1, 3, 0, NULL);"
+      "INSERT INTO cameras SELECT 2, model, width, height, params, "
+      "prior_focal_length FROM cameras WHERE camera_id = 1;"
+      "UPDATE images SET camera_id = 2 WHERE image_id = 2;"
+      "UPDATE frame_data SET frame_id = 1, sensor_id = 2 WHERE data_id = 2;");
+  const CameraRigs rigs = ReadFrames().rigs;
+  ASSERT_EQ(rigs.cameras.size(), 3);
+  EXPECT_TRUE(rigs.cameras.at(1).is_reference);
+  EXPECT_FALSE(rigs.cameras.at(3).cam_from_rig.has_value());
+  EXPECT_EQ(rigs.cameras.at(2).cam_from_rig->translation.x(), -0.5);
+  EXPECT_EQ(rigs.images.at(1).frame_id, rigs.images.at(2).frame_id);
+  EXPECT_NE(rigs.images.at(1).frame_id, rigs.images.at(3).frame_id);
+  EXPECT_EQ(ReadFrames().frames.size(), 4);
 }
 
 template <typename T>
@@ -91,7 +100,8 @@ TEST_F(FramesTest, FilesSayTheIdsAndPosesOfRegisteredImages) {
     model.AddImage(image);
     if (image_id != 6) model.RegisterImage(image_id);
   }
-  std::map<image_t, FrameOfImage> frames = {{4, {14, 3}}, {5, {15, 3}}};
+  ModelFrames frames;
+  frames.frames = {{4, {14, 3}}, {5, {15, 3}}};
   ASSERT_TRUE(WriteModelFolder(folder_.Path(), {&model}, frames).ok());
 
   std::string rigs = ReadBytes(folder_.File("0/rigs.bin"));
@@ -119,8 +129,71 @@ TEST_F(FramesTest, FilesSayTheIdsAndPosesOfRegisteredImages) {
   // Models with the two files are read as others.
   EXPECT_EQ(ReadModel(folder_.File("0"))->NumRegImages(), 2);
   // Nothing half: an image without a frame is an error.
-  frames.erase(5);
+  frames.frames.erase(5);
   EXPECT_FALSE(WriteModelFolder(folder_.Path(), {&model}, frames).ok());
+}
+
+TEST_F(FramesTest, FilesSayTheRigOfTheModel) {
+  const Rigid3d pose1(Eigen::Quaterniond(0.5, 0.5, -0.5, 0.5),
+                      Eigen::Vector3d(1.0, 2.0, 3.0));
+  const Rigid3d mount(Eigen::Quaterniond::Identity(),
+                      Eigen::Vector3d(-0.5, 0.0, 0.0));
+  colmap::Reconstruction model;
+  for (const camera_t camera_id : {1, 2}) {
+    colmap::Camera camera;
+    camera.SetCameraId(camera_id);
+    camera.InitializeWithName("PINHOLE", 500.0, 640, 480);
+    model.AddCamera(camera);
+  }
+  ModelFrames frames;
+  frames.rigs.cameras[1] = {3, true, Rigid3d()};
+  frames.rigs.cameras[2] = {3, false, Rigid3d()};  // Not what the model has.
+  for (const image_t image_id : {1, 2, 4}) {       // 3 is not in the model.
+    const camera_t camera_id = 2 - image_id % 2;
+    colmap::Image image;
+    image.SetImageId(image_id);
+    image.SetCameraId(camera_id);
+    image.SetName(std::to_string(image_id));
+    SetCamFromWorld(camera_id == 1 ? pose1 : mount * pose1, &image);
+    model.AddImage(image);
+    model.RegisterImage(image_id);
+    frames.rigs.images[image_id] = {camera_id, (image_id + 1) / 2};
+    frames.frames[image_id] = {(image_id + 1) / 2, 3};
+  }
+  ASSERT_TRUE(WriteModelFolder(folder_.Path(), {&model}, frames).ok());
+
+  std::string rigs = ReadBytes(folder_.File("0/rigs.bin"));
+  EXPECT_EQ(Take<uint64_t>(&rigs), 1);
+  EXPECT_EQ(Take<uint32_t>(&rigs), 3);
+  EXPECT_EQ(Take<uint32_t>(&rigs), 2);  // cameras
+  EXPECT_EQ(Take<int32_t>(&rigs), 0);
+  EXPECT_EQ(Take<uint32_t>(&rigs), 1);  // the reference
+  EXPECT_EQ(Take<int32_t>(&rigs), 0);
+  EXPECT_EQ(Take<uint32_t>(&rigs), 2);
+  EXPECT_EQ(Take<uint8_t>(&rigs), 1);  // known
+  for (const double value : {1.0, 0.0, 0.0, 0.0, -0.5, 0.0, 0.0}) {
+    EXPECT_NEAR(Take<double>(&rigs), value, 1e-12);
+  }
+  EXPECT_TRUE(rigs.empty());
+
+  std::string file = ReadBytes(folder_.File("0/frames.bin"));
+  EXPECT_EQ(Take<uint64_t>(&file), 2);
+  for (const uint32_t frame_id : {1, 2}) {
+    EXPECT_EQ(Take<uint32_t>(&file), frame_id);
+    EXPECT_EQ(Take<uint32_t>(&file), 3);
+    // Both have the pose of the reference camera, seen or not.
+    for (const double value : {0.5, 0.5, -0.5, 0.5, 1.0, 2.0, 3.0}) {
+      EXPECT_NEAR(Take<double>(&file), value, 1e-12);
+    }
+    const uint32_t num_images = Take<uint32_t>(&file);
+    ASSERT_EQ(num_images, frame_id == 1 ? 2 : 1);
+    for (uint32_t k = 0; k < num_images; ++k) {
+      Take<int32_t>(&file);
+      const uint32_t camera_id = Take<uint32_t>(&file);
+      EXPECT_EQ(Take<uint64_t>(&file), 2 * (frame_id - 1) + camera_id);
+    }
+  }
+  EXPECT_TRUE(file.empty());
 }
 
 TEST_F(FramesTest, ModelsWithUnknownCamerasAreNamed) {

@@ -55,6 +55,43 @@ TEST(OdometryChain, BreaksWherePriorsAreMissing) {
   EXPECT_TRUE(chain.Motion(3, 5).has_position);
 }
 
+TEST(OdometryChain, FollowersHaveTheirLeadersPlace) {
+  Random random(1);
+  const Rigid3d mount(ExpSo3(Eigen::Vector3d(0.1, -1.2, 0.2)),
+                      Eigen::Vector3d(-0.5, 0.1, 0.2));
+  std::vector<RelativePosePrior> priors, frame_priors;
+  for (int k = 1; k < 10; ++k) {
+    priors.push_back(BuildPrior(k, k + 1, TrueStep(k), 1e-3, 0.02, &random));
+    frame_priors.push_back(BuildPrior(k, 100 + k, mount, 0, 0, &random));
+    frame_priors.back().covariance.setIdentity();
+    frame_priors.back().covariance *= 1e-6;
+  }
+  const OdometryChain chain(priors, OdometryChainOptions(), frame_priors);
+  const ChainMotion leaders = chain.Motion(3, 8);
+  EXPECT_TRUE(chain.IsFollower(103));
+  EXPECT_FALSE(chain.IsFollower(3));
+  EXPECT_EQ(chain.Index(103), chain.Index(3));
+  EXPECT_EQ(chain.NumSteps(103, 8), 5);
+  EXPECT_EQ(chain.NumSteps(3, 103), 0);
+  EXPECT_TRUE(PosesNear(chain.CamFromStart(108), mount * chain.CamFromStart(8),
+                        1e-9, 1e-9));
+  const ChainMotion followers = chain.Motion(103, 108);
+  EXPECT_TRUE(followers.has_rotation);
+  EXPECT_TRUE(followers.has_position);
+  EXPECT_TRUE(PosesNear(followers.cam2_from_cam1,
+                        mount * leaders.cam2_from_cam1 * mount.Inverse(), 1e-9,
+                        1e-9));
+  // The mounts' errors of 1 mrad come to the odometry's.
+  const auto rotation_variance = [](const ChainMotion& motion) {
+    return Eigen::Matrix3d(motion.covariance.topLeftCorner<3, 3>()).trace();
+  };
+  EXPECT_NEAR(rotation_variance(followers),
+              rotation_variance(leaders) + 2 * 3e-6, 1e-12);
+  const ChainMotion within = chain.Motion(3, 103);
+  EXPECT_TRUE(PosesNear(within.cam2_from_cam1, mount, 1e-9, 1e-9));
+  EXPECT_TRUE(within.covariance.isApprox(frame_priors[0].covariance, 1e-9));
+}
+
 // Draws chains with white noise and common errors; their spread must be the
 // covariance that the chain states.
 TEST(OdometryChain, CovarianceAgreesWithMonteCarlo) {

@@ -41,14 +41,15 @@ inline void Require(bool holds) {
 
 // Accepted logs have strictly ascending times; refusals have one line.
 template <typename Log>
-void RequireAscending(const Log& log) {
+void RequireAscending(const Log& log, bool strictly = true) {
   if (!log.ok()) {
     Require(!log.status().message().empty());
     Require(log.status().message().find('\n') == std::string::npos);
     return;
   }
   for (size_t i = 1; i < log->size(); ++i) {
-    Require((*log)[i].timestamp_ns > (*log)[i - 1].timestamp_ns);
+    Require((*log)[i].timestamp_ns >=
+            (*log)[i - 1].timestamp_ns + (strictly ? 1 : 0));
   }
 }
 

@@ -86,6 +86,14 @@ TEST_F(Readers, ImageTimesOfAllFormats) {
   EXPECT_EQ((*seasons)[1].name, "1611.png");
 }
 
+TEST_F(Readers, ImagesOfARigHaveEqualTimes) {
+  const auto times =
+      ReadImageTimes(Write("data.csv", "10,cam0/a.png\n10,cam1/a.png\n"));
+  ASSERT_TRUE(times.ok()) << times.status().message();
+  EXPECT_EQ((*times)[1].timestamp_ns, 10);
+  EXPECT_EQ((*times)[1].name, "cam1/a.png");
+}
+
 TEST_F(Readers, ImageTimesErrors) {
   std::string path = folder_ + "/absent.csv";
   ExpectError(ReadImageTimes(path).status(), path, {"no such file"});
@@ -295,6 +303,26 @@ wheel0:
 std::string Replaced(std::string text, const std::string& from,
                      const std::string& to) {
   return text.replace(text.find(from), from.size(), to);
+}
+
+TEST_F(Readers, CalibrationOfARig) {
+  const std::string second =
+      "cam1:\n  T_cam_imu: [[0, -1, 0, -0.4], [0, 0, -1, 0.2], "
+      "[1, 0, 0, 0.3], [0, 0, 0, 1]]\n";
+  const auto rig = ReadSensorCalibration(
+      Write("rig.yaml", kCalibration + second +
+                            "  timeshift_cam_imu: 0.0625\n"
+                            "cam2:\n  resolution: [800, 500]\n"));
+  ASSERT_TRUE(rig.ok()) << rig.status().message();
+  // cam2 has no mount.
+  ASSERT_EQ(rig->other_cams_from_imu.size(), 1u);
+  EXPECT_EQ(rig->other_cams_from_imu[0].translation.x(), -0.4);
+  EXPECT_TRUE(ReadSensorCalibration(Write("one.yaml", kCalibration))
+                  ->other_cams_from_imu.empty());
+  const std::string path =
+      Write("apart.yaml", kCalibration + second + "  timeshift_cam_imu: 0.1\n");
+  ExpectError(ReadSensorCalibration(path).status(), path,
+              {"cam1/timeshift_cam_imu", "millisecond"});
 }
 
 TEST_F(Readers, Calibration) {

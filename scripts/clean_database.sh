@@ -1,0 +1,52 @@
+#!/usr/bin/env bash
+# SPDX-License-Identifier: BSD-3-Clause
+# Cleans the matches of a COLMAP database of any version, for COLMAP's own
+# mappers: a copy of it gets the sensors' priors, and adasfm_global rewrites
+# there which pairs match, how, and with which relative pose. The database itself
+# stays as it is (docs/guide/cleaner.md).
+#
+#   scripts/clean_database.sh DATABASE CLEANED [SENSORS]
+#
+#   DATABASE   matched and verified, by any COLMAP from 3.6 on
+#   CLEANED    the copy to make; CLEANED.coarse becomes the coarse model
+#   SENSORS    folder with imu.csv, wheel.csv, times.csv and sensors.yaml;
+#              leave it out when there are none
+#
+# Environment: COLMAP, our executable (default: colmap of the PATH).
+set -euo pipefail
+if [ $# -lt 2 ]; then sed -n '3,16s/^# \{0,1\}//p' "$0" >&2; exit 1; fi
+colmap=${COLMAP:-colmap}
+database=$1 cleaned=$2 sensors=${3:-}
+if [ -e "$cleaned" ]; then echo "$cleaned is there already" >&2; exit 1; fi
+
+# A copy of what is in the write-ahead log too.
+python3 - "$database" "$cleaned" <<'COPY'
+import pathlib, sqlite3, sys
+source = sqlite3.connect(pathlib.Path(sys.argv[1]).absolute().as_uri() +
+                         '?mode=ro', uri=True)
+with sqlite3.connect(sys.argv[2]) as target:
+    source.backup(target)
+COPY
+
+if [ -n "$sensors" ]; then
+  "$colmap" adasfm_prior_importer \
+    --database_path "$cleaned" --image_times_path "$sensors/times.csv" \
+    --imu_path "$sensors/imu.csv" --wheel_path "$sensors/wheel.csv" \
+    --sensors_path "$sensors/sensors.yaml"
+fi
+
+# COLMAP 4's table of priors takes positions and the direction of gravity.
+priors=0
+if python3 - "$cleaned" <<'TABLE'
+import sqlite3, sys
+columns = [row[1] for row in sqlite3.connect(sys.argv[1]).execute(
+    'PRAGMA table_info(pose_priors)')]
+sys.exit(0 if {'gravity', 'corr_data_id'} <= set(columns) else 1)
+TABLE
+then priors=1; fi
+mkdir -p "$cleaned.coarse"
+"$colmap" adasfm_global --database_path "$cleaned" \
+  --output_path "$cleaned.coarse" --AdaSfmGlobal.write_pose_priors "$priors"
+
+# Joins that vision cannot measure: COLMAP's mappers have no sensors for them.
+"$(dirname "${BASH_SOURCE[0]}")/drop_weak_joins.py" "$cleaned"
