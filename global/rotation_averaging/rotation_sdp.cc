@@ -167,9 +167,12 @@ RotationSdpSolution SolveRotationSdp(
       CertificateMatrix(problem, blocks), std::max(0.0, -smallest.value));
   solution.lower_bound =
       std::max(0.0, solution.cost - 3.0 * blocks.size() * bound);
-  solution.optimality =
-      solution.cost <= negligible ? 1.0 : solution.lower_bound / solution.cost;
   solution.rotations = RoundToRotations(blocks);
+  // Of the rotations, not of the relaxation: rounding may cost.
+  const double cost = problem.Cost(std::vector<RotationBlock>(
+      solution.rotations.begin(), solution.rotations.end()));
+  solution.optimality =
+      cost <= negligible ? 1.0 : std::min(1.0, solution.lower_bound / cost);
   return solution;
 }
 
