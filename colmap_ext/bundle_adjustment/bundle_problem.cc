@@ -200,23 +200,24 @@ void BundleProblem::AddPriors(const std::vector<PosePriorEdge>& edges) {
         (image1->second.is_constant && image2->second.is_constant)) {
       continue;
     }
-    const auto add = [&](Term term, double sigma) {
-      if (!std::isfinite(sigma) || !(sigma > 0.0)) return;
+    for (int k = 0; k < kNumPriorTerms; ++k) {
+      const Term term = static_cast<Term>(k);
+      const double sigma = edge.SigmaOf(term);
+      if (!std::isfinite(sigma) || !(sigma > 0.0)) continue;
       AddPrior(edge, term, &image1->second, &image2->second,
                edge.is_held_by_points ? prior_loss_.get() : nullptr);
-    };
-    add(Term::kRotation, edge.rotation_sigma_rad);
-    add(Term::kDirection, edge.direction_sigma_rad);
-    add(Term::kLength, edge.length_sigma_m);
-    add(Term::kTranslation, edge.translation_sigma_m);
+    }
   }
 }
 
 void BundleProblem::AddPrior(const PosePriorEdge& edge,
                              PosePriorCost::Term term, ImageBlock* image1,
                              ImageBlock* image2, ceres::LossFunction* loss) {
-  auto cost =
-      std::make_unique<PosePriorCost>(edge, term, image1->pose, image2->pose);
+  const double sigma_factor =
+      edge.dt_s < 0.0 ? 1.0
+                      : options_.prior_sigma_factors[static_cast<size_t>(term)];
+  auto cost = std::make_unique<PosePriorCost>(edge, term, sigma_factor,
+                                              image1->pose, image2->pose);
   std::vector<double*> parameters = {image1->pose->parameters,
                                      image2->pose->parameters};
   const std::vector<double*> shared = SharedParameters(edge, *cost, term);
