@@ -276,6 +276,8 @@ void BundleProblem::AddSharedErrorPriors(
       shared.direction_drift_time_s > 0.0 ? MedianDirectionSigma(edges) : 0.0);
 }
 
+// A random walk: once its first value is believed, each next one only by its
+// step, or a constant bias would be held back once a window.
 void BundleProblem::AddGyroscopePriors() {
   const SharedErrorOptions& shared = options_.shared_errors;
   const double sigma = shared.gyroscope_bias_sigma_rad_s;
@@ -285,8 +287,10 @@ void BundleProblem::AddGyroscopePriors() {
   for (size_t k = kGyroscopeBias; k < direction_drift_; ++k) {
     SharedBlock& block = shared_[k];
     if (!block.is_used) continue;
-    AddSharedErrorPrior(sigma, &block);
-    if (before != nullptr && sigma > 0.0) {
+    if (before == nullptr || !shared.enabled || !(sigma > 0.0) ||
+        !(step_sigma > 0.0)) {
+      AddSharedErrorPrior(sigma, &block);
+    } else {
       AddSharedErrorStep(step_sigma, 1.0, before, &block);
     }
     before = &block;
