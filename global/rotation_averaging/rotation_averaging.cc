@@ -107,8 +107,9 @@ void StartFromSdp(const RotationAveragingOptions& options,
   if (SumOfAbsoluteErrors(edges, solution.rotations) <
       SumOfAbsoluteErrors(edges, *rotations)) {
     *rotations = solution.rotations;
-    result->sdp_optimality = solution.optimality;
   }
+  result->sdp_optimality =
+      ComputeOptimality(edges, *rotations, solution.lower_bound);
 }
 
 // The cost of a node's edges when it has this rotation.

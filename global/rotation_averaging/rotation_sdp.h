@@ -43,4 +43,10 @@ RotationSdpSolution SolveRotationSdp(const RotationSdpOptions& options,
                                      const std::vector<RotationEdge>& edges,
                                      const std::vector<Eigen::Matrix3d>& start);
 
+// The bound over the cost of these rotations, in [0, 1]; 1 when that is
+// round-off.
+double ComputeOptimality(const std::vector<RotationEdge>& edges,
+                         const std::vector<Eigen::Matrix3d>& rotations,
+                         double lower_bound);
+
 }  // namespace adasfm
