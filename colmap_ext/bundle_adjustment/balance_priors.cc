@@ -22,7 +22,7 @@ constexpr double kMaxStep = 2.0;
 // Sigmas of priors are lowered this often, at most to this share (the importer
 // grants noise figures the same factor), and for as long as they change by
 // more.
-constexpr int kMaxNumCorrections = 3;
+constexpr int kMaxNumCorrections = 2;
 constexpr double kMinSigmaFactor = 0.2;
 constexpr double kMinSigmaChange = 1.1;
 
