@@ -29,7 +29,7 @@ namespace {
 
 bool ChangesDatabase(const GlobalStageOptions& options) {
   return options.refinement.enabled || options.poses.camera_mount.enabled ||
-         options.poses.rotation_rates.enabled || options.write_pose_priors;
+         options.write_pose_priors;
 }
 
 // Of all models together.
@@ -62,21 +62,16 @@ Status CheckGlobalPaths(const GlobalStageOptions& options,
     return Status::Error("the database " + database_path +
                          " is not writable; change its permissions or use "
                          "--AdaSfmGlobal.refine_matches 0 "
-                         "--AdaSfmGlobal.correct_camera_mount 0 "
-                         "--AdaSfmGlobal.correct_rotation_rates 0");
+                         "--AdaSfmGlobal.correct_camera_mount 0");
   }
   if (options.write_pose_priors) status = CheckHasPosePriorTable(database_path);
   if (status.ok()) status = PrepareOutputFolder(output_path);
   return status.ok() ? CheckModelFolders(output_path) : status;
 }
 
-PriorCorrections CollectCorrections(const CoarsePoses& poses) {
-  PriorCorrections corrections;
-  if (poses.camera_mount.corrected) {
-    corrections.camera_mount = ExpSo3(poses.camera_mount.turn_rad);
-  }
-  if (poses.rotation_rates.corrected) corrections.priors = poses.priors;
-  return corrections;
+std::optional<Eigen::Quaterniond> FindCameraMount(const CoarsePoses& poses) {
+  if (!poses.camera_mount.corrected) return std::nullopt;
+  return ExpSo3(poses.camera_mount.turn_rad);
 }
 
 // Waits for another writer, and gives up before anything is replaced.
@@ -174,7 +169,7 @@ Status WriteGlobalResult(const GlobalStageOptions& options,
   if (status.ok() && ChangesDatabase(options)) {
     status = RewriteTwoViewGeometries(database_path, result.geometries,
                                       result.removed_pairs,
-                                      CollectCorrections(result.poses));
+                                      FindCameraMount(result.poses));
   }
   return status;
 }

@@ -21,14 +21,6 @@ std::string DescribeCameraMount(const CameraMountReport& mount) {
   return text;
 }
 
-std::string DescribeRotationRates(const RotationRateReport& rates) {
-  if (!rates.corrected) return "";
-  char text[64];
-  std::snprintf(text, sizeof(text), ", odometry turned by up to %.2g rad/s",
-                rates.max_rate_rad_s);
-  return text;
-}
-
 bool AnyLength(const std::vector<RelativePosePrior>& priors) {
   return std::any_of(
       priors.begin(), priors.end(),
@@ -54,20 +46,16 @@ void CoarsePoseEstimator::RefinePairs() {
   EndStep("relative poses", std::to_string(graph_.edges.size()) + " pairs, " +
                                 std::to_string(num_removed) +
                                 " with few inliers removed" +
-                                DescribeCameraMount(result_.camera_mount) +
-                                DescribeRotationRates(result_.rotation_rates));
+                                DescribeCameraMount(result_.camera_mount));
 }
 
-// The chain, after vision has corrected the camera's mount and the rotations.
+// The chain, after vision has corrected the camera's mount.
 void CoarsePoseEstimator::BuildChain() {
   chain_ = OdometryChain(priors_, options_.chain, frame_priors_);
   const CameraMountOptions& mount = options_.camera_mount;
-  const RotationRateOptions& rates = options_.rotation_rates;
-  if (chain_.empty() || !options_.relative_poses.enabled ||
-      (!mount.enabled && !rates.enabled)) {
+  if (chain_.empty() || !options_.relative_poses.enabled || !mount.enabled) {
     return;
   }
-  const int max_num_steps = std::max(mount.max_num_steps, rates.max_num_steps);
   ViewGraph near = graph_;
   near.edges.erase(
       std::remove_if(
@@ -77,18 +65,13 @@ void CoarsePoseEstimator::BuildChain() {
                    chain_.IsFollower(edge.image_id2) ||
                    !chain_.IsConnected(edge.image_id1, edge.image_id2) ||
                    std::abs(chain_.NumSteps(edge.image_id1, edge.image_id2)) >
-                       max_num_steps;
+                       mount.max_num_steps;
           }),
       near.edges.end());
   RefineRelativePoses(options_.relative_poses, correspondences_, {}, &near);
-  if (mount.enabled) {
-    result_.camera_mount =
-        CorrectCameraMount(mount, chain_, near, correspondences_, &priors_);
-    chain_ = OdometryChain(priors_, options_.chain, frame_priors_);
-  }
-  if (rates.enabled) {
-    result_.rotation_rates =
-        CorrectRotationRates(rates, chain_, near, &priors_);
+  result_.camera_mount =
+      CorrectCameraMount(mount, chain_, near, correspondences_, &priors_);
+  if (result_.camera_mount.corrected) {
     chain_ = OdometryChain(priors_, options_.chain, frame_priors_);
   }
 }

@@ -66,11 +66,11 @@ bool CoarsePoseOptions::IsValid(std::string* error) const {
     return false;
   }
   return chain.IsValid(error) && camera_mount.IsValid(error) &&
-         rotation_rates.IsValid(error) && relative_poses.IsValid(error) &&
-         lengths.IsValid(error) && visual_steps.IsValid(error) &&
-         loops.IsValid(error) && rotations.IsValid(error) &&
-         translations.IsValid(error) && augmentation.IsValid(error) &&
-         positions.IsValid(error) && position_filter.IsValid(error);
+         relative_poses.IsValid(error) && lengths.IsValid(error) &&
+         visual_steps.IsValid(error) && loops.IsValid(error) &&
+         rotations.IsValid(error) && translations.IsValid(error) &&
+         augmentation.IsValid(error) && positions.IsValid(error) &&
+         position_filter.IsValid(error);
 }
 
 CoarsePoses EstimateCoarsePoses(

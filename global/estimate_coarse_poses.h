@@ -8,7 +8,6 @@
 #include "core/relative_pose_prior.h"
 #include "core/rigid3d.h"
 #include "global/calibration/correct_camera_mount.h"
-#include "global/calibration/correct_rotation_rates.h"
 #include "global/loop_closures/filter_loop_closures.h"
 #include "global/loop_closures/loop_closure_options.h"
 #include "global/odometry/augment_view_graph.h"
@@ -29,7 +28,6 @@ namespace adasfm {
 struct CoarsePoseOptions {
   OdometryChainOptions chain;
   CameraMountOptions camera_mount;
-  RotationRateOptions rotation_rates;
   RelativePoseRefinementOptions relative_poses;
   EdgeLengthOptions lengths;
   VisualStepOptions visual_steps;
@@ -100,10 +98,9 @@ struct CoarsePoses {
   // The input's edges and those added, with reasons of removal and the
   // relative poses as they were used.
   ViewGraph graph;
-  // The input's, with the rotations that vision corrected.
+  // The input's, turned by the camera's mount where vision corrected it.
   std::vector<RelativePosePrior> priors;
   CameraMountReport camera_mount;
-  RotationRateReport rotation_rates;
   LoopClosureReport loop_closures;
   std::vector<CoarseStep> steps;
 };
@@ -116,7 +113,6 @@ struct CoarsePoses {
 // for invalid options or an inconsistent graph. Numbered steps:
 //   1 least-squares relative poses            RefineRelativePoses
 //     the camera's mount                      CorrectCameraMount
-//     odometry's rotation rates               CorrectRotationRates
 //   2 odometry chain, lengths, loop closures  AddVisualSteps
 //                                             FilterLoopClosures
 //   3 sensor edges, rotation averaging        EstimateGlobalRotations

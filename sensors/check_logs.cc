@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "core/median.h"
 #include "sensors/calibration_check/check_wheels.h"
 #include "sensors/io/format_figures.h"
 #include "sensors/io/log_checks.h"
@@ -14,8 +13,6 @@ namespace {
 
 constexpr double kMinImagePeriodS = 1e-3;
 constexpr double kMinImuRateHz = 40.0;
-// Below this the noise figure is another sensor's, or another unit's.
-constexpr double kMinNoiseShare = 0.2;
 constexpr double kMaxScaleError = 0.2;
 constexpr double kMaxScaleFactor = 2.0;
 
@@ -23,43 +20,6 @@ template <typename Sample>
 bool Covers(const std::vector<Sample>& log, timestamp_t time_ns) {
   return !log.empty() && time_ns >= log.front().timestamp_ns &&
          time_ns <= log.back().timestamp_ns;
-}
-
-// The tenth of all windows of a second that are quietest end here: sigma of one
-// reading's white noise, from second differences. Windows that do not change at
-// all (wheels at rest) tell nothing.
-double QuietSigma(const std::vector<timestamp_t>& times_ns,
-                  const std::vector<Eigen::Vector3d>& readings, int num_axes) {
-  std::vector<double> sigmas;
-  size_t begin = 0;
-  for (size_t end = 1; end < readings.size(); ++end) {
-    if (SecondsFromNs(times_ns[end] - times_ns[begin]) < 1.0) continue;
-    std::vector<double> sizes;
-    for (size_t i = begin + 2; i < end; ++i) {
-      const Eigen::Vector3d second =
-          readings[i] - 2.0 * readings[i - 1] + readings[i - 2];
-      for (int axis = 0; axis < num_axes; ++axis) {
-        sizes.push_back(std::abs(second[axis]));
-      }
-    }
-    const double sigma = 1.4826 * UpperMedian(&sizes) / std::sqrt(6.0);
-    if (sigma > 0.0) sigmas.push_back(sigma);
-    begin = end;
-  }
-  if (sigmas.size() < 10) return 0.0;
-  std::sort(sigmas.begin(), sigmas.end());
-  return sigmas[sigmas.size() / 10];
-}
-
-void Raise(const char* name, double measured, double* figure,
-           std::vector<std::string>* warnings) {
-  if (*figure >= kMinNoiseShare * measured) return;
-  warnings->push_back(
-      std::string(name) +
-      FormatFigures(" is %.3g, but the log's noise in its quietest seconds is "
-                    "%.3g, which is used: correct the noise figures",
-                    *figure, measured));
-  *figure = measured;
 }
 
 }  // namespace
@@ -123,36 +83,6 @@ std::string FindContradiction(const MotionLogs& logs,
   warnings->insert(warnings->end(), check.warnings.begin(),
                    check.warnings.end());
   return check.contradiction;
-}
-
-void RaiseNoiseFigures(const MotionLogs& logs, SensorCalibration* calibration,
-                       std::vector<std::string>* warnings) {
-  std::vector<timestamp_t> times_ns;
-  std::vector<Eigen::Vector3d> rates, forces;
-  for (const ImuSample& sample : logs.imu) {
-    times_ns.push_back(sample.timestamp_ns);
-    rates.push_back(sample.angular_velocity);
-    forces.push_back(sample.specific_force);
-  }
-  const double root_period = std::sqrt(ComputeMedianPeriod(times_ns));
-  ImuNoise& noise = calibration->imu_noise;
-  Raise("gyroscope_noise_density", root_period * QuietSigma(times_ns, rates, 3),
-        &noise.gyroscope_noise_density, warnings);
-  Raise("accelerometer_noise_density",
-        root_period * QuietSigma(times_ns, forces, 3),
-        &noise.accelerometer_noise_density, warnings);
-  if (CountsTicks(calibration->wheel_type)) return;
-  times_ns.clear();
-  std::vector<Eigen::Vector3d> speeds;
-  for (const WheelSpeed& speed : logs.wheel) {
-    times_ns.push_back(speed.timestamp_ns);
-    speeds.emplace_back(speed.speed, 0.0, 0.0);
-  }
-  // The mean of two wheels is less noisy than one.
-  const double num_wheels =
-      calibration->wheel_type == WheelType::kDifferential ? 2.0 : 1.0;
-  Raise("speed_noise", std::sqrt(num_wheels) * QuietSigma(times_ns, speeds, 1),
-        &calibration->wheel_speed_noise, warnings);
 }
 
 std::string DescribeWheelScale(double scale, bool* is_error) {

@@ -27,13 +27,6 @@ std::string FindContradiction(const MotionLogs& logs,
                               const SensorCalibration& calibration,
                               std::vector<std::string>* warnings);
 
-// Noise figures that are less than a fifth of what the log shows in its
-// quietest seconds (a tenth of them are quieter) are raised to that, with a
-// warning: second differences of white noise of the density n at the rate f
-// have the standard deviation n sqrt(6 f).
-void RaiseNoiseFigures(const MotionLogs& logs, SensorCalibration* calibration,
-                       std::vector<std::string>* warnings);
-
 // A line about a wheel scale more than 20 % from 1, with its likely causes;
 // empty when there is none. One beyond a factor of 2 has no other cause than a
 // wheel log that is wrong: is_error says so.

@@ -13,7 +13,7 @@
 #include "sensors/calibration_check/wheel_clock.h"
 #include "sensors/check_logs.h"
 #include "sensors/io/format_figures.h"
-#include "sensors/preintegration/imu_noise.h"
+#include "sensors/noise_figures.h"
 #include "sensors/select_images.h"
 #include "sensors/smoother/build_odometry_links.h"
 #include "sensors/smoother/compose_prior.h"
@@ -111,9 +111,7 @@ void PriorEstimator::SelectLogs(const SensorLogs& logs) {
     logs_.wheel = ComputeWheelSpeeds(logs.wheel, calibration_);
     logs_.odometry = logs.odometry;
   }
-  // Far too small figures are said; then the IMU's are what the log shows.
   RaiseNoiseFigures(logs_, &calibration_, &summary.warnings);
-  calibration_.imu_noise = RaiseToLog(logs_.imu, calibration_.imu_noise);
   if (!calibration_.has_imu && !logs.imu.empty()) {
     summary.warnings.push_back(
         "the calibration has no imu0: the IMU log is not used");

@@ -6,16 +6,12 @@
 #include <stdexcept>
 
 #include "colmap_ext/bundle_adjustment/estimate_keypoint_sigma.h"
-#include "colmap_ext/host/pose_conversion.h"
-#include "core/so3.h"
+#include "colmap_ext/bundle_adjustment/prior_components.h"
 
 namespace adasfm {
 namespace {
 
-constexpr double kMaxTerm = 25.0;
 constexpr double kTornNumSigmas = 10.0;
-// Fewer terms of a kind than this are no statistic.
-constexpr int kMinNumTerms = 10;
 // Made-up keypoints have no noise, and weights need an end.
 constexpr double kMinKeypointSigmaPx = 0.02;
 // Relative change of the cost at which an adjustment of the search ends.
@@ -23,50 +19,141 @@ constexpr double kSearchFunctionTolerance = 1e-3;
 // Steps of the search: small ones would only repeat the adjustment.
 constexpr double kMinStep = 1.25;
 constexpr double kMaxStep = 2.0;
+// Sigmas of priors are lowered this often, at most to this share (the importer
+// grants noise figures the same factor), and for as long as they change by
+// more.
+constexpr int kMaxNumCorrections = 2;
+constexpr double kMinSigmaFactor = 0.2;
+constexpr double kMinSigmaChange = 1.1;
 
-// Mean of the squared whitened errors of one kind of term.
-struct TermMean {
-  int num_dof = 1;
-  double sum = 0.0;
-  int count = 0;
-  int num_torn = 0;
-
-  void Add(double error, double sigma) {
-    if (!std::isfinite(sigma)) return;
-    const double whitened = error / sigma;
-    num_torn += std::abs(whitened) > kTornNumSigmas;
-    sum += std::min(kMaxTerm, whitened * whitened / num_dof);
-    ++count;
+// Lowers the sigmas that the residuals refute as too large, as far as one
+// standard deviation of the estimate goes; whether any moved enough to matter.
+bool LowerSigmas(const PriorComponents& components,
+                 PriorSigmaFactors* factors) {
+  bool any = false;
+  for (int k = 0; k < kNumPriorTerms; ++k) {
+    const PriorComponent& component = components[k];
+    if (component.mean_square == 0.0) continue;  // Too few.
+    const double factor =
+        std::clamp((*factors)[k] * std::sqrt(component.VarianceFactor() +
+                                             component.VarianceFactorSigma()),
+                   kMinSigmaFactor, 1.0);
+    const double change = factor / (*factors)[k];
+    if (std::max(change, 1.0 / change) < kMinSigmaChange) continue;
+    (*factors)[k] = factor;
+    any = true;
   }
-  double Mean() const { return count < kMinNumTerms ? 0.0 : sum / count; }
-};
+  return any;
+}
 
-// The terms of priors at the reconstruction's poses.
-struct PriorTerms {
-  TermMean rotations{3};
-  TermMean directions{2};
-  TermMean lengths{1};
-  TermMean translations{3};
+// One adjustment, repeated until its sigmas agree with its residuals.
+class BalancedAdjustment {
+ public:
+  BalancedAdjustment(const PriorBalanceOptions& balance,
+                     const PriorBundleAdjustmentOptions& options,
+                     const PriorBundleAdjustmentProblem& problem,
+                     double* keypoint_sigma_factor,
+                     colmap::Reconstruction* reconstruction)
+      : balance_(balance),
+        given_(options),
+        options_(options),
+        problem_(problem),
+        factor_(*keypoint_sigma_factor),
+        reconstruction_(*reconstruction) {
+    if (!balance.estimate_keypoint_sigma) return;
+    given_.keypoint_sigma_px =
+        std::max(kMinKeypointSigmaPx, EstimateKeypointSigma(reconstruction_)
+                                          .value_or(options.keypoint_sigma_px));
+  }
 
-  void Add(const PosePriorEdge& edge,
-           const colmap::Reconstruction& reconstruction) {
-    if (!reconstruction.IsImageRegistered(edge.image_id1) ||
-        !reconstruction.IsImageRegistered(edge.image_id2)) {
-      return;
+  PriorBundleAdjustmentSummary Run() {
+    const bool has_priors = !problem_.priors.empty();
+    const bool estimates_priors = has_priors &&
+                                  balance_.estimate_keypoint_sigma &&
+                                  balance_.estimate_prior_sigmas;
+    if (estimates_priors) EstimatePriorSigmas();
+    if (has_priors && balance_.enabled) RaiseKeypointSigma();
+    if (!is_final_) Adjust(given_.function_tolerance);
+    if (summary_.success && has_priors) {
+      PriorComponents components = Components();
+      if (estimates_priors) EstimateRedundancies(&components);
+      summary_.prior_chi2_per_dof = LargestChi2PerDof(components);
     }
-    const Rigid3d cam2_from_cam1 =
-        ComputeCam2FromCam1(CamFromWorld(reconstruction.Image(edge.image_id1)),
-                            CamFromWorld(reconstruction.Image(edge.image_id2)));
-    const Eigen::Vector3d& translation = cam2_from_cam1.translation;
-    const Eigen::Vector3d& prior = edge.cam2_from_cam1.translation;
-    rotations.Add(
-        AngleBetweenRad(cam2_from_cam1.rotation, edge.cam2_from_cam1.rotation),
-        edge.rotation_sigma_rad);
-    directions.Add(AngleBetweenRad(translation, prior),
-                   edge.direction_sigma_rad);
-    lengths.Add(translation.norm() - prior.norm(), edge.length_sigma_m);
-    translations.Add((translation - prior).norm(), edge.translation_sigma_m);
+    return summary_;
   }
+
+ private:
+  bool Adjust(double function_tolerance) {
+    options_.function_tolerance = function_tolerance;
+    options_.keypoint_sigma_px = given_.keypoint_sigma_px * factor_;
+    is_final_ = function_tolerance == given_.function_tolerance;
+    const int num_iterations = summary_.num_iterations;
+    summary_ = AdjustBundle(options_, problem_, &reconstruction_);
+    summary_.num_iterations += num_iterations;
+    return summary_.success;
+  }
+
+  PriorComponents Components() const {
+    return ComputePriorComponents(
+        options_.prior_sigma_factors,
+        CorrectSharedErrors(options_.shared_errors, summary_.shared_errors,
+                            problem_.priors),
+        reconstruction_);
+  }
+
+  bool EstimateRedundancies(PriorComponents* components) const {
+    return adasfm::EstimateRedundancies(options_, problem_,
+                                        summary_.shared_errors, reconstruction_,
+                                        components);
+  }
+
+  // While keypoints weigh what their residuals show: a larger sigma would
+  // explain what is left of the priors by itself.
+  void EstimatePriorSigmas() {
+    for (int k = 0; k < kMaxNumCorrections; ++k) {
+      if (!Adjust(given_.function_tolerance)) return;
+      PriorComponents components = Components();
+      if (!EstimateRedundancies(&components) ||
+          !LowerSigmas(components, &options_.prior_sigma_factors)) {
+        return;
+      }
+      is_final_ = false;
+    }
+  }
+
+  // The search needs no last digits.
+  void RaiseKeypointSigma() {
+    const double tolerance =
+        std::max(given_.function_tolerance, kSearchFunctionTolerance);
+    if (!is_final_ && !Adjust(tolerance)) return;
+    while (factor_ < balance_.max_sigma_factor) {
+      const double chi2 = LargestChi2PerDof(Components());
+      if (chi2 > balance_.max_chi2_per_dof) {
+        factor_ = std::min(
+            balance_.max_sigma_factor,
+            factor_ * std::clamp(std::sqrt(chi2 / balance_.max_chi2_per_dof),
+                                 kMinStep, kMaxStep));
+      } else if (is_final_) {
+        return;
+      }
+      if (!Adjust(chi2 > balance_.max_chi2_per_dof
+                      ? tolerance
+                      : given_.function_tolerance)) {
+        return;
+      }
+    }
+  }
+
+  const PriorBalanceOptions& balance_;
+  // With the keypoint sigma that the residuals show.
+  PriorBundleAdjustmentOptions given_;
+  PriorBundleAdjustmentOptions options_;
+  const PriorBundleAdjustmentProblem& problem_;
+  double& factor_;
+  colmap::Reconstruction& reconstruction_;
+  PriorBundleAdjustmentSummary summary_;
+  // The last adjustment was with the sigmas in use and the tolerance given.
+  bool is_final_ = false;
 };
 
 }  // namespace
@@ -87,25 +174,16 @@ bool PriorBalanceOptions::IsValid(std::string* error) const {
 
 double ComputePriorChi2PerDof(const std::vector<PosePriorEdge>& priors,
                               const colmap::Reconstruction& reconstruction) {
-  PriorTerms terms;
-  for (const PosePriorEdge& edge : priors) {
-    if (edge.is_held_by_points) terms.Add(edge, reconstruction);
-  }
-  return std::max({terms.rotations.Mean(), terms.directions.Mean(),
-                   terms.lengths.Mean(), terms.translations.Mean()});
+  return LargestChi2PerDof(
+      ComputePriorComponents({1.0, 1.0, 1.0, 1.0}, priors, reconstruction));
 }
 
 int CountTornPriors(const std::vector<PosePriorEdge>& priors,
                     const colmap::Reconstruction& reconstruction) {
-  int num_torn = 0;
-  for (const PosePriorEdge& edge : priors) {
-    PriorTerms terms;
-    terms.Add(edge, reconstruction);
-    num_torn += terms.rotations.num_torn + terms.directions.num_torn +
-                    terms.lengths.num_torn + terms.translations.num_torn >
-                0;
-  }
-  return num_torn;
+  return std::count_if(
+      priors.begin(), priors.end(), [&](const PosePriorEdge& edge) {
+        return LargestNumSigmas(edge, reconstruction) > kTornNumSigmas;
+      });
 }
 
 PriorBundleAdjustmentSummary AdjustBundleInBalance(
@@ -115,46 +193,9 @@ PriorBundleAdjustmentSummary AdjustBundleInBalance(
     colmap::Reconstruction* reconstruction, double* keypoint_sigma_factor) {
   std::string error;
   if (!balance.IsValid(&error)) throw std::invalid_argument(error);
-  PriorBundleAdjustmentOptions adjusted = options;
-  PriorBundleAdjustmentSummary summary;
-  double keypoint_sigma_px = options.keypoint_sigma_px;
-  if (balance.estimate_keypoint_sigma) {
-    keypoint_sigma_px = std::max(
-        kMinKeypointSigmaPx,
-        EstimateKeypointSigma(*reconstruction).value_or(keypoint_sigma_px));
-  }
-  const bool may_search = balance.enabled && !problem.priors.empty();
-  // The search needs no last digits.
-  if (may_search) {
-    adjusted.function_tolerance =
-        std::max(options.function_tolerance, kSearchFunctionTolerance);
-  }
-  int num_iterations = 0;
-  while (true) {
-    adjusted.keypoint_sigma_px = keypoint_sigma_px * *keypoint_sigma_factor;
-    summary = AdjustBundle(adjusted, problem, reconstruction);
-    num_iterations += summary.num_iterations;
-    summary.num_iterations = num_iterations;
-    if (!summary.success) return summary;
-    double chi2 = 0.0;
-    if (may_search && *keypoint_sigma_factor < balance.max_sigma_factor) {
-      chi2 = ComputePriorChi2PerDof(
-          CorrectSharedErrors(options.shared_errors, summary.shared_errors,
-                              problem.priors),
-          *reconstruction);
-    }
-    if (chi2 > balance.max_chi2_per_dof) {
-      *keypoint_sigma_factor =
-          std::min(balance.max_sigma_factor,
-                   *keypoint_sigma_factor *
-                       std::clamp(std::sqrt(chi2 / balance.max_chi2_per_dof),
-                                  kMinStep, kMaxStep));
-    } else if (adjusted.function_tolerance > options.function_tolerance) {
-      adjusted.function_tolerance = options.function_tolerance;
-    } else {
-      return summary;
-    }
-  }
+  return BalancedAdjustment(balance, options, problem, keypoint_sigma_factor,
+                            reconstruction)
+      .Run();
 }
 
 }  // namespace adasfm

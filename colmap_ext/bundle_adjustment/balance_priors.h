@@ -13,9 +13,10 @@ namespace adasfm {
 // Keypoints share errors that no single one shows (calibration, moving cars,
 // forward motion), so thousands of them may outvote honest priors. The priors
 // tell: when an adjustment leaves them further off than their covariance
-// allows, vision was believed too much. Its sigma is then raised until both
-// agree (variance component estimation for two groups of observations, of which
-// one is trusted; docs/reference/mapper.md).
+// allows, vision was believed too much, and its sigma is raised until both
+// agree. When it leaves them nearer than their covariance lets expect, that is
+// too large, and lowered: variance component estimation, in which priors are
+// never blamed (docs/reference/mapper.md).
 struct PriorBalanceOptions {
   bool enabled = true;
   // Squared whitened residuals per degree of freedom that priors may have;
@@ -24,6 +25,10 @@ struct PriorBalanceOptions {
   // The search begins with the noise of keypoints that their residuals show
   // (estimate_keypoint_sigma.h), where there are enough.
   bool estimate_keypoint_sigma = true;
+  // The adjustment also lowers the priors' sigmas that its residuals refute as
+  // too large, each kind of term by itself (prior_components.h). Together with
+  // estimate_keypoint_sigma only, since both need poses near the optimum.
+  bool estimate_prior_sigmas = true;
   // The keypoint sigma is raised by at most this factor, so that priors of a
   // wrong calibration do not take over. Real drives need up to 16: keypoints
   // of 0.27 px, and calibration errors that they share of 4 px.

@@ -183,6 +183,7 @@ PriorBundleAdjustmentSummary AdjustBundle(
 
   PriorBundleAdjustmentSummary summary;
   summary.keypoint_sigma_px = options.keypoint_sigma_px;
+  summary.prior_sigma_factors = options.prior_sigma_factors;
   PriorBundleAdjustmentProblem with_windows = problem;
   AssignWindows(options.shared_errors, &with_windows.priors);
   BundleProblem bundle(options, with_windows, *reconstruction);

@@ -3,6 +3,7 @@
 
 #include <base/reconstruction.h>
 
+#include <array>
 #include <limits>
 #include <map>
 #include <set>
@@ -17,6 +18,12 @@
 #include "core/types.h"
 
 namespace adasfm {
+
+enum class PriorTerm { kRotation, kDirection, kLength, kTranslation };
+inline constexpr int kNumPriorTerms = 4;
+
+// What the sigmas that sensors state are multiplied by, by PriorTerm.
+using PriorSigmaFactors = std::array<double, kNumPriorTerms>;
 
 // A relative-pose term of the adjustment for one edge of the augmented graph
 // (paper, eq. 8; docs/reference/math.md). With P = P_j P_i^-1 of the current
@@ -45,6 +52,12 @@ struct PosePriorEdge {
   double dt_s = -1.0;
   // Set by AdjustBundle.
   SharedErrorWindows windows;
+
+  double SigmaOf(PriorTerm term) const {
+    return std::array<double, kNumPriorTerms>{
+        rotation_sigma_rad, direction_sigma_rad, length_sigma_m,
+        translation_sigma_m}[static_cast<size_t>(term)];
+  }
 };
 
 // The edge of a sensor prior with the sigmas of its covariance; what its flags
@@ -64,6 +77,8 @@ struct PriorBundleAdjustmentOptions {
   // sigmas. It drops single wrong priors; many that vision contradicts together
   // are what balance_priors.h is for.
   double prior_loss_scale = 3.0;
+  // Of the priors' sigmas alone: what is believed of the shared errors stays.
+  PriorSigmaFactors prior_sigma_factors = {1.0, 1.0, 1.0, 1.0};
 
   // Where the robust loss (Cauchy) on whitened positions takes over, in sigmas.
   // Larger while the model is still bent.
@@ -127,9 +142,13 @@ struct PriorBundleAdjustmentSummary {
   double initial_cost = 0.0;
   double final_cost = 0.0;
   double seconds = 0.0;
-  // The keypoint sigma that was used.
+  // The sigmas that were used.
   double keypoint_sigma_px = 0.0;
+  PriorSigmaFactors prior_sigma_factors = {1.0, 1.0, 1.0, 1.0};
   std::string message;
+  // Of the priors, where AdjustBundleInBalance made the adjustment: the largest
+  // chi-square per degree of freedom of a kind of term.
+  double prior_chi2_per_dof = 0.0;
   // Of the priors with a duration; all zero on failure.
   SharedErrors shared_errors;
 };

@@ -275,23 +275,24 @@ void BundleProblem::AddPriors(const std::vector<PosePriorEdge>& edges) {
         (image1->second.is_constant && image2->second.is_constant)) {
       continue;
     }
-    const auto add = [&](Term term, double sigma) {
-      if (!std::isfinite(sigma) || !(sigma > 0.0)) return;
+    for (int k = 0; k < kNumPriorTerms; ++k) {
+      const Term term = static_cast<Term>(k);
+      const double sigma = edge.SigmaOf(term);
+      if (!std::isfinite(sigma) || !(sigma > 0.0)) continue;
       AddPrior(edge, term, &image1->second, &image2->second,
                edge.is_held_by_points ? prior_loss_.get() : nullptr);
-    };
-    add(Term::kRotation, edge.rotation_sigma_rad);
-    add(Term::kDirection, edge.direction_sigma_rad);
-    add(Term::kLength, edge.length_sigma_m);
-    add(Term::kTranslation, edge.translation_sigma_m);
+    }
   }
 }
 
 void BundleProblem::AddPrior(const PosePriorEdge& edge,
                              PosePriorCost::Term term, ImageBlock* image1,
                              ImageBlock* image2, ceres::LossFunction* loss) {
-  auto cost =
-      std::make_unique<PosePriorCost>(edge, term, image1->pose, image2->pose);
+  const double sigma_factor =
+      edge.dt_s < 0.0 ? 1.0
+                      : options_.prior_sigma_factors[static_cast<size_t>(term)];
+  auto cost = std::make_unique<PosePriorCost>(edge, term, sigma_factor,
+                                              image1->pose, image2->pose);
   const std::vector<double*> shared = SharedParameters(edge, *cost, term);
   other_costs_.push_back(std::move(cost));
   AddCost(other_costs_.back().get(), loss, {image1, image2}, shared);
@@ -347,6 +348,8 @@ void BundleProblem::AddSharedErrorPriors(
       shared.direction_drift_time_s > 0.0 ? MedianDirectionSigma(edges) : 0.0);
 }
 
+// A random walk: once its first value is believed, each next one only by its
+// step, or a constant bias would be held back once a window.
 void BundleProblem::AddGyroscopePriors() {
   const SharedErrorOptions& shared = options_.shared_errors;
   const double sigma = shared.gyroscope_bias_sigma_rad_s;
@@ -356,8 +359,10 @@ void BundleProblem::AddGyroscopePriors() {
   for (size_t k = kGyroscopeBias; k < direction_drift_; ++k) {
     SharedBlock& block = shared_[k];
     if (!block.is_used) continue;
-    AddSharedErrorPrior(sigma, &block);
-    if (before != nullptr && sigma > 0.0) {
+    if (before == nullptr || !shared.enabled || !(sigma > 0.0) ||
+        !(step_sigma > 0.0)) {
+      AddSharedErrorPrior(sigma, &block);
+    } else {
       AddSharedErrorStep(step_sigma, 1.0, before, &block);
     }
     before = &block;

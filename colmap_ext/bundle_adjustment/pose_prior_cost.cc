@@ -86,7 +86,7 @@ Eigen::Vector2d DirectionError(const Eigen::Vector3d& vector,
 }
 
 PosePriorCost::PosePriorCost(const PosePriorEdge& edge, Term term,
-                             const AdjustedPose* pose1,
+                             double sigma_factor, const AdjustedPose* pose1,
                              const AdjustedPose* pose2)
     : term_(term),
       pose1_(pose1),
@@ -99,17 +99,9 @@ PosePriorCost::PosePriorCost(const PosePriorEdge& edge, Term term,
   }
   basis_ = OrthonormalComplement(direction_);
   int num_residuals = 3;
-  double sigma = edge.rotation_sigma_rad;
-  if (term == Term::kDirection) {
-    num_residuals = 2;
-    sigma = edge.direction_sigma_rad;
-  } else if (term == Term::kLength) {
-    num_residuals = 1;
-    sigma = edge.length_sigma_m;
-  } else if (term == Term::kTranslation) {
-    sigma = edge.translation_sigma_m;
-  }
-  inverse_sigma_ = 1.0 / sigma;
+  if (term == Term::kDirection) num_residuals = 2;
+  if (term == Term::kLength) num_residuals = 1;
+  inverse_sigma_ = 1.0 / (sigma_factor * edge.SigmaOf(term));
   set_num_residuals(num_residuals);
   if (edge.dt_s >= 0.0) {
     const Eigen::Matrix3d from_middle = CameraFromMiddle(rotation_);

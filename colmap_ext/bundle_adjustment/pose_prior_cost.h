@@ -36,10 +36,11 @@ Eigen::Vector2d DirectionError(const Eigen::Vector3d& vector,
 // robust loss can drop a wrong term and keep the others.
 class PosePriorCost final : public ceres::CostFunction {
  public:
-  enum class Term { kRotation, kDirection, kLength, kTranslation };
+  using Term = PriorTerm;
 
-  PosePriorCost(const PosePriorEdge& edge, Term term, const AdjustedPose* pose1,
-                const AdjustedPose* pose2);
+  // The edge's sigma is multiplied by sigma_factor.
+  PosePriorCost(const PosePriorEdge& edge, Term term, double sigma_factor,
+                const AdjustedPose* pose1, const AdjustedPose* pose2);
 
   bool Evaluate(double const* const* parameters, double* residuals,
                 double** jacobians) const final;

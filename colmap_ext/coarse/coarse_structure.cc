@@ -76,9 +76,7 @@ PriorBundleAdjustmentProblem CreateProblem(
   return problem;
 }
 
-void FillFigures(const CoarseStructureOptions& options,
-                 const PriorBundleAdjustmentProblem& problem,
-                 CoarseModel* model) {
+void FillFigures(const CoarseStructureOptions& options, CoarseModel* model) {
   const colmap::Reconstruction& reconstruction = model->reconstruction;
   model->num_points = reconstruction.NumPoints3D();
   model->num_observations = reconstruction.ComputeNumObservations();
@@ -91,10 +89,7 @@ void FillFigures(const CoarseStructureOptions& options,
     model->num_images_with_few_points +=
         num_points < options.min_num_points_per_image;
   }
-  model->prior_chi2_per_dof = ComputePriorChi2PerDof(
-      CorrectSharedErrors(options.bundle.shared_errors,
-                          model->rounds.back().shared_errors, problem.priors),
-      reconstruction);
+  model->prior_chi2_per_dof = model->rounds.back().prior_chi2_per_dof;
   model->priors_agree =
       model->prior_chi2_per_dof <= options.balance.max_chi2_per_dof;
 }
@@ -206,6 +201,7 @@ PriorBundleAdjustmentSummary AdjustRound(
   bundle.position_loss_scale = PositionLossScale(
       alignment, bundle.position_loss_scale, round, options.num_rounds);
   PriorBalanceOptions balance = options.balance;
+  balance.estimate_prior_sigmas = false;
   if (round + 1 < options.num_rounds) {
     bundle.function_tolerance =
         std::max(bundle.function_tolerance, options.early_function_tolerance);
@@ -322,7 +318,7 @@ CoarseModel BuildCoarseModel(
       is_georeferenced ||
       AlignToGravity(scene, &model.reconstruction, input.camera_mount);
   model.keypoint_sigma_px = model.rounds.back().keypoint_sigma_px;
-  FillFigures(options, problem, &model);
+  FillFigures(options, &model);
   return model;
 }
 

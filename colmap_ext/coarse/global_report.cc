@@ -219,10 +219,6 @@ std::string FormatGlobalReportJson(const SceneData& scene,
   }
   report["edges"] = removals;
   report["camera_mount"] = MountJson(result.poses.camera_mount);
-  const RotationRateReport& rates = result.poses.rotation_rates;
-  report["rotation_rates"] = {{"corrected", rates.corrected},
-                              {"pairs", rates.num_pairs},
-                              {"max_rate_rad_s", rates.max_rate_rad_s}};
   report["loop_closures"] = LoopClosuresJson(result.poses.loop_closures);
   report["joins"] = PartJoinsJson(scene, result.poses.loop_closures);
   report["weak_places"] = WeakPlacesJson(scene, result.poses);

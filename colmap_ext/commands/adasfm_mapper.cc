@@ -76,6 +76,8 @@ void AddMapperOptions(MapperCommandOptions* options, CommandOptions* command) {
       "1 sigma of keypoints, weighs priors [px]");
   add("estimate_keypoint_sigma", &local.balance.estimate_keypoint_sigma,
       "the last refinement takes the keypoint sigma from the residuals");
+  add("estimate_prior_sigmas", &local.balance.estimate_prior_sigmas,
+      "and lowers the priors' sigmas that the residuals refute");
   add("balance_priors", &local.balance.enabled,
       "raise the keypoint sigma until the priors agree within their "
       "covariance");

@@ -51,21 +51,10 @@ void GlobalOptionAdder::AddPaper() {
 }
 
 void GlobalOptionAdder::AddRotations() {
-  RotationRateOptions* rates = &stage_->poses.rotation_rates;
   Add("min_num_inliers", &stage_->poses.min_num_inliers,
       "pairs with fewer verified matches take no part");
   Add("num_rotation_rounds", &stage_->poses.num_rotation_rounds,
       "rounds of relative poses and rotations for pairs without odometry");
-  Add("rotation_rate_max_num_steps", &rates->max_num_steps,
-      "pairs at most this many images apart tell the gyroscope's bias");
-  Add("rotation_rate_window_s", &rates->window_s,
-      "one correction of the gyroscope for each such span [s]");
-  Add("rotation_rate_sigma_rad_s", &rates->rate_sigma_rad_s,
-      "1 sigma of a correction, per axis [rad/s]");
-  Add("rotation_rate_drift_sigma_rad_s", &rates->drift_sigma_rad_s,
-      "1 sigma of its change from span to span, per axis [rad/s]");
-  Add("rotation_rate_min_sigma_rad", &rates->min_rotation_sigma_rad,
-      "least error granted to a pair's rotation [rad]");
 }
 
 void GlobalOptionAdder::AddMount() {
@@ -136,8 +125,6 @@ void GlobalOptionAdder::AddStructure() {
   Add("min_num_tracks_per_image",
       &stage_->structure.tracks.min_num_tracks_per_image,
       "tracks are taken while an image has fewer");
-  Add("max_num_tracks", &stage_->structure.tracks.max_num_tracks,
-      "largest number of tracks; -1: no bound");
   Add("num_rounds", &stage_->structure.num_rounds,
       "rounds of triangulation and bundle adjustment");
   Add("final_max_reproj_error_px", &stage_->structure.final_max_reproj_error_px,
@@ -186,8 +173,6 @@ void GlobalOptionAdder::AddAblations() {
       "least-squares relative poses");
   Add("correct_camera_mount", &stage_->poses.camera_mount.enabled,
       "take a wrong rotation of T_cam_imu out of the priors, by vision");
-  Add("correct_rotation_rates", &stage_->poses.rotation_rates.enabled,
-      "take the gyroscope's remaining bias out of the priors, by vision");
   Add("refine_translations", &stage_->poses.translations.enabled,
       "directions anew under the global rotations");
   Add("use_augmentation", &stage_->poses.augmentation.enabled,

@@ -15,7 +15,6 @@
 namespace adasfm {
 namespace {
 
-constexpr char kTable[] = "adasfm_prior_corrections";
 constexpr char kMountTable[] = "adasfm_camera_mount";
 
 std::array<double, 4> ToQvec(const Eigen::Quaterniond& q) {
@@ -41,65 +40,23 @@ void WriteCameraMount(const Eigen::Quaterniond& camera_mount,
   statement.Step();
 }
 
-std::map<image_t, std::string> ReadNames(SqliteConnection* database) {
-  std::map<image_t, std::string> names;
-  for (DatabaseImage& image : ReadImages(database)) {
-    names[image.image_id] = std::move(image.name);
-  }
-  return names;
-}
-
-const std::string& NameOf(const std::map<image_t, std::string>& names,
-                          image_t image_id) {
-  const auto name = names.find(image_id);
-  if (name != names.end()) return name->second;
-  throw SqliteError("no image with the id " + std::to_string(image_id));
-}
-
-void WriteRotations(const std::vector<RelativePosePrior>& priors,
-                    SqliteConnection* database) {
-  database->Execute(
-      "CREATE TABLE adasfm_prior_corrections ("
-      "image_id1 INTEGER NOT NULL, image_id2 INTEGER NOT NULL, "
-      "name1 TEXT NOT NULL, name2 TEXT NOT NULL, qvec BLOB NOT NULL, "
-      "PRIMARY KEY (image_id1, image_id2))");
-  const std::map<image_t, std::string> names = ReadNames(database);
-  SqliteStatement statement(
-      database, "INSERT INTO adasfm_prior_corrections VALUES (?, ?, ?, ?, ?)");
-  for (const RelativePosePrior& prior : priors) {
-    statement.Reset();
-    statement.BindInt(1, prior.image_id1);
-    statement.BindInt(2, prior.image_id2);
-    statement.BindText(3, NameOf(names, prior.image_id1));
-    statement.BindText(4, NameOf(names, prior.image_id2));
-    BindDoubles(&statement, 5, ToQvec(prior.cam2_from_cam1.rotation).data(), 4);
-    statement.Step();
-  }
-}
-
 }  // namespace
 
-void WritePriorCorrections(const PriorCorrections& corrections,
-                           SqliteConnection* database) {
+void WritePriorCorrections(
+    const std::optional<Eigen::Quaterniond>& camera_mount,
+    SqliteConnection* database) {
   RemovePriorCorrections(database);
-  if (corrections.priors.empty() && !corrections.camera_mount) return;
+  if (!camera_mount) return;
   CreateMetaTable(database);
-  if (corrections.camera_mount) {
-    WriteCameraMount(*corrections.camera_mount, database);
-  }
-  if (!corrections.priors.empty()) {
-    WriteRotations(corrections.priors, database);
-  }
+  WriteCameraMount(*camera_mount, database);
 }
 
 bool HasPriorCorrections(SqliteConnection* database) {
-  return database->HasTable(kTable) || database->HasTable(kMountTable);
+  return database->HasTable(kMountTable);
 }
 
 void RemovePriorCorrections(SqliteConnection* database) {
-  for (const char* table : {kTable, kMountTable}) {
-    database->Execute(std::string("DROP TABLE IF EXISTS ") + table);
-  }
+  database->Execute(std::string("DROP TABLE IF EXISTS ") + kMountTable);
 }
 
 std::optional<Eigen::Quaterniond> ReadCameraMount(SqliteConnection* database) {
@@ -114,23 +71,6 @@ void ApplyPriorCorrections(SqliteConnection* database,
                            std::vector<RelativePosePrior>* priors) {
   if (const auto camera_mount = ReadCameraMount(database)) {
     for (RelativePosePrior& prior : *priors) TurnPrior(*camera_mount, &prior);
-  }
-  if (!database->HasTable(kTable)) return;
-  std::map<std::pair<std::string, std::string>, Eigen::Quaterniond> rotations;
-  SqliteStatement statement(
-      database, std::string("SELECT name1, name2, qvec FROM ") + kTable);
-  while (statement.Step()) {
-    const std::string row = std::string("table ") + kTable + ", images " +
-                            statement.Text(0) + " and " + statement.Text(1);
-    rotations[{statement.Text(0), statement.Text(1)}] =
-        ReadRotation(statement, 2, row);
-  }
-  const std::map<image_t, std::string> names = ReadNames(database);
-  for (RelativePosePrior& prior : *priors) {
-    const auto rotation = rotations.find(
-        {NameOf(names, prior.image_id1), NameOf(names, prior.image_id2)});
-    if (rotation == rotations.end()) continue;
-    prior.cam2_from_cam1.rotation = rotation->second;
   }
 }
 

@@ -11,23 +11,17 @@
 namespace adasfm {
 
 // What adasfm_global corrected of the priors (docs/reference/formats.md): the
-// table adasfm_camera_mount has the one turn by which T_cam_imu was wrong, the
-// table adasfm_prior_corrections the rotations of priors whose gyroscope vision
-// corrected, in cameras turned so. The priors themselves stay as they were
-// imported, so that a second run starts from them; a new import removes the
-// corrections. All functions throw SqliteError.
-struct PriorCorrections {
-  // The true camera frame from the one that T_cam_imu states; none when the
-  // mount is right.
-  std::optional<Eigen::Quaterniond> camera_mount;
-  // Only the rotations are kept; empty when they are right.
-  std::vector<RelativePosePrior> priors;
-};
+// table adasfm_camera_mount has the one turn by which T_cam_imu was wrong. The
+// priors themselves stay as they were imported, so that a second run starts
+// from them; a new import removes the correction. All functions throw
+// SqliteError.
 
-// Replaces all corrections. The database must have the priors' images. Without
-// corrections nothing of the tables remains. Within the caller's transaction.
-void WritePriorCorrections(const PriorCorrections& corrections,
-                           SqliteConnection* database);
+// Replaces the true camera frame from the one that T_cam_imu states; none when
+// the mount is right: nothing of the table remains. Within the caller's
+// transaction.
+void WritePriorCorrections(
+    const std::optional<Eigen::Quaterniond>& camera_mount,
+    SqliteConnection* database);
 
 bool HasPriorCorrections(SqliteConnection* database);
 void RemovePriorCorrections(SqliteConnection* database);
@@ -35,8 +29,7 @@ void RemovePriorCorrections(SqliteConnection* database);
 // None when there is none.
 std::optional<Eigen::Quaterniond> ReadCameraMount(SqliteConnection* database);
 
-// Turns the priors by the camera's mount, and gives them their corrected
-// rotations, where there are any. Rows are matched by image name.
+// Turns the priors by the camera's mount, where there is one.
 void ApplyPriorCorrections(SqliteConnection* database,
                            std::vector<RelativePosePrior>* priors);
 

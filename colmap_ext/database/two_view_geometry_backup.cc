@@ -260,10 +260,11 @@ void RemoveRows(const std::vector<ImagePair>& pairs,
 
 }  // namespace
 
-Status RewriteTwoViewGeometries(const std::string& database_path,
-                                const std::vector<NewTwoViewGeometry>& rows,
-                                const std::vector<ImagePair>& removed,
-                                const PriorCorrections& corrections) {
+Status RewriteTwoViewGeometries(
+    const std::string& database_path,
+    const std::vector<NewTwoViewGeometry>& rows,
+    const std::vector<ImagePair>& removed,
+    const std::optional<Eigen::Quaterniond>& camera_mount) {
   const Status checked = CheckDatabase(database_path);
   if (!checked.ok()) return checked;
   std::vector<ImagePair> pairs = removed;
@@ -278,7 +279,7 @@ Status RewriteTwoViewGeometries(const std::string& database_path,
     RemoveRows(removed, &database);
     WriteTwoViewGeometries(&database, rows);
     RecordDigests(rows, &database);
-    WritePriorCorrections(corrections, &database);
+    WritePriorCorrections(camera_mount, &database);
     transaction.Commit();
   } catch (const SqliteError& error) {
     return Status::Error("cannot rewrite the two-view geometries of " +

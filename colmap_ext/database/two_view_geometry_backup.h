@@ -22,10 +22,11 @@ namespace adasfm {
 // `removed`, and writes the corrections of priors, all in one transaction. What
 // an earlier call replaced is put back first, so calling twice equals calling
 // once. On error nothing has changed.
-Status RewriteTwoViewGeometries(const std::string& database_path,
-                                const std::vector<NewTwoViewGeometry>& rows,
-                                const std::vector<ImagePair>& removed,
-                                const PriorCorrections& corrections = {});
+Status RewriteTwoViewGeometries(
+    const std::string& database_path,
+    const std::vector<NewTwoViewGeometry>& rows,
+    const std::vector<ImagePair>& removed,
+    const std::optional<Eigen::Quaterniond>& camera_mount = {});
 
 struct RestoreSummary {
   int num_restored = 0;

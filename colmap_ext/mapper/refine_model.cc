@@ -180,10 +180,7 @@ class ModelRefiner {
         balance, options, problem, &reconstruction_, keypoint_sigma_factor);
     summary_.num_iterations += adjustment.num_iterations;
     summary_.keypoint_sigma_px = adjustment.keypoint_sigma_px;
-    summary_.prior_chi2_per_dof = ComputePriorChi2PerDof(
-        CorrectSharedErrors(options.shared_errors, adjustment.shared_errors,
-                            problem.priors),
-        reconstruction_);
+    summary_.prior_chi2_per_dof = adjustment.prior_chi2_per_dof;
   }
 
   // The coarse model, and so this one, is in the frame of the positions.

@@ -103,12 +103,13 @@ void StartFromSdp(const RotationAveragingOptions& options,
   const RotationSdpSolution solution =
       SolveRotationSdp(sdp_options, edges, *rotations);
   result->sdp_rank = solution.rank;
-  result->sdp_optimality = solution.optimality;
   // The relaxation is of plain squares: wrong edges may have bent it.
   if (SumOfAbsoluteErrors(edges, solution.rotations) <
       SumOfAbsoluteErrors(edges, *rotations)) {
     *rotations = solution.rotations;
   }
+  result->sdp_optimality =
+      ComputeOptimality(edges, *rotations, solution.lower_bound);
 }
 
 // The cost of a node's edges when it has this rotation.

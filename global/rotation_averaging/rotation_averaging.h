@@ -43,7 +43,8 @@ struct GlobalRotations {
   std::map<image_t, Eigen::Quaterniond> cams_from_world;
   int num_iterations = 0;
   // The start: rank reached, and a lower bound of the optimum's share in the
-  // cost of the start (1: certified optimal, 0: nothing known).
+  // cost of the rotations that the averaging began with, in plain squares (1:
+  // certified optimal, 0: nothing known).
   int sdp_rank = 0;
   double sdp_optimality = 0.0;
 };

@@ -102,6 +102,11 @@ Eigenpair SmallestEigenpair(const RotationSdpProblem& problem,
   return pair;
 }
 
+// Round-off.
+double NegligibleCost(const std::vector<RotationEdge>& edges) {
+  return 1e-12 * edges.size();
+}
+
 // One more column, along the direction of negative curvature.
 void RaiseRank(const Eigen::VectorXd& direction,
                std::vector<RotationBlock>* blocks) {
@@ -150,7 +155,7 @@ RotationSdpSolution SolveRotationSdp(
     block.leftCols<3>() = rotation;
     blocks.push_back(block);
   }
-  const double negligible = 1e-12 * edges.size();  // round-off
+  const double negligible = NegligibleCost(edges);
   Eigenpair smallest;
   while (true) {
     Descend(options, problem, &blocks);
@@ -167,10 +172,21 @@ RotationSdpSolution SolveRotationSdp(
       CertificateMatrix(problem, blocks), std::max(0.0, -smallest.value));
   solution.lower_bound =
       std::max(0.0, solution.cost - 3.0 * blocks.size() * bound);
-  solution.optimality =
-      solution.cost <= negligible ? 1.0 : solution.lower_bound / solution.cost;
   solution.rotations = RoundToRotations(blocks);
+  // Of the rotations, not of the relaxation: rounding may cost.
+  solution.optimality =
+      ComputeOptimality(edges, solution.rotations, solution.lower_bound);
   return solution;
+}
+
+double ComputeOptimality(const std::vector<RotationEdge>& edges,
+                         const std::vector<Eigen::Matrix3d>& rotations,
+                         double lower_bound) {
+  const double cost =
+      RotationSdpProblem(edges, rotations.size())
+          .Cost(std::vector<RotationBlock>(rotations.begin(), rotations.end()));
+  return cost <= NegligibleCost(edges) ? 1.0
+                                       : std::min(1.0, lower_bound / cost);
 }
 
 }  // namespace adasfm

@@ -29,7 +29,8 @@ struct RotationSdpSolution {
   double cost = 0.0;
   // No rotations cost less; proven by a factorisation (rotation_certificate.h).
   double lower_bound = 0.0;
-  // lower_bound / cost, in [0, 1]; 1 when the cost is round-off.
+  // lower_bound over the cost of `rotations`, in [0, 1]; 1 when that is
+  // round-off.
   double optimality = 0.0;
 };
 
@@ -41,5 +42,11 @@ struct RotationSdpSolution {
 RotationSdpSolution SolveRotationSdp(const RotationSdpOptions& options,
                                      const std::vector<RotationEdge>& edges,
                                      const std::vector<Eigen::Matrix3d>& start);
+
+// The bound over the cost of these rotations, in [0, 1]; 1 when that is
+// round-off.
+double ComputeOptimality(const std::vector<RotationEdge>& edges,
+                         const std::vector<Eigen::Matrix3d>& rotations,
+                         double lower_bound);
 
 }  // namespace adasfm

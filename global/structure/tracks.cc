@@ -119,10 +119,6 @@ std::vector<Track> SelectNeededTracks(const TrackOptions& options,
   std::map<image_t, int> num_tracks;
   std::vector<Track> selected;
   for (Track& track : tracks) {
-    if (options.max_num_tracks >= 0 &&
-        selected.size() >= options.max_num_tracks) {
-      break;
-    }
     const bool is_needed = std::any_of(
         track.begin(), track.end(), [&](const TrackElement& element) {
           return num_tracks[element.image_id] <
@@ -151,11 +147,6 @@ bool TrackOptions::IsValid(std::string* error) const {
   if (min_num_tracks_per_image < 1) {
     *error = "min_num_tracks_per_image = " +
              std::to_string(min_num_tracks_per_image) + " must be >= 1";
-    return false;
-  }
-  if (max_num_tracks < -1) {
-    *error =
-        "max_num_tracks = " + std::to_string(max_num_tracks) + " must be >= -1";
     return false;
   }
   return true;

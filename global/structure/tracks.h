@@ -36,8 +36,6 @@ struct TrackOptions {
   // Tracks are taken, longest first, while they help an image that has fewer
   // than this many yet.
   int min_num_tracks_per_image = 120;
-  // Bound of the number of tracks, whatever the images; -1: none.
-  int max_num_tracks = 200000;
 
   bool IsValid(std::string* error) const;
 };

@@ -26,7 +26,6 @@ VARIANTS = {
     'no SDP start': ['use_sdp_start'],
     'no loop gating': ['use_loop_gating'],
     'no refinement of relative poses': ['refine_relative_poses'],
-    'no correction of rotation rates': ['correct_rotation_rates'],
     'no refinement of translations': ['refine_translations'],
     'no augmentation': ['use_augmentation'],
     'no metric lengths (unit vectors)': ['use_metric_lengths'],

@@ -46,37 +46,6 @@ TEST(CheckLogs, RefusesImagesInMicroseconds) {
   EXPECT_NE(status.message().find("microseconds"), std::string::npos);
 }
 
-TEST(CheckLogs, RaisesNoiseFiguresThatAreTooSmall) {
-  Dataset data = Drive();
-  const double truth = data.calibration.imu_noise.gyroscope_noise_density;
-  data.calibration.imu_noise.gyroscope_noise_density /= 100.0;
-  data.calibration.imu_noise.accelerometer_noise_density /= 100.0;
-  data.calibration.wheel_speed_noise /= 100.0;
-  const MotionLogs logs = {
-      data.logs.imu, ComputeWheelSpeeds(data.logs.wheel, data.calibration), {}};
-  std::vector<std::string> warnings;
-  RaiseNoiseFigures(logs, &data.calibration, &warnings);
-  EXPECT_EQ(warnings.size(), 3u);
-  EXPECT_NEAR(data.calibration.imu_noise.gyroscope_noise_density, truth,
-              0.2 * truth);
-  EXPECT_NEAR(data.calibration.wheel_speed_noise, 0.05, 0.02);
-}
-
-TEST(CheckLogs, LeavesRightNoiseFigures) {
-  for (const char* name :
-       {"", "kitti01-51", "kitti06-51", "kitti07-160", "comma2k19-ex1"}) {
-    Dataset data = Drive();
-    if (name[0] != '\0' && !ReadDataset(name, &data)) continue;
-    const MotionLogs logs = {
-        data.logs.imu,
-        ComputeWheelSpeeds(data.logs.wheel, data.calibration),
-        {}};
-    std::vector<std::string> warnings;
-    RaiseNoiseFigures(logs, &data.calibration, &warnings);
-    EXPECT_TRUE(warnings.empty()) << name << ": " << warnings.front();
-  }
-}
-
 TEST(CheckLogs, NamesAWheelScaleFarFromOne) {
   bool is_error = true;
   EXPECT_EQ(DescribeWheelScale(1.1, &is_error), "");

@@ -77,7 +77,8 @@ TEST_P(PosePriorCostTest, JacobiansEqualNumericOnes) {
     Random random(seed);
     AdjustedPose pose1 = RandomPose(&random);
     AdjustedPose pose2 = RandomPose(&random);
-    const PosePriorCost cost(RandomEdge(&random), GetParam(), &pose1, &pose2);
+    const PosePriorCost cost(RandomEdge(&random), GetParam(), 1.0, &pose1,
+                             &pose2);
     const auto changed = [&] {
       pose1.Update();
       pose2.Update();
@@ -99,7 +100,7 @@ TEST_P(PosePriorCostTest, IsZeroAtTheMeasurement) {
     PosePriorEdge edge = RandomEdge(&random);
     edge.cam2_from_cam1 =
         ComputeCam2FromCam1(pose1.CamFromWorld(), pose2.CamFromWorld());
-    const PosePriorCost cost(edge, GetParam(), &pose1, &pose2);
+    const PosePriorCost cost(edge, GetParam(), 1.0, &pose1, &pose2);
     const double* parameters[] = {pose1.parameters, pose2.parameters};
     std::vector<double> residuals(cost.num_residuals());
     cost.Evaluate(parameters, residuals.data(), nullptr);
@@ -114,7 +115,7 @@ TEST_P(PosePriorCostTest, JacobiansBySharedErrorsEqualNumericOnes) {
     AdjustedPose pose2 = RandomPose(&random);
     PosePriorEdge edge = RandomEdge(&random);
     edge.dt_s = 0.3;
-    const PosePriorCost cost(edge, GetParam(), &pose1, &pose2);
+    const PosePriorCost cost(edge, GetParam(), 1.0, &pose1, &pose2);
     Eigen::Vector3d shared[] = {random.GaussianVector(0.1),
                                 random.GaussianVector(0.1)};
     std::vector<double*> parameters = {pose1.parameters, pose2.parameters,
@@ -146,7 +147,7 @@ TEST_P(PosePriorCostTest, SharedErrorsAreThoseThatCorrectTakesOut) {
     AdjustedPose pose1 = RandomPose(&random);
     AdjustedPose pose2(errors.Correct(edge.cam2_from_cam1, edge.dt_s, {}) *
                        pose1.CamFromWorld());
-    const PosePriorCost cost(edge, GetParam(), &pose1, &pose2);
+    const PosePriorCost cost(edge, GetParam(), 1.0, &pose1, &pose2);
     const bool is_rotation = GetParam() == PosePriorCost::Term::kRotation;
     const double* parameters[] = {pose1.parameters, pose2.parameters,
                                   is_rotation ? errors.extrinsic_rotation.data()

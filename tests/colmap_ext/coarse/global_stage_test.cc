@@ -301,9 +301,8 @@ TEST(RunGlobalStageTest, ReportsEveryStep) {
   for (const StepReport& step : result.steps) {
     EXPECT_NE(json.find("\"" + step.name + "\""), std::string::npos);
   }
-  for (const char* figure :
-       {"direction_agreement", "least_direction_agreement",
-        "rotation_optimality", "max_track_bytes", "rotation_rates"}) {
+  for (const char* figure : {"direction_agreement", "least_direction_agreement",
+                             "rotation_optimality", "max_track_bytes"}) {
     EXPECT_NE(json.find("\"" + std::string(figure) + "\""), std::string::npos)
         << figure;
   }

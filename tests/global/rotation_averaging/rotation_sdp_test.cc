@@ -138,7 +138,9 @@ TEST(SolveRotationSdp, BoundsTheCostOfAllRotations) {
         SolveRotationSdp(options, problem.edges, RandomRotations(12, &random));
     EXPECT_LE(solution.lower_bound, solution.cost);
     EXPECT_LE(solution.lower_bound, costs.Cost(BlocksOf(problem.truth)));
-    EXPECT_LE(solution.lower_bound, costs.Cost(BlocksOf(solution.rotations)));
+    const double rounded_cost = costs.Cost(BlocksOf(solution.rotations));
+    EXPECT_LE(solution.lower_bound, rounded_cost);
+    EXPECT_NEAR(solution.optimality, solution.lower_bound / rounded_cost, 1e-9);
     // Descent from the rounded solution and from the truth cannot go below.
     for (const auto& start : {solution.rotations, problem.truth}) {
       RotationSdpOptions fixed_rank;

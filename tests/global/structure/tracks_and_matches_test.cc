@@ -34,8 +34,6 @@ TEST(BuildTracks, KeepsOneKeypointPerImage) {
   TrackOptions options;
   options.min_track_length = 2;
   EXPECT_EQ(BuildTracks(options, matches).size(), 3);
-  options.max_num_tracks = 1;
-  EXPECT_EQ(BuildTracks(options, matches).size(), 1);
   options = TrackOptions();
   options.min_num_tracks_per_image = 1;
   EXPECT_EQ(BuildTracks(options, matches).size(), 1);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "sensors/preintegration/imu_noise.h"
+#include "sensors/noise_figures.h"
 
 #include <gtest/gtest.h>
 
@@ -7,11 +7,23 @@
 
 #include "core/random.h"
 #include "core/so3.h"
+#include "tests/testing/sensors/synthetic_dataset.h"
 
 namespace adasfm {
 namespace {
 
 constexpr double kRateHz = 200.0;
+
+ImuNoise RaiseToLog(const std::vector<ImuSample>& samples,
+                    const ImuNoise& stated) {
+  MotionLogs logs;
+  logs.imu = samples;
+  SensorCalibration calibration;
+  calibration.imu_noise = stated;
+  std::vector<std::string> warnings;
+  RaiseNoiseFigures(logs, &calibration, &warnings);
+  return calibration.imu_noise;
+}
 
 // White noise of the given densities on a motion that turns and accelerates.
 std::vector<ImuSample> Samples(const ImuNoise& noise, uint64_t seed,
@@ -43,7 +55,7 @@ std::vector<ImuSample> Samples(const ImuNoise& noise, uint64_t seed,
 
 // Second differences of 20 s at 200 Hz tell a density to 2 %; a quarter of the
 // stretches and the least of three estimates are a little below it.
-TEST(ImuNoise, AFigureThatIsTooSmallIsRaisedToTheLog) {
+TEST(NoiseFigures, AFigureThatIsTooSmallIsRaisedToTheLog) {
   const ImuNoise truth;
   ImuNoise stated = truth;
   stated.gyroscope_noise_density /= 3.0;
@@ -59,7 +71,7 @@ TEST(ImuNoise, AFigureThatIsTooSmallIsRaisedToTheLog) {
   }
 }
 
-TEST(ImuNoise, RightAndLargeFiguresAreKept) {
+TEST(NoiseFigures, RightAndLargeFiguresAreKept) {
   const ImuNoise truth;
   for (const double factor : {1.0, 3.0}) {
     ImuNoise stated = truth;
@@ -76,26 +88,57 @@ TEST(ImuNoise, RightAndLargeFiguresAreKept) {
 
 // Vibration is motion: it is at one frequency, white noise at all. In
 // neighbouring samples it is 3e-3 rad/s/sqrt(Hz).
-TEST(ImuNoise, VibrationIsNoNoise) {
+TEST(NoiseFigures, VibrationIsNoNoise) {
   const ImuNoise truth;
   const ImuNoise noise = RaiseToLog(Samples(truth, 1, 0.05), truth);
   EXPECT_LT(noise.gyroscope_noise_density, 1.5 * truth.gyroscope_noise_density);
 }
 
 // In a filtered log neighbours differ little, which is no small noise.
-TEST(ImuNoise, AFilteredLogIsNotBelieved) {
+TEST(NoiseFigures, AFilteredLogIsNotBelieved) {
   const ImuNoise truth;
   const ImuNoise noise = RaiseToLog(Samples(truth, 1, 0.0, 0.05), truth);
   EXPECT_EQ(noise.gyroscope_noise_density, truth.gyroscope_noise_density);
 }
 
-TEST(ImuNoise, AShortLogChangesNothing) {
+TEST(NoiseFigures, AShortLogChangesNothing) {
   std::vector<ImuSample> samples = Samples(ImuNoise(), 1);
   ImuNoise stated;
   stated.gyroscope_noise_density = 1e-6;
   samples.resize(800);
   EXPECT_EQ(RaiseToLog(samples, stated).gyroscope_noise_density, 1e-6);
   EXPECT_EQ(RaiseToLog({}, stated).gyroscope_noise_density, 1e-6);
+}
+
+TEST(NoiseFigures, FarTooSmallOnesAreSaid) {
+  Dataset data = ToDataset(BuildSyntheticWorld(SmallWorld(1)));
+  const double truth = data.calibration.imu_noise.gyroscope_noise_density;
+  data.calibration.imu_noise.gyroscope_noise_density /= 100.0;
+  data.calibration.imu_noise.accelerometer_noise_density /= 100.0;
+  data.calibration.wheel_speed_noise /= 100.0;
+  const MotionLogs logs = {
+      data.logs.imu, ComputeWheelSpeeds(data.logs.wheel, data.calibration), {}};
+  std::vector<std::string> warnings;
+  RaiseNoiseFigures(logs, &data.calibration, &warnings);
+  EXPECT_EQ(warnings.size(), 3u);
+  EXPECT_NEAR(data.calibration.imu_noise.gyroscope_noise_density, truth,
+              0.2 * truth);
+  EXPECT_NEAR(data.calibration.wheel_speed_noise, 0.05, 0.02);
+}
+
+TEST(NoiseFigures, RightOnesOfRealLogsAreNotAccused) {
+  for (const char* name :
+       {"", "kitti01-51", "kitti06-51", "kitti07-160", "comma2k19-ex1"}) {
+    Dataset data = ToDataset(BuildSyntheticWorld(SmallWorld(1)));
+    if (name[0] != '\0' && !ReadDataset(name, &data)) continue;
+    const MotionLogs logs = {
+        data.logs.imu,
+        ComputeWheelSpeeds(data.logs.wheel, data.calibration),
+        {}};
+    std::vector<std::string> warnings;
+    RaiseNoiseFigures(logs, &data.calibration, &warnings);
+    EXPECT_TRUE(warnings.empty()) << name << ": " << warnings.front();
+  }
 }
 
 }  // namespace

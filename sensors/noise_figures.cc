@@ -1,0 +1,133 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "sensors/noise_figures.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "core/types.h"
+#include "sensors/io/format_figures.h"
+
+namespace adasfm {
+namespace {
+
+constexpr double kStretchS = 1.0;
+constexpr size_t kMinNumStretches = 8;
+// The share of the stretches that is quieter.
+constexpr double kQuietShare = 0.25;
+// Stated figures are kept within this factor: estimates err by some percent.
+constexpr double kMinFactor = 1.2;
+// A figure this much too small is another sensor's, or in another unit.
+constexpr double kWrongFactor = 5.0;
+
+// The readings of one quantity, in order of time.
+struct Readings {
+  std::vector<timestamp_t> times_ns;
+  std::vector<Eigen::Vector3d> values;
+  int num_axes = 3;
+
+  void Add(timestamp_t time_ns, const Eigen::Vector3d& value) {
+    times_ns.push_back(time_ns);
+    values.push_back(value);
+  }
+  double PeriodS() const {
+    return SecondsFromNs(times_ns.back() - times_ns.front()) /
+           (times_ns.size() - 1.0);
+  }
+};
+
+// The quantile of the quiet share of a chi-square of n degrees of freedom over
+// n (Wilson and Hilferty).
+double QuietQuantile(double n) {
+  constexpr double kNormalQuantile = -0.6745;
+  const double spread = 2.0 / (9.0 * n);
+  return std::pow(1.0 - spread + kNormalQuantile * std::sqrt(spread), 3);
+}
+
+// Squared density, from second differences of the means over blocks of
+// readings; infinite when the log is too short.
+double QuietDensity2(const Readings& readings, size_t block) {
+  constexpr double kUnknown = std::numeric_limits<double>::infinity();
+  const double period_s = readings.PeriodS();
+  const size_t num_triples = static_cast<size_t>(
+      kStretchS / (3.0 * static_cast<double>(block) * period_s));
+  if (num_triples == 0) return kUnknown;
+  const auto mean = [&](size_t first) {
+    Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+    for (size_t i = first; i < first + block; ++i) sum += readings.values[i];
+    return Eigen::Vector3d(sum / static_cast<double>(block));
+  };
+  const double num_differences =
+      static_cast<double>(readings.num_axes) * num_triples;
+  std::vector<double> variances;
+  const size_t stretch = 3 * block * num_triples;
+  for (size_t start = 0; start + stretch <= readings.values.size();
+       start += stretch) {
+    double sum = 0.0;
+    for (size_t i = start; i < start + stretch; i += 3 * block) {
+      sum +=
+          (mean(i) - 2.0 * mean(i + block) + mean(i + 2 * block)).squaredNorm();
+    }
+    // The difference of white noise has six times the variance of a mean.
+    if (sum > 0.0) variances.push_back(sum / (6.0 * num_differences));
+  }
+  if (variances.size() < kMinNumStretches) return kUnknown;
+  const auto quiet =
+      variances.begin() + static_cast<int64_t>(kQuietShare * variances.size());
+  std::nth_element(variances.begin(), quiet, variances.end());
+  return *quiet / QuietQuantile(num_differences) * static_cast<double>(block) *
+         period_s;
+}
+
+// 0 when the log does not tell.
+double LeastDensity(const Readings& readings) {
+  if (readings.values.size() < 2) return 0.0;
+  double least = std::numeric_limits<double>::infinity();
+  for (const size_t block : {1, 4, 16}) {
+    least = std::min(least, QuietDensity2(readings, block));
+  }
+  return std::isfinite(least) ? std::sqrt(least) : 0.0;
+}
+
+void Raise(const char* name, double shown, double min_factor, double* figure,
+           std::vector<std::string>* warnings) {
+  if (shown <= min_factor * *figure) return;
+  if (shown > kWrongFactor * *figure) {
+    warnings->push_back(
+        std::string(name) +
+        FormatFigures(" is %.3g, but the log's noise in its quietest seconds "
+                      "is %.3g, which is used: correct the noise figures",
+                      *figure, shown));
+  }
+  *figure = shown;
+}
+
+}  // namespace
+
+void RaiseNoiseFigures(const MotionLogs& logs, SensorCalibration* calibration,
+                       std::vector<std::string>* warnings) {
+  Readings rates, forces;
+  for (const ImuSample& sample : logs.imu) {
+    rates.Add(sample.timestamp_ns, sample.angular_velocity);
+    forces.Add(sample.timestamp_ns, sample.specific_force);
+  }
+  ImuNoise& noise = calibration->imu_noise;
+  Raise("gyroscope_noise_density", LeastDensity(rates), kMinFactor,
+        &noise.gyroscope_noise_density, warnings);
+  Raise("accelerometer_noise_density", LeastDensity(forces), kMinFactor,
+        &noise.accelerometer_noise_density, warnings);
+  if (CountsTicks(calibration->wheel_type) || logs.wheel.size() < 2) return;
+  Readings speeds;
+  speeds.num_axes = 1;
+  for (const WheelSpeed& speed : logs.wheel) {
+    speeds.Add(speed.timestamp_ns, Eigen::Vector3d(speed.speed, 0.0, 0.0));
+  }
+  // The mean of two wheels is less noisy than one.
+  const double num_wheels =
+      calibration->wheel_type == WheelType::kDifferential ? 2.0 : 1.0;
+  Raise("speed_noise",
+        std::sqrt(num_wheels / speeds.PeriodS()) * LeastDensity(speeds),
+        kWrongFactor, &calibration->wheel_speed_noise, warnings);
+}
+
+}  // namespace adasfm

@@ -1,0 +1,31 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "sensors/io/calibration.h"
+#include "sensors/smoother/motion_logs.h"
+
+namespace adasfm {
+
+// The white noise that logs themselves show, where the stated figures are too
+// small: densities of the IMU, sigma of a wheel's speed.
+//
+// Method. White noise adds the same to the spectrum at all frequencies, motion
+// and vibration only add to it. Second differences of means over 1, 4 and 16
+// samples give the density at three frequencies, in stretches of one second; a
+// log's quieter quarter of them counts, without those that do not change at all
+// (wheels at rest). The least of the three is the most that white noise can be,
+// and at least as much as it is. A stated density of the IMU below it by more
+// than chance is raised to it; the speed of wheels, which is uneven for more
+// reasons, when it is less than a fifth of it. A figure that small is another
+// sensor's or in another unit: it is said in `warnings`. One above is kept,
+// since a log may be filtered, and its errors (scale, alignment, time stamps)
+// be more than noise.
+//
+// A log of fewer than eight stretches changes nothing.
+void RaiseNoiseFigures(const MotionLogs& logs, SensorCalibration* calibration,
+                       std::vector<std::string>* warnings);
+
+}  // namespace adasfm

@@ -1,0 +1,127 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "colmap_ext/bundle_adjustment/prior_components.h"
+
+#include <gtest/gtest.h>
+
+#include "colmap_ext/bundle_adjustment/balance_priors.h"
+#include "colmap_ext/host/pose_conversion.h"
+#include "colmap_ext/mapper/local_mapper.h"
+#include "core/random.h"
+#include "core/so3.h"
+#include "tests/testing/colmap_ext/mapper_world.h"
+
+namespace adasfm {
+namespace {
+
+constexpr PriorSigmaFactors kStated = {1.0, 1.0, 1.0, 1.0};
+
+MapperWorld BuildDrive(uint64_t seed) {
+  MapperWorldOptions options;
+  options.world.num_images = 120;
+  options.world.seed = seed;
+  return BuildMapperWorld(options);
+}
+
+colmap::Reconstruction Reconstruct(const MapperWorld& world) {
+  std::set<image_t> images;
+  for (const auto& image : world.data.images) images.insert(image.first);
+  return ReconstructLocally({}, world.data, world.coarse_poses, images)
+      .reconstruction;
+}
+
+PriorBundleAdjustmentProblem ProblemOf(
+    const MapperWorld& world, const colmap::Reconstruction& reconstruction,
+    double sigma_factor) {
+  PriorBundleAdjustmentProblem problem;
+  problem.images = {reconstruction.RegImageIds().begin(),
+                    reconstruction.RegImageIds().end()};
+  for (RelativePosePrior prior : world.data.priors) {
+    prior.covariance *= sigma_factor * sigma_factor;
+    problem.priors.push_back(PosePriorEdgeFromPrior(prior));
+  }
+  return problem;
+}
+
+// Poses that nothing but the priors holds follow a single measurement of each
+// motion wholly, and two by half.
+TEST(PriorComponents, RedundancyIsWhatMeasurementsTestOfEachOther) {
+  const MapperWorld world = BuildDrive(1);
+  colmap::Reconstruction model = Reconstruct(world);
+  PriorBundleAdjustmentProblem problem = ProblemOf(world, model, 1.0);
+  for (const colmap::point3D_t point_id : model.Point3DIds()) {
+    model.DeletePoint3D(point_id);
+  }
+  for (PosePriorEdge& edge : problem.priors) {
+    edge.cam2_from_cam1 =
+        ComputeCam2FromCam1(CamFromWorld(model.Image(edge.image_id1)),
+                            CamFromWorld(model.Image(edge.image_id2)));
+  }
+  PriorBundleAdjustmentOptions options;
+  options.shared_errors.enabled = false;
+  for (const int num_measurements : {1, 2, 4}) {
+    PriorBundleAdjustmentProblem repeated = problem;
+    for (int k = 1; k < num_measurements; ++k) {
+      repeated.priors.insert(repeated.priors.end(), problem.priors.begin(),
+                             problem.priors.end());
+    }
+    PriorComponents components =
+        ComputePriorComponents(kStated, repeated.priors, model);
+    ASSERT_TRUE(
+        EstimateRedundancies(options, repeated, {}, model, &components));
+    const double share = 1.0 - 1.0 / num_measurements;
+    for (int k = 0; k < 3; ++k) {
+      EXPECT_GT(components[k].num_residuals, 100 * num_measurements);
+      EXPECT_NEAR(components[k].redundancy_share, share, 0.12)
+          << num_measurements << " measurements, term " << k;
+      // I - H is a projection here.
+      EXPECT_NEAR(components[k].own_share, components[k].redundancy_share,
+                  0.05);
+    }
+  }
+}
+
+TEST(PriorComponents, LeavesOutWhatSensorsDidNotMeasure) {
+  const MapperWorld world = BuildDrive(1);
+  const colmap::Reconstruction model = Reconstruct(world);
+  std::vector<PosePriorEdge> priors = ProblemOf(world, model, 1.0).priors;
+  const double chi2 = ComputePriorChi2PerDof(priors, model);
+  PosePriorEdge guess = priors.front();
+  guess.dt_s = -1.0;
+  guess.cam2_from_cam1.translation *= 10.0;
+  for (int k = 0; k < 100; ++k) priors.push_back(guess);
+  EXPECT_EQ(ComputePriorChi2PerDof(priors, model), chi2);
+}
+
+// Sigmas that are stated three times too large end within 40 % of the truth,
+// and the chi-square at 1; right ones stay.
+TEST(AdjustBundleInBalance, LowersSigmasThatResidualsRefute) {
+  for (uint64_t seed = 1; seed <= 3; ++seed) {
+    const MapperWorld world = BuildDrive(seed);
+    const colmap::Reconstruction start = Reconstruct(world);
+    const auto adjust = [&](double sigma_factor, bool estimates) {
+      colmap::Reconstruction model = start;
+      PriorBalanceOptions balance;
+      balance.estimate_prior_sigmas = estimates;
+      double factor = 1.0;
+      return AdjustBundleInBalance(
+          balance, {}, ProblemOf(world, start, sigma_factor), &model, &factor);
+    };
+    const PriorBundleAdjustmentSummary large = adjust(3.0, true);
+    const PriorBundleAdjustmentSummary kept = adjust(3.0, false);
+    const PriorBundleAdjustmentSummary right = adjust(1.0, true);
+    EXPECT_LT(kept.prior_chi2_per_dof, 0.3) << "seed " << seed;
+    EXPECT_GT(large.prior_chi2_per_dof, 0.7) << "seed " << seed;
+    EXPECT_LT(large.prior_chi2_per_dof, 1.3) << "seed " << seed;
+    EXPECT_EQ(kept.prior_sigma_factors, kStated);
+    for (const PriorTerm term : {PriorTerm::kRotation, PriorTerm::kDirection}) {
+      const auto k = static_cast<size_t>(term);
+      EXPECT_NEAR(large.prior_sigma_factors[k], 1.0 / 3.0, 0.13)
+          << "seed " << seed << ", term " << k;
+      EXPECT_GT(right.prior_sigma_factors[k], 0.7)
+          << "seed " << seed << ", term " << k;
+    }
+  }
+}
+
+}  // namespace
+}  // namespace adasfm
