@@ -88,14 +88,15 @@ TEST(RigCost, JacobiansEqualNumericOnes) {
          {PosePriorCost::Term::kRotation, PosePriorCost::Term::kTranslation}) {
       // One mount, two mounts; and a frame beside a pose of its own.
       for (const auto& [i, j] : {std::pair(1, 3), std::pair(0, 3)}) {
-        const PosePriorCost inner(edge, term, rig.poses[i].pose,
+        const PosePriorCost inner(edge, term, 1.0, rig.poses[i].pose,
                                   rig.poses[j].pose);
         const RigCost cost(&inner, {rig.poses[i], rig.poses[j]});
         EXPECT_EQ(cost.Blocks().size(), i == 1 ? 3u : 4u);
         ExpectNumericJacobians(cost, cost.Blocks(), &rig);
       }
       const RigPose reference{&rig.frames[0]};
-      const PosePriorCost inner(edge, term, reference.pose, rig.poses[2].pose);
+      const PosePriorCost inner(edge, term, 1.0, reference.pose,
+                                rig.poses[2].pose);
       const RigCost cost(&inner, {reference, rig.poses[2]});
       ExpectNumericJacobians(cost, cost.Blocks(), &rig);
     }
