@@ -13,8 +13,10 @@ namespace {
 // Calibrations of one camera differ by some tenths of a per cent.
 constexpr double kMinRatio = 0.003;
 // Priors share errors from step to step, which the cost's change does not
-// show: many sigmas, and never less than this.
+// show: against a measured focal length it takes many sigmas, and never less
+// than this sigma.
 constexpr double kMinNumSigmas = 10.0;
+constexpr double kMinNumSigmasOfUnknown = 3.0;
 constexpr double kMinSigma = 0.001;
 // Straight on such errors pass for 8 % of focal length; turns tell.
 constexpr double kMinTurnDeg = 20.0;
@@ -75,6 +77,12 @@ double FarthestRatio(const colmap::Reconstruction& before,
 
 }  // namespace
 
+bool KnowsFocalLengths(const colmap::Reconstruction& reconstruction) {
+  return std::all_of(
+      reconstruction.Cameras().begin(), reconstruction.Cameras().end(),
+      [](const auto& entry) { return entry.second.HasPriorFocalLength(); });
+}
+
 std::optional<FocalLengthError> FindFocalLengthError(
     const PriorBalanceOptions& balance,
     const PriorBundleAdjustmentOptions& options,
@@ -107,7 +115,10 @@ std::optional<FocalLengthError> FindFocalLengthError(
       variance);
   FocalLengthError error;
   error.ratio = FarthestRatio(reconstruction, free);
-  if (std::abs(error.ratio - 1.0) < kMinRatio || num_sigmas < kMinNumSigmas) {
+  const double min_num_sigmas = KnowsFocalLengths(reconstruction)
+                                    ? kMinNumSigmas
+                                    : kMinNumSigmasOfUnknown;
+  if (std::abs(error.ratio - 1.0) < kMinRatio || num_sigmas < min_num_sigmas) {
     return std::nullopt;
   }
   error.sigma = std::hypot(std::abs(error.ratio - 1.0) / num_sigmas, kMinSigma);

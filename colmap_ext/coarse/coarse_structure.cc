@@ -212,12 +212,6 @@ PriorBundleAdjustmentSummary AdjustRound(
                                keypoint_sigma_factor);
 }
 
-bool KnowsFocalLengths(const colmap::Reconstruction& reconstruction) {
-  return std::all_of(
-      reconstruction.Cameras().begin(), reconstruction.Cameras().end(),
-      [](const auto& entry) { return entry.second.HasPriorFocalLength(); });
-}
-
 // The last round once more, after an adjustment that has found the focal
 // length.
 void RepeatWithFreeFocalLength(

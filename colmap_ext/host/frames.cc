@@ -127,7 +127,8 @@ void WriteRigs(const std::map<uint32_t, std::set<camera_t>>& cameras_of_rig,
 
 DatabaseFrames ReadDatabaseFrames(SqliteConnection* database) {
   DatabaseFrames result;
-  result.has_tables = database->HasTable("frames");
+  result.has_tables =
+      database->HasTable("frames") && database->HasTable("rig_sensors");
   if (!result.has_tables) return result;
   result.rigs = ReadRigs(database);
   bool needs_files = !result.rigs.cameras.empty();
