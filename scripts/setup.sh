@@ -57,7 +57,8 @@ test_packages=(chromium chromium-driver python3-selenium file lintian
 # The files of COLMAP's library that our program links
 # (scripts/checks/check_host_part.sh), and its other libraries.
 host_part=(base/{camera,camera_database,camera_models,camera_rig}
-  base/{correspondence_graph,database,essential_matrix,gps,homography_matrix}
+  base/{correspondence_graph,database,database_cache,essential_matrix,gps}
+  base/homography_matrix
   base/{image,image_reader,point2d,point3d,polynomial,pose,projection}
   base/{reconstruction,similarity_transform,track,triangulation}
   base/visibility_pyramid estimators/{absolute_pose,affine_transform}
@@ -66,7 +67,8 @@ host_part=(base/{camera,camera_database,camera_models,camera_rig}
   feature/{extraction,matching,sift,types,utils}
   optim/{bundle_adjustment,combination_sampler,random_sampler}
   optim/support_measurement retrieval/{geometry,vote_and_verify}
-  sfm/incremental_triangulator util/{bitmap,camera_specs,logging,math,misc}
+  sfm/incremental_{mapper,triangulator}
+  util/{bitmap,camera_specs,logging,math,misc}
   util/{ply,random,string,threading,timer})
 host_part_libraries=(PBA/libpba.a SiftGPU/libsift_gpu.a VLFeat/libvlfeat.a)
 # Linked by name, and nothing of them used.
