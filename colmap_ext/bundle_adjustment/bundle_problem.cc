@@ -5,56 +5,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <set>
 #include <utility>
 
 #include "colmap_ext/bundle_adjustment/create_reprojection_cost.h"
 #include "colmap_ext/host/pose_conversion.h"
-#include "core/median.h"
 
 namespace adasfm {
-namespace {
-
-// (second - decay * first) / sigma, 3 residuals.
-class DifferenceCost final : public ceres::SizedCostFunction<3, 3, 3> {
- public:
-  DifferenceCost(double sigma, double decay)
-      : inverse_sigma_(1.0 / sigma), decay_(decay) {}
-
-  bool Evaluate(double const* const* parameters, double* residuals,
-                double** jacobians) const final {
-    using Jacobian = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
-    for (int i = 0; i < 3; ++i) {
-      residuals[i] =
-          inverse_sigma_ * (parameters[1][i] - decay_ * parameters[0][i]);
-    }
-    for (int block = 0; jacobians != nullptr && block < 2; ++block) {
-      if (jacobians[block] == nullptr) continue;
-      Eigen::Map<Jacobian> jacobian(jacobians[block]);
-      jacobian = Jacobian::Identity() *
-                 (block == 0 ? -decay_ * inverse_sigma_ : inverse_sigma_);
-    }
-    return true;
-  }
-
- private:
-  double inverse_sigma_;
-  double decay_;
-};
-
-// Of the directions that the motions of sensors state; 0 when none does.
-double MedianDirectionSigma(const std::vector<PosePriorEdge>& edges) {
-  std::vector<double> sigmas;
-  for (const PosePriorEdge& edge : edges) {
-    if (edge.dt_s >= 0.0 && std::isfinite(edge.direction_sigma_rad)) {
-      sigmas.push_back(edge.direction_sigma_rad);
-    }
-  }
-  return UpperMedian(&sigmas);
-}
-
-}  // namespace
-
 BundleProblem::BundleProblem(const PriorBundleAdjustmentOptions& options,
                              const PriorBundleAdjustmentProblem& problem,
                              const colmap::Reconstruction& reconstruction)
@@ -298,113 +254,6 @@ void BundleProblem::AddPrior(const PosePriorEdge& edge,
   AddCost(other_costs_.back().get(), loss, {image1, image2}, shared);
   image1->num_priors += 1;
   image2->num_priors += 1;
-}
-
-std::vector<double*> BundleProblem::SharedParameters(const PosePriorEdge& edge,
-                                                     const PosePriorCost& cost,
-                                                     PosePriorCost::Term term) {
-  if (cost.parameter_block_sizes().size() == 2) return {};
-  if (term != PosePriorCost::Term::kRotation) {
-    SharedBlock& direction = shared_[kDrivingDirection];
-    SharedBlock& drift = shared_[direction_drift_ + edge.windows.direction];
-    direction.is_used = drift.is_used = true;
-    return {direction.values, drift.values};
-  }
-  SharedBlock& rotation = shared_[kExtrinsicRotation];
-  SharedBlock& bias = shared_[kGyroscopeBias + edge.windows.gyroscope];
-  rotation.is_used = bias.is_used = true;
-  return {rotation.values, bias.values};
-}
-
-void BundleProblem::AddSharedErrorPrior(double sigma, SharedBlock* block) {
-  if (!block->is_used) return;
-  if (!options_.shared_errors.enabled || !(sigma > 0.0)) {
-    problem_->SetParameterBlockConstant(block->values);
-    return;
-  }
-  other_costs_.push_back(std::make_unique<ceres::NormalPrior>(
-      Eigen::Matrix3d::Identity() / sigma, Eigen::Vector3d::Zero()));
-  problem_->AddResidualBlock(other_costs_.back().get(), nullptr, block->values);
-}
-
-void BundleProblem::AddSharedErrorStep(double sigma, double decay,
-                                       SharedBlock* before,
-                                       SharedBlock* block) {
-  if (!options_.shared_errors.enabled || !(sigma > 0.0)) return;
-  other_costs_.push_back(std::make_unique<DifferenceCost>(sigma, decay));
-  problem_->AddResidualBlock(other_costs_.back().get(), nullptr, before->values,
-                             block->values);
-}
-
-void BundleProblem::AddSharedErrorPriors(
-    const std::vector<PosePriorEdge>& edges) {
-  const SharedErrorOptions& shared = options_.shared_errors;
-  AddSharedErrorPrior(shared.extrinsic_rotation_sigma_rad,
-                      &shared_[kExtrinsicRotation]);
-  AddSharedErrorPrior(shared.driving_direction_sigma_rad,
-                      &shared_[kDrivingDirection]);
-  AddGyroscopePriors();
-  AddDirectionDriftPriors(
-      shared.direction_drift_time_s > 0.0 ? MedianDirectionSigma(edges) : 0.0);
-}
-
-// A random walk: once its first value is believed, each next one only by its
-// step, or a constant bias would be held back once a window.
-void BundleProblem::AddGyroscopePriors() {
-  const SharedErrorOptions& shared = options_.shared_errors;
-  const double sigma = shared.gyroscope_bias_sigma_rad_s;
-  const double step_sigma = shared.gyroscope_random_walk_rad_s_sqrt_s *
-                            std::sqrt(shared.gyroscope_window_s);
-  SharedBlock* before = nullptr;
-  for (size_t k = kGyroscopeBias; k < direction_drift_; ++k) {
-    SharedBlock& block = shared_[k];
-    if (!block.is_used) continue;
-    if (before == nullptr || !shared.enabled || !(sigma > 0.0) ||
-        !(step_sigma > 0.0)) {
-      AddSharedErrorPrior(sigma, &block);
-    } else {
-      AddSharedErrorStep(step_sigma, 1.0, before, &block);
-    }
-    before = &block;
-  }
-}
-
-// A stationary process: its first value has the sigma, each next one decays
-// towards zero and is stirred as much as keeps the sigma.
-void BundleProblem::AddDirectionDriftPriors(double sigma_rad) {
-  const SharedErrorOptions& shared = options_.shared_errors;
-  const double decay =
-      std::exp(-shared.direction_window_s / shared.direction_drift_time_s);
-  SharedBlock* before = nullptr;
-  for (size_t k = direction_drift_; k < shared_.size(); ++k) {
-    SharedBlock& block = shared_[k];
-    if (!block.is_used) continue;
-    if (before == nullptr || !shared.enabled || !(sigma_rad > 0.0)) {
-      AddSharedErrorPrior(sigma_rad, &block);
-    } else {
-      AddSharedErrorStep(sigma_rad * std::sqrt(1.0 - decay * decay), decay,
-                         before, &block);
-    }
-    before = &block;
-  }
-}
-
-SharedErrors BundleProblem::EstimatedSharedErrors() const {
-  SharedErrors errors;
-  const auto vector = [](const SharedBlock& block) {
-    return Eigen::Vector3d(block.values[0], block.values[1], block.values[2]);
-  };
-  errors.extrinsic_rotation = vector(shared_[kExtrinsicRotation]);
-  errors.driving_direction = vector(shared_[kDrivingDirection]);
-  for (size_t k = kGyroscopeBias; k < shared_.size(); ++k) {
-    if (!shared_[k].is_used) continue;
-    if (k < direction_drift_) {
-      errors.gyroscope_bias[k - kGyroscopeBias] = vector(shared_[k]);
-    } else {
-      errors.direction_drift[k - direction_drift_] = vector(shared_[k]);
-    }
-  }
-  return errors;
 }
 
 void BundleProblem::SetConstantBlocks(

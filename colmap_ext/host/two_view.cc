@@ -2,6 +2,7 @@
 #include "colmap_ext/host/two_view.h"
 
 #include <base/essential_matrix.h>
+#include <estimators/fundamental_matrix.h>
 #include <estimators/pose.h>
 #include <estimators/two_view_geometry.h>
 #include <util/random.h>
@@ -33,6 +34,16 @@ std::optional<Rigid3d> EstimateRelativePose(
   }
   return Rigid3d(Eigen::Quaterniond(qvec(0), qvec(1), qvec(2), qvec(3)),
                  tvec.normalized());
+}
+
+std::optional<Eigen::Matrix3d> EstimateFundamentalMatrix(
+    const std::vector<Eigen::Vector2d>& points1,
+    const std::vector<Eigen::Vector2d>& points2) {
+  if (points1.size() < 8) return std::nullopt;
+  const std::vector<Eigen::Matrix3d> models =
+      colmap::FundamentalMatrixEightPointEstimator::Estimate(points1, points2);
+  if (models.empty() || !models.front().allFinite()) return std::nullopt;
+  return models.front();
 }
 
 EssentialPoses DecomposeEssentialMatrix(

@@ -26,6 +26,11 @@ std::optional<Rigid3d> EstimateRelativePose(
     const std::vector<Eigen::Vector2d>& points2, double max_error,
     uint32_t seed);
 
+// x2^T F x1 = 0 for at least eight matches (pixels), by linear least squares.
+std::optional<Eigen::Matrix3d> EstimateFundamentalMatrix(
+    const std::vector<Eigen::Vector2d>& points1,
+    const std::vector<Eigen::Vector2d>& points2);
+
 // The two rotations and the direction, up to its sign, of an essential matrix.
 struct EssentialPoses {
   Eigen::Matrix3d rotations[2];

@@ -4,8 +4,8 @@
 #include <algorithm>
 #include <optional>
 #include <set>
-#include <tuple>
 
+#include "colmap_ext/priors/stamp_images.h"
 #include "core/so3.h"
 
 namespace adasfm {
@@ -145,11 +145,7 @@ std::vector<ImageStamp> GroupFrames(
     for (ImageStamp* stamp : frame) stamp->timestamp_ns = frame_ns;
     begin = std::max(end, begin + 1);
   }
-  std::sort(stamps->begin(), stamps->end(),
-            [](const ImageStamp& a, const ImageStamp& b) {
-              return std::tie(a.timestamp_ns, a.image_id) <
-                     std::tie(b.timestamp_ns, b.image_id);
-            });
+  SortByTime(stamps);
   if (cameras.empty()) return *stamps;
   std::vector<ImageStamp> references;
   for (const ImageStamp& stamp : *stamps) {

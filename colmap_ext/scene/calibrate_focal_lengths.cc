@@ -8,7 +8,7 @@
 #include <sstream>
 
 #include "colmap_ext/host/camera.h"
-#include "colmap_ext/host/fundamental_matrix.h"
+#include "colmap_ext/host/two_view.h"
 #include "colmap_ext/scene/two_view_poses.h"
 #include "core/parallel.h"
 #include "global/two_view/minimize_epipolar_distances.h"

@@ -3,37 +3,10 @@
 
 #include <gtest/gtest.h>
 
-#include "colmap_ext/mapper/local_mapper.h"
-#include "tests/testing/colmap_ext/mapper_world.h"
+#include "tests/testing/colmap_ext/mapper_drive.h"
 
 namespace adasfm {
 namespace {
-
-MapperWorld BuildDrive(uint64_t seed) {
-  MapperWorldOptions options;
-  options.world.num_images = 120;
-  options.world.seed = seed;
-  return BuildMapperWorld(options);
-}
-
-// A model of the drive by vision alone, in the frame of the coarse poses.
-colmap::Reconstruction Reconstruct(const MapperWorld& world) {
-  std::set<image_t> images;
-  for (const auto& image : world.data.images) images.insert(image.first);
-  return ReconstructLocally({}, world.data, world.coarse_poses, images)
-      .reconstruction;
-}
-
-PriorBundleAdjustmentProblem ProblemOf(
-    const MapperWorld& world, const colmap::Reconstruction& reconstruction) {
-  PriorBundleAdjustmentProblem problem;
-  problem.images = {reconstruction.RegImageIds().begin(),
-                    reconstruction.RegImageIds().end()};
-  for (const RelativePosePrior& prior : world.data.priors) {
-    problem.priors.push_back(PosePriorEdgeFromPrior(prior));
-  }
-  return problem;
-}
 
 TEST(ComputePriorChi2PerDof, IsZeroAtThePriorsAndCapsWhatIsWild) {
   const MapperWorld world = BuildDrive(1);

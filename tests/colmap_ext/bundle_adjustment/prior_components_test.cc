@@ -5,42 +5,14 @@
 
 #include "colmap_ext/bundle_adjustment/balance_priors.h"
 #include "colmap_ext/host/pose_conversion.h"
-#include "colmap_ext/mapper/local_mapper.h"
 #include "core/random.h"
 #include "core/so3.h"
-#include "tests/testing/colmap_ext/mapper_world.h"
+#include "tests/testing/colmap_ext/mapper_drive.h"
 
 namespace adasfm {
 namespace {
 
 constexpr PriorSigmaFactors kStated = {1.0, 1.0, 1.0, 1.0};
-
-MapperWorld BuildDrive(uint64_t seed) {
-  MapperWorldOptions options;
-  options.world.num_images = 120;
-  options.world.seed = seed;
-  return BuildMapperWorld(options);
-}
-
-colmap::Reconstruction Reconstruct(const MapperWorld& world) {
-  std::set<image_t> images;
-  for (const auto& image : world.data.images) images.insert(image.first);
-  return ReconstructLocally({}, world.data, world.coarse_poses, images)
-      .reconstruction;
-}
-
-PriorBundleAdjustmentProblem ProblemOf(
-    const MapperWorld& world, const colmap::Reconstruction& reconstruction,
-    double sigma_factor) {
-  PriorBundleAdjustmentProblem problem;
-  problem.images = {reconstruction.RegImageIds().begin(),
-                    reconstruction.RegImageIds().end()};
-  for (RelativePosePrior prior : world.data.priors) {
-    prior.covariance *= sigma_factor * sigma_factor;
-    problem.priors.push_back(PosePriorEdgeFromPrior(prior));
-  }
-  return problem;
-}
 
 // Poses that nothing but the priors holds follow a single measurement of each
 // motion wholly, and two by half.

@@ -77,6 +77,38 @@ TEST(SharedErrorsTest, FindsTheErrorsThatAllPriorsShare) {
   }
 }
 
+// A bias that walks by next to nothing is one constant, however many windows it
+// has: its prior counts once, and not once a window.
+TEST(SharedErrorsTest, AConstantBiasIsHeldBackOnce) {
+  BundleWorldOptions world;
+  world.num_images = 200;
+  world.num_keypoints_per_image = 40;
+  world.pixel_noise_px = 0.3;
+  Random random(1);
+  const colmap::Reconstruction given = BuildBundleWorld(world);
+  PriorBundleAdjustmentProblem problem = ProblemOfAll(given);
+  problem.priors = BiasedPriors(world, LargeSharedErrors(), &random);
+  PriorBundleAdjustmentOptions options = ConvergeFully();
+  options.keypoint_sigma_px = world.pixel_noise_px;
+  options.shared_errors.gyroscope_random_walk_rad_s_sqrt_s = 1e-7;
+  const auto bias_of = [&](double window_s) {
+    options.shared_errors.gyroscope_window_s = window_s;
+    colmap::Reconstruction model = given;
+    const PriorBundleAdjustmentSummary summary =
+        AdjustBundle(options, problem, &model);
+    EXPECT_TRUE(summary.success);
+    return summary.shared_errors.gyroscope_bias;
+  };
+  // Of the minute that the drive takes.
+  const Eigen::Vector3d constant = bias_of(1000.0).at(0);
+  EXPECT_GT(constant.norm(), 5e-4);
+  const std::map<int, Eigen::Vector3d> walking = bias_of(6.0);
+  ASSERT_GE(walking.size(), 9);
+  for (const auto& [window, bias] : walking) {
+    EXPECT_LT((bias - constant).norm(), 0.02 * constant.norm()) << window;
+  }
+}
+
 // Directions of driving whose errors are smooth in time, as a smoother's are:
 // each is as stated, but neighbours do not average out.
 std::vector<PosePriorEdge> DriftingPriors(const BundleWorldOptions& options,
