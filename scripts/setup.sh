@@ -31,8 +31,8 @@ host_minutes=12 host_part_minutes=6 project_minutes=20 demo_minutes=11
 
 # Without these nothing is built.
 demo_packages=(
-  # The tools.
-  build-essential cmake ninja-build dpkg-dev
+  # The tools; Python writes the manual pages.
+  build-essential cmake ninja-build dpkg-dev python3
   # The host's own dependencies.
   libboost-program-options-dev libboost-filesystem-dev libboost-graph-dev
   libboost-system-dev libboost-test-dev libfreeimage-dev libflann-dev
@@ -49,7 +49,7 @@ more_packages=(
   librosbag-storage-dev libsensor-msgs-dev libnav-msgs-dev
   libgtest-dev libgmock-dev libbenchmark-dev
   # For the scripts that draw tables and compare models.
-  python3 python3-numpy python3-matplotlib sqlite3)
+  python3-numpy python3-matplotlib sqlite3)
 test_packages=(chromium chromium-driver python3-selenium file lintian
   python3-h5py clang libclang-rt-14-dev linux-perf ffmpeg
   slurmctld slurmd slurm-client munge)
