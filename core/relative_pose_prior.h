@@ -36,6 +36,8 @@ struct RelativePosePrior {
   bool HasRotation() const { return flags & kPriorRotation; }
   bool HasDirection() const { return flags & kPriorDirection; }
   bool HasLength() const { return flags & kPriorLength; }
+  bool HasTranslation() const { return HasDirection() && HasLength(); }
+  bool HasMotion() const { return HasRotation() && HasTranslation(); }
 };
 
 }  // namespace adasfm

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <cmath>
 #include <cstdint>
 #include <limits>
 #include <tuple>
@@ -19,6 +20,9 @@ inline constexpr image_t kInvalidImageId = std::numeric_limits<image_t>::max();
 using timestamp_t = int64_t;
 
 inline double SecondsFromNs(timestamp_t time_ns) { return 1e-9 * time_ns; }
+inline timestamp_t NsFromSeconds(double time_s) {
+  return std::llround(1e9 * time_s);
+}
 
 // An unordered image pair, stored with the smaller id first.
 struct ImagePair {

@@ -244,7 +244,7 @@ build_host() {
 build_project() {
   say "Building the project into $build"
   local options=(-DCMAKE_BUILD_TYPE="${ADASFM_BUILD_TYPE:-Release}"
-    -DCOLMAP_DIR="$colmap_dir" -DADASFM_WERROR=ON)
+    -DCOLMAP_DIR="$colmap_dir" -DADASFM_WERROR=ON -DADASFM_UNITY=ON)
   local log=$cache/configure.log targets=()
   if [ "$for_demo" = 1 ]; then
     targets=(adasfm_launcher)

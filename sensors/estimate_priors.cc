@@ -33,10 +33,6 @@ constexpr double kMinNoiseChange = 1.2;
 // drive; a stabilised video keeps the slow turns.
 constexpr double kMinSameMotionCorrelation = 0.4;
 
-timestamp_t NsFromSeconds(double seconds) {
-  return std::llround(1e9 * seconds);
-}
-
 // Moves a factor by another, within limits; whether it moved enough to matter.
 bool Correct(double by, double min_factor, double* factor) {
   const double corrected =

@@ -21,9 +21,8 @@ Times BringTogether(const SensorCalibration& calibration,
                     const std::vector<GnssFix>& fixes) {
   Times times;
   const timestamp_t start_ns = images.front().timestamp_ns;
-  const timestamp_t shift_ns =
-      std::llround(1e9 * (calibration.timeshift_gnss_imu_s -
-                          calibration.timeshift_cam_imu_s));
+  const timestamp_t shift_ns = NsFromSeconds(calibration.timeshift_gnss_imu_s -
+                                             calibration.timeshift_cam_imu_s);
   for (const ImageStamp& image : images) {
     times.images.push_back(SecondsFromNs(image.timestamp_ns - start_ns));
   }

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/first_not_before.h"
 #include "core/so3.h"
 
 namespace adasfm {
@@ -47,11 +48,7 @@ std::map<image_t, Rigid3d> InterpolateTrajectory(
   std::map<image_t, Rigid3d> poses;
   for (const ImageStamp& image : images) {
     const timestamp_t time_ns = image.timestamp_ns + timeshift_ns;
-    const auto after = std::lower_bound(
-        trajectory.begin(), trajectory.end(), time_ns,
-        [](const OdometryPose& pose, timestamp_t timestamp_ns) {
-          return pose.timestamp_ns < timestamp_ns;
-        });
+    const auto after = FirstNotBefore(trajectory, time_ns);
     if (after == trajectory.end()) continue;
     if (after->timestamp_ns == time_ns) {
       poses[image.image_id] = cam_from_body * after->world_from_body.Inverse();

@@ -17,7 +17,6 @@ namespace {
 
 constexpr int kMinNumMatches = 15;
 constexpr int kMaxNumMatches = 25;
-constexpr double kMaxEpipolarErrorPx = 4.0;
 // Raw matches per match that fits.
 constexpr int kNumRawPerMatch = 4;
 constexpr double kMaxSpuriousTurn = DegToRad(40.0);

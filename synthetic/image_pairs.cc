@@ -20,7 +20,6 @@ namespace {
 
 // COLMAP keeps pairs with at least so many verified matches.
 constexpr int kMinNumInliers = 15;
-constexpr double kMaxEpipolarErrorPx = 4.0;
 // A feature is recognised between views that do not differ by more.
 constexpr double kMaxScaleRatio = 2.2;
 constexpr double kMatchRate = 0.85;

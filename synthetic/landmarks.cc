@@ -16,14 +16,10 @@ constexpr int kNumPolesPerSide = 5;
 constexpr int kNumPointsPerPole = 12;
 constexpr double kGroundDensity = 2.0;  // per metre of street
 constexpr double kFacadeTop = 9.0;      // m
-// Above the road, about.
-constexpr double kCameraHeight = 1.2;
 // The yard around the lanes, m.
 constexpr double kLawnMargin = 6.0;
 constexpr double kLawnDensity = 1.0;  // per square metre
 constexpr double kPostSpacing = 6.0;  // m, on average
-// Share of the visible features that the detector finds in an image.
-constexpr double kDetectionRate = 0.8;
 // A facade seen at a flatter angle than this shows no features.
 constexpr double kMinIncidenceCosine = 0.1;
 constexpr double kImageBorder = 3.0;  // px

@@ -9,6 +9,11 @@
 
 namespace adasfm {
 
+// Above the road, about [m].
+inline constexpr double kCameraHeight = 1.2;
+// Share of the visible features that the detector finds in an image.
+inline constexpr double kDetectionRate = 0.8;
+
 struct Landmark {
   Eigen::Vector3d position_in_world = Eigen::Vector3d::Zero();
   // The way the surface faces; zero for poles and the ground, which are seen

@@ -5,6 +5,8 @@
 #include <cmath>
 #include <map>
 
+#include "synthetic/landmarks.h"
+
 namespace adasfm {
 namespace {
 
@@ -19,8 +21,6 @@ constexpr double kMaxAliasOffset = 8.0;
 constexpr double kMinAliasDistance = 45.0;
 constexpr size_t kNumAliasNeighbors = 5;
 constexpr size_t kAliasRunLength = 14;
-// Above the road, about.
-constexpr double kCameraHeight = 1.2;
 
 // How far the car has driven between two visits.
 double RevisitDistance(const SyntheticWorldOptions& options) {

@@ -57,8 +57,6 @@ std::vector<Slip> DrawSlips(const SyntheticWorldOptions& options,
   return slips;
 }
 
-timestamp_t NsFromSeconds(double time_s) { return std::llround(1e9 * time_s); }
-
 }  // namespace
 
 void SimulateImu(const Drive& drive, double end_s, SyntheticWorld* world) {

@@ -82,12 +82,12 @@ std::vector<double> TakeImages(const Drive& drive, SyntheticWorld* world) {
   const double first_s = drive.FirstImageTime();
   const double period_s =
       (drive.LastImageTime() - first_s) / (options.num_images - 1);
-  const timestamp_t shift_ns = std::llround(1e9 * options.timeshift_cam_imu_s);
+  const timestamp_t shift_ns = NsFromSeconds(options.timeshift_cam_imu_s);
   std::vector<double> times_s;
   for (int i = 0; i < options.num_images; ++i) {
     const double jitter = random.Uniform(-kTimeJitter, kTimeJitter);
     const timestamp_t time_ns =
-        std::llround(1e9 * (first_s + (i + jitter) * period_s));
+        NsFromSeconds(first_s + (i + jitter) * period_s);
     const double time_s = SecondsFromNs(time_ns);
     SyntheticImage image;
     image.image_id = static_cast<image_t>(i + 1);
@@ -100,7 +100,7 @@ std::vector<double> TakeImages(const Drive& drive, SyntheticWorld* world) {
   }
   for (const Drive::Stop& stop : drive.stops()) {
     const auto at = [&](double time_s) {
-      return kWorldStartNs - shift_ns + std::llround(1e9 * time_s);
+      return kWorldStartNs - shift_ns + NsFromSeconds(time_s);
     };
     world->stops.emplace_back(at(stop.begin_s), at(stop.end_s));
   }

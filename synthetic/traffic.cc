@@ -7,13 +7,11 @@
 #include <vector>
 
 #include "core/so3.h"
+#include "synthetic/landmarks.h"
 #include "synthetic/street_grid.h"
 
 namespace adasfm {
 namespace {
-
-// Found in an image, as facades are.
-constexpr double kDetectionRate = 0.8;
 
 // In the frame of a car, m: its rear and the left side, which the camera sees.
 std::vector<Eigen::Vector3d> DrawCarPoints(Random* random) {

@@ -14,6 +14,9 @@ namespace adasfm {
 double ComputeSampsonErrorPx(const Bearing& bearing1, const Bearing& bearing2,
                              const Rigid3d& cam2_from_cam1);
 
+// A match that is farther from the geometry is no inlier, as in COLMAP.
+inline constexpr double kMaxEpipolarErrorPx = 4.0;
+
 // Gauss-Newton on the Sampson errors, from a start near the solution, with a
 // robust weight beyond about 2 px. Derivatives are numeric, so that a mistake
 // in those of the estimators under test is not made here too. The translation

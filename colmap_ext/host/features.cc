@@ -23,7 +23,7 @@
 namespace adasfm {
 namespace {
 
-constexpr std::chrono::milliseconds kPollInterval(100);
+constexpr std::chrono::milliseconds kThreadPollInterval(100);
 
 // Images of the database that have no descriptors yet, and how many have.
 std::vector<std::string> ImagesWithoutFeatures(const std::string& path,
@@ -55,7 +55,7 @@ Status MissingRows(const std::string& database_path, const std::string& what,
 void WaitFor(colmap::Thread* thread, const std::function<void()>& report) {
   try {
     while (!thread->IsFinished()) {
-      std::this_thread::sleep_for(kPollInterval);
+      std::this_thread::sleep_for(kThreadPollInterval);
       report();
     }
   } catch (...) {

@@ -5,6 +5,7 @@
 #include <limits>
 #include <string>
 
+#include "colmap_ext/host/database_schema.h"
 #include "colmap_ext/io/double_blob.h"
 
 namespace adasfm {
@@ -14,12 +15,6 @@ namespace {
 constexpr int64_t kWgs84 = 0;
 constexpr int64_t kCartesian = 1;
 constexpr int64_t kCameraSensor = 0;
-
-bool HasColumn(SqliteConnection* database, const std::string& table,
-               const std::string& column) {
-  const std::vector<std::string> columns = database->Columns(table);
-  return std::find(columns.begin(), columns.end(), column) != columns.end();
-}
 
 // COLMAP writes NaN where it knows no covariance.
 std::optional<Eigen::Matrix3d> ReadCovariance(const SqliteStatement& statement,

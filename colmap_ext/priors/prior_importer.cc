@@ -212,7 +212,7 @@ StatusOr<std::map<image_t, Rigid3d>> ReadTrajectoryPoses(
     if (!trajectory.ok()) return trajectory.status();
     poses = InterpolateTrajectory(
         *trajectory, calibration.cam_from_imu,
-        std::llround(1e9 * calibration.timeshift_cam_imu_s), stamps, max_gap_s);
+        NsFromSeconds(calibration.timeshift_cam_imu_s), stamps, max_gap_s);
   }
   if (poses.size() > 1) return poses;
   return Status::Error(path + ": gives poses to " +

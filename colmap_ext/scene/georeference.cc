@@ -12,10 +12,10 @@ namespace {
 
 // What accelerometers know of the vertical over a drive: a bias that is left of
 // 0.03 m/s^2, and a wrong mounting that averages out as the machine turns.
-constexpr double kGravitySigmaRad = DegToRad(0.2);
-constexpr double kUprightSigmaRad = DegToRad(10.0);
+constexpr double kDriveGravitySigmaRad = DegToRad(0.2);
+constexpr double kDriveUprightSigmaRad = DegToRad(10.0);
 // What is within this many sigmas needs no wider loss.
-constexpr double kNormalSigmas = 4.0;
+constexpr double kNarrowLossSigmas = 4.0;
 
 }  // namespace
 
@@ -45,7 +45,7 @@ Verticals FindVerticals(const SceneData& scene,
                         const std::map<image_t, Rigid3d>& cams_from_enu,
                         const Eigen::Quaterniond& camera_mount) {
   Verticals verticals;
-  verticals.sigma_rad = kGravitySigmaRad;
+  verticals.sigma_rad = kDriveGravitySigmaRad;
   for (const auto& [image_id, pose] : cams_from_enu) {
     const auto image = scene.images.find(image_id);
     if (image == scene.images.end() || !image->second.gravity_in_cam) continue;
@@ -53,7 +53,7 @@ Verticals FindVerticals(const SceneData& scene,
         camera_mount * *image->second.gravity_in_cam;
   }
   if (!verticals.gravity_in_cam.empty()) return verticals;
-  verticals.sigma_rad = kUprightSigmaRad;
+  verticals.sigma_rad = kDriveUprightSigmaRad;
   for (const auto& [image_id, pose] : cams_from_enu) {
     verticals.gravity_in_cam[image_id] =
         pose.rotation * -Eigen::Vector3d::UnitZ();
@@ -65,7 +65,7 @@ double PositionLossScale(const PositionAlignment& alignment, double final_scale,
                          int round, int num_rounds) {
   if (num_rounds < 2) return final_scale;
   const double widening =
-      std::max(1.0, alignment.threshold_sigmas / kNormalSigmas);
+      std::max(1.0, alignment.threshold_sigmas / kNarrowLossSigmas);
   const double share_left = 1.0 - static_cast<double>(round) / (num_rounds - 1);
   return final_scale * std::pow(widening, std::max(0.0, share_left));
 }

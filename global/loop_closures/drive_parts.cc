@@ -12,10 +12,6 @@
 namespace adasfm {
 namespace {
 
-bool HasPosition(const RelativePosePrior& prior) {
-  return prior.HasRotation() && prior.HasDirection() && prior.HasLength();
-}
-
 bool IsVisual(const ViewGraphEdge& edge) {
   return edge.IsKept() && edge.source != EdgeSource::kSensor;
 }
@@ -85,7 +81,7 @@ DriveParts FindDriveParts(const LoopClosureOptions& options,
   for (const RelativePosePrior& prior : priors) {
     const int i = graph.IndexOf(prior.image_id1);
     const int j = graph.IndexOf(prior.image_id2);
-    if (i < 0 || j < 0 || !HasPosition(prior)) continue;
+    if (i < 0 || j < 0 || !prior.HasMotion()) continue;
     sets.Join(i, j);
     metric_images.push_back(i);
   }

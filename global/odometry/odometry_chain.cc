@@ -17,10 +17,6 @@ namespace {
 
 using Matrix6d = Eigen::Matrix<double, 6, 6>;
 
-bool HasPosition(const RelativePosePrior& prior) {
-  return prior.HasRotation() && prior.HasDirection() && prior.HasLength();
-}
-
 // The prior's covariance with zeros for what it does not observe, which the
 // counters of the nodes exclude from use.
 Matrix6d ObservedCovariance(const RelativePosePrior& prior) {
@@ -29,7 +25,7 @@ Matrix6d ObservedCovariance(const RelativePosePrior& prior) {
     covariance.topRows<3>().setZero();
     covariance.leftCols<3>().setZero();
   }
-  if (!HasPosition(prior)) {
+  if (!prior.HasMotion()) {
     covariance.bottomRows<3>().setZero();
     covariance.rightCols<3>().setZero();
   }
@@ -64,7 +60,7 @@ Eigen::Matrix<double, 6, 13> SharedJacobian(const RelativePosePrior& prior,
 Rigid3d ObservedMotion(const RelativePosePrior& prior) {
   Rigid3d motion;
   if (prior.HasRotation()) motion.rotation = prior.cam2_from_cam1.rotation;
-  if (HasPosition(prior)) motion.translation = prior.cam2_from_cam1.translation;
+  if (prior.HasMotion()) motion.translation = prior.cam2_from_cam1.translation;
   return motion;
 }
 
@@ -139,7 +135,7 @@ void OdometryChain::AppendPiece(image_t first,
     node.image_id = prior.image_id2;
     node.cam_from_start = motion * node.cam_from_start;
     node.num_without_rotation += !prior.HasRotation();
-    node.num_without_position += !HasPosition(prior);
+    node.num_without_position += !prior.HasMotion();
 
     const Matrix6d start_from_error = Adjoint(node.cam_from_start.Inverse()) *
                                       TwistFromError(motion.translation);

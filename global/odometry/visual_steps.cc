@@ -13,10 +13,6 @@
 namespace adasfm {
 namespace {
 
-bool HasPosition(const RelativePosePrior& prior) {
-  return prior.HasDirection() && prior.HasLength();
-}
-
 int FindVisualEdge(const ViewGraph& graph, const ImagePair& pair) {
   const int e = FindEdge(graph, pair);
   if (e < 0) return -1;
@@ -145,7 +141,7 @@ std::vector<RelativePosePrior*> InOrder(
 
 // In the camera's frame; none without a time.
 std::optional<Eigen::Vector3d> Velocity(const RelativePosePrior& step) {
-  if (!HasPosition(step) || step.dt_ns <= 0) return std::nullopt;
+  if (!step.HasTranslation() || step.dt_ns <= 0) return std::nullopt;
   return step.cam2_from_cam1.translation / SecondsFromNs(step.dt_ns);
 }
 
@@ -155,10 +151,10 @@ int Coast(const VisualStepOptions& options,
           const std::vector<RelativePosePrior*>& steps) {
   int num_coasting = 0;
   for (size_t begin = 1; begin < steps.size(); ++begin) {
-    if (HasPosition(*steps[begin])) continue;
+    if (steps[begin]->HasTranslation()) continue;
     size_t end = begin;
     double seconds = 0.0;
-    for (; end < steps.size() && !HasPosition(*steps[end]); ++end) {
+    for (; end < steps.size() && !steps[end]->HasTranslation(); ++end) {
       seconds += SecondsFromNs(steps[end]->dt_ns);
     }
     if (end == steps.size()) break;
@@ -185,7 +181,7 @@ double MedianLength(const std::vector<RelativePosePrior>& priors) {
   std::vector<double> lengths;
   for (const RelativePosePrior& prior : priors) {
     const double length = prior.cam2_from_cam1.translation.norm();
-    if (HasPosition(prior) && length > 0.0) lengths.push_back(length);
+    if (prior.HasTranslation() && length > 0.0) lengths.push_back(length);
   }
   return lengths.empty() ? 1.0 : UpperMedian(&lengths);
 }
@@ -236,7 +232,7 @@ VisualSteps AddVisualSteps(const VisualStepOptions& options,
   std::vector<RelativePosePrior*> standstills;
   std::map<ImagePair, double> known_lengths = known_lengths_m;
   for (RelativePosePrior& prior : steps.priors) {
-    if (prior.HasRotation() && HasPosition(prior)) continue;
+    if (prior.HasRotation() && prior.HasTranslation()) continue;
     const ImagePair pair(prior.image_id1, prior.image_id2);
     const int e = FindVisualEdge(graph, pair);
     if (e < 0) continue;

@@ -37,6 +37,7 @@ global                         core global/...
 colmap_ext/io                  core
 colmap_ext/matching            core
 colmap_ext/host                core global/view_graph global/two_view colmap_ext/io colmap_ext/matching
+colmap_ext/features            core colmap_ext/host
 colmap_ext/database            core colmap_ext/io colmap_ext/host global/calibration
 colmap_ext/bundle_adjustment   core colmap_ext/host
 colmap_ext/scene               core colmap_ext/io colmap_ext/host colmap_ext/database global/view_graph global/two_view
@@ -50,7 +51,7 @@ colmap_ext/bags                core sensors/bags sensors/io colmap_ext/io colmap
 colmap_ext/mapper_stage        core colmap_ext/io colmap_ext/host colmap_ext/scene colmap_ext/mapper partition
 colmap_ext/report              core colmap_ext/io colmap_ext/host colmap_ext/database colmap_ext/evaluation
 colmap_ext                     core colmap_ext/io colmap_ext/host colmap_ext/database colmap_ext/scene colmap_ext/priors colmap_ext/coarse colmap_ext/mapper_stage
-colmap_ext/workspace           core sensors/io colmap_ext colmap_ext/bags colmap_ext/io colmap_ext/host colmap_ext/database colmap_ext/coarse colmap_ext/pairs colmap_ext/datasets colmap_ext/report
+colmap_ext/workspace           core sensors/io colmap_ext colmap_ext/bags colmap_ext/io colmap_ext/features colmap_ext/host colmap_ext/database colmap_ext/coarse colmap_ext/pairs colmap_ext/datasets colmap_ext/report
 colmap_ext/commands            core synthetic sensors sensors/... global global/... partition colmap_ext colmap_ext/...
 '
 

@@ -18,9 +18,6 @@ namespace {
 // listed later this much better than one listed earlier.
 constexpr double kClearlyBetter = 0.7;
 constexpr double kTie = 0.9;
-// A refusal needs evidence. The best of some 10,000 wrong explanations (50 at
-// 200 shifts) is by chance e^9 times likelier than the right one; twice that.
-constexpr double kMinEvidence = 20.0;
 // Cameras' rotations per gyroscope's that are tried: those nearer to 1 are
 // within what a poor focal length does.
 constexpr double kTurnScales[] = {0.1, 0.125, 0.167, 0.2,  0.25, 0.33,

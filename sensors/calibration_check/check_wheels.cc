@@ -7,17 +7,15 @@
 #include "core/so3.h"
 #include "sensors/calibration_check/calibration_mistakes.h"
 #include "sensors/calibration_check/motion_bins.h"
+#include "sensors/calibration_check/rotation_comparison.h"
 #include "sensors/io/format_figures.h"
 
 namespace adasfm {
 namespace {
 
 // Clock errors looked for, and the smallest one that is named.
-constexpr double kMaxShiftS = 10.0;
+constexpr double kMaxLogShiftS = 10.0;
 constexpr int kMinShiftBins = 2;
-// The best of 200 wrong shifts is by chance e^5 times likelier; see
-// check_against_vision.cc.
-constexpr double kMinEvidence = 20.0;
 // Windows overlap: so many bins count as one observation.
 constexpr double kBinsPerObservation = 4.0;
 // Gravity further than this from the wheel frame's z is no tilt of a road or
@@ -143,7 +141,7 @@ std::string WheelChecker::CheckGravity(const WheelCheck& check) const {
 
 std::string WheelChecker::CheckClock(const WheelFit& fit) const {
   const int max_shift =
-      static_cast<int>(std::lround(kMaxShiftS / MotionBins::kBinS));
+      static_cast<int>(std::lround(kMaxLogShiftS / MotionBins::kBinS));
   const double as_logged = LogLikelihood(fit);
   double best = as_logged;
   int shift = 0;

@@ -10,7 +10,7 @@ void UndoGyroscopeFilter(const GyroscopeFilter& filter,
                          std::vector<ImuSample>* imu) {
   if (imu->size() < 2) return;
   constexpr timestamp_t kStepNs = 10'000'000;
-  const timestamp_t delay_ns = std::llround(1e9 * filter.delay_s);
+  const timestamp_t delay_ns = NsFromSeconds(filter.delay_s);
   const std::vector<ImuSample> logged = *imu;
   size_t next = 1;
   // Times are asked for in ascending order but for the steps to both sides.

@@ -70,6 +70,11 @@ std::vector<double> ComputeRateDistances(const RotationComparison& data,
 double ComputeEvidence(const std::vector<double>& worse,
                        const std::vector<double>& better, double num_repeats);
 
+// Evidence that another explanation needs before it is believed: the best of
+// some 10,000 wrong ones (50 at 200 shifts) is by chance e^9 times likelier
+// than the right one; twice that.
+inline constexpr double kMinEvidence = 20.0;
+
 // Correlation per axis and of all axes together, about the means.
 double ComputeRotationCorrelation(const RotationComparison& data,
                                   const Eigen::Matrix3d& map,

@@ -91,7 +91,7 @@ bool ShiftSearch::IsCovered(const TimedRotation& rotation,
 }
 
 size_t ShiftSearch::CountCovered(double shift_s) const {
-  const timestamp_t shift_ns = std::llround(1e9 * (timeshift_s_ + shift_s));
+  const timestamp_t shift_ns = NsFromSeconds(timeshift_s_ + shift_s);
   return std::count_if(rotations_.begin(), rotations_.end(),
                        [&](const TimedRotation& rotation) {
                          return IsCovered(rotation, shift_ns);
@@ -101,7 +101,7 @@ size_t ShiftSearch::CountCovered(double shift_s) const {
 RotationComparison ShiftSearch::Compare(
     const std::vector<TimedRotation>& rotations, double shift_s,
     double lag_s) const {
-  const timestamp_t shift = std::llround(1e9 * (timeshift_s_ + shift_s));
+  const timestamp_t shift = NsFromSeconds(timeshift_s_ + shift_s);
   const auto turn = [&](timestamp_t start, timestamp_t end) -> Eigen::Vector3d {
     const Eigen::Vector3d without_lag = integral_.Turn(start, end);
     if (lag_s == 0.0) return without_lag;

@@ -16,8 +16,8 @@
 namespace adasfm {
 namespace {
 
-constexpr double kMaxShiftS = 0.3;
-constexpr double kShiftStepS = 0.01;
+constexpr double kMaxCameraShiftS = 0.3;
+constexpr double kCameraStepS = 0.01;
 constexpr int kNumMountingRounds = 5;
 
 using Rates = std::vector<Eigen::Vector3d>;
@@ -205,7 +205,8 @@ UnexplainedRotation FindUnexplainedRotation(
   if (!visual_error) return result;
   result.visual_error_deg = RadToDeg(visual_error->length);
   double least = std::numeric_limits<double>::infinity();
-  const int num_steps = static_cast<int>(std::round(kMaxShiftS / kShiftStepS));
+  const int num_steps =
+      static_cast<int>(std::round(kMaxCameraShiftS / kCameraStepS));
   constexpr double kNormalMedian = 0.6745;
   const double visual_sigma = visual_error->along / kNormalMedian;
   RotationRest rest;
@@ -234,7 +235,7 @@ UnexplainedRotation FindUnexplainedRotation(
   };
   compare_at(shift_s);
   for (int step = -num_steps; step <= num_steps; ++step) {
-    compare_at(step * kShiftStepS);
+    compare_at(step * kCameraStepS);
   }
   if (result.is_conclusive) {
     result.interval_time_sigma_s = FindIntervalTimeSigma(rest);

@@ -12,8 +12,8 @@
 namespace adasfm {
 namespace {
 
-constexpr double kMaxShiftS = 0.15;
-constexpr double kShiftStepS = 0.002;
+constexpr double kMaxClockShiftS = 0.15;
+constexpr double kClockStepS = 0.002;
 constexpr double kWindowS = 0.2;
 // Wheels are not compared over holes of their log.
 constexpr double kMaxGapS = 0.25;
@@ -21,18 +21,17 @@ constexpr double kMaxGapS = 0.25;
 constexpr size_t kMaxNumWindows = 1000;
 constexpr size_t kMinNumWindows = 50;
 constexpr double kMinYawRateRms = 0.02;  // rad/s
-constexpr double kClearlyBetter = 0.9;
-constexpr double kMinEvidence = 20.0;
+constexpr double kMaxCostRatio = 0.9;
 
 // One turn of the wheels, rad.
-struct Window {
+struct TurnWindow {
   timestamp_t start_ns = 0;
   timestamp_t end_ns = 0;
   double yaw = 0.0;
 };
 
-std::vector<Window> ListWindows(const std::vector<WheelSpeed>& speeds) {
-  std::vector<Window> windows;
+std::vector<TurnWindow> ListWindows(const std::vector<WheelSpeed>& speeds) {
+  std::vector<TurnWindow> windows;
   size_t begin = 0;
   double yaw = 0.0;
   for (size_t i = 1; i < speeds.size(); ++i) {
@@ -51,7 +50,7 @@ std::vector<Window> ListWindows(const std::vector<WheelSpeed>& speeds) {
     begin = i;
     yaw = 0.0;
   }
-  std::vector<Window> selected;
+  std::vector<TurnWindow> selected;
   const size_t stride = windows.size() / kMaxNumWindows + 1;
   for (size_t i = 0; i < windows.size(); i += stride) {
     selected.push_back(windows[i]);
@@ -66,8 +65,8 @@ class ClockSearch {
               const Eigen::Vector3d& up_in_imu)
       : integral_(imu), up_in_imu_(up_in_imu) {
     // Covered at every shift, so that none wins by what it leaves out.
-    const timestamp_t margin_ns = std::llround(1e9 * kMaxShiftS);
-    for (const Window& window : ListWindows(speeds)) {
+    const timestamp_t margin_ns = NsFromSeconds(kMaxClockShiftS);
+    for (const TurnWindow& window : ListWindows(speeds)) {
       if (!integral_.Covers(window.start_ns - margin_ns) ||
           !integral_.Covers(window.end_ns + margin_ns)) {
         continue;
@@ -83,16 +82,16 @@ class ClockSearch {
     const std::vector<double> unshifted = Distances(0.0);
     double best_s = 0.0, least = Mean(unshifted);
     const int num_steps =
-        static_cast<int>(std::round(kMaxShiftS / kShiftStepS));
+        static_cast<int>(std::round(kMaxClockShiftS / kClockStepS));
     for (int step = -num_steps; step <= num_steps; ++step) {
-      const double cost = Mean(Distances(step * kShiftStepS));
+      const double cost = Mean(Distances(step * kClockStepS));
       if (cost >= least) continue;
       least = cost;
-      best_s = step * kShiftStepS;
+      best_s = step * kClockStepS;
     }
     // At the end of the range the right one lies beyond.
-    if (least > kClearlyBetter * Mean(unshifted) ||
-        std::abs(best_s) > kMaxShiftS - 1.5 * kShiftStepS ||
+    if (least > kMaxCostRatio * Mean(unshifted) ||
+        std::abs(best_s) > kMaxClockShiftS - 1.5 * kClockStepS ||
         ComputeEvidence(unshifted, Distances(best_s), 1.0) < kMinEvidence) {
       return std::nullopt;
     }
@@ -108,7 +107,7 @@ class ClockSearch {
 
   double YawRateRms() const {
     double sum = 0.0;
-    for (const Window& window : windows_) {
+    for (const TurnWindow& window : windows_) {
       const double rate =
           window.yaw / SecondsFromNs(window.end_ns - window.start_ns);
       sum += rate * rate;
@@ -118,9 +117,9 @@ class ClockSearch {
 
   // Of the turning rates, about their median.
   std::vector<double> Distances(double shift_s) const {
-    const timestamp_t shift_ns = std::llround(1e9 * shift_s);
+    const timestamp_t shift_ns = NsFromSeconds(shift_s);
     std::vector<double> gyro, wheel;
-    for (const Window& window : windows_) {
+    for (const TurnWindow& window : windows_) {
       const double dt = SecondsFromNs(window.end_ns - window.start_ns);
       gyro.push_back(up_in_imu_.dot(integral_.At(window.end_ns + shift_ns) -
                                     integral_.At(window.start_ns + shift_ns)) /
@@ -145,7 +144,7 @@ class ClockSearch {
 
   RateIntegral integral_;
   Eigen::Vector3d up_in_imu_;
-  std::vector<Window> windows_;
+  std::vector<TurnWindow> windows_;
 };
 
 }  // namespace

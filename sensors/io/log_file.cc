@@ -145,7 +145,7 @@ bool ParseSeconds(std::string_view field, timestamp_t* timestamp_ns) {
     if (!ParseDouble(field, &value) || !(value >= 0.0 && value <= 9e9)) {
       return false;
     }
-    *timestamp_ns = std::llround(1e9 * value);
+    *timestamp_ns = NsFromSeconds(value);
     return true;
   }
   if (!ParseInt64(whole, &seconds) || seconds > 9'000'000'000) return false;

@@ -63,7 +63,7 @@ const std::map<std::string, int>& ColumnNames() {
   return *kNames;
 }
 
-std::string ColumnName(std::string_view text) {
+std::string FixColumnName(std::string_view text) {
   std::string name;
   for (const char c : text) {
     if (c == '[' || c == '(') break;
@@ -85,7 +85,7 @@ StatusOr<ColumnFields> FindColumns(const LogFile& file, size_t* num_fields) {
   *num_fields = 0;
   while (!header.empty()) {
     const size_t end = header.find(',');
-    const auto name = ColumnNames().find(ColumnName(header.substr(0, end)));
+    const auto name = ColumnNames().find(FixColumnName(header.substr(0, end)));
     if (name != ColumnNames().end()) fields[name->second] = *num_fields;
     ++*num_fields;
     if (end == std::string_view::npos) break;

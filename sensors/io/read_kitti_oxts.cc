@@ -15,7 +15,6 @@ constexpr size_t kMinNumFields = 20;
 constexpr size_t kForceField = 11;
 constexpr size_t kRateField = 17;
 constexpr size_t kPositionSigmaField = 23;
-constexpr timestamp_t kSecondNs = 1'000'000'000;
 
 // "2011-09-26 13:02:25.594360375".
 bool ParseDateTime(const LogLine& line, timestamp_t* timestamp_ns) {

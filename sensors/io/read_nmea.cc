@@ -10,7 +10,6 @@
 namespace adasfm {
 namespace {
 
-constexpr int64_t kSecondNs = 1'000'000'000;
 constexpr int64_t kDayNs = 86'400 * kSecondNs;
 // Of a height that nobody has told.
 constexpr double kUnknownHeightSigmaM = 500.0;

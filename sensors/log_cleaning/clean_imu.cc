@@ -23,7 +23,7 @@ constexpr size_t kMinFrozen = 6;        // all six axes
 constexpr size_t kMinHalfFrozen = 12;   // of gyroscope or accelerometer alone
 constexpr double kDeadShare = 0.5;
 constexpr size_t kMinNumForDead = 100;
-constexpr double kMaxBadShare = 0.2;
+constexpr double kMaxBadImuShare = 0.2;
 constexpr double kMinPeriodS = 50e-6;
 constexpr double kMinMissingShare = 0.005;
 constexpr double kHolePeriods = 1.5;
@@ -169,7 +169,7 @@ StatusOr<CleanedLog<ImuSample>> ImuCleaner::Run() {
   MarkSpikes();
   CleanedLog<ImuSample> cleaned = LeaveOutFaults(samples_, kinds_, origin_);
   const size_t num_bad = samples_.size() - cleaned.samples.size();
-  if (num_bad > kMaxBadShare * samples_.size()) {
+  if (num_bad > kMaxBadImuShare * samples_.size()) {
     return Status::Error(
         origin_.path + ": " + std::to_string(num_bad) + " of " +
         std::to_string(samples_.size()) +

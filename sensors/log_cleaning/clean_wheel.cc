@@ -16,8 +16,8 @@ constexpr double kMinDrop = 0.5;
 // Speeds that repeat in all digits for this long are not measured (and five
 // times as many as usual: encoders are coarse).
 constexpr double kMinFrozenS = 0.3;
-constexpr double kUsualRuns = 5.0;
-constexpr double kMaxBadShare = 0.5;
+constexpr double kUsualRunsOfSpeeds = 5.0;
+constexpr double kMaxBadWheelShare = 0.5;
 
 bool IsEqual(const WheelSample& a, const WheelSample& b) {
   return a.first == b.first && a.second == b.second;
@@ -54,7 +54,7 @@ void MarkRuns(const std::vector<WheelSample>& samples, WheelType type,
   std::sort(lengths.begin(), lengths.end());
   const double limit =
       std::max(kMinFrozenS / period_s,
-               kUsualRuns * lengths[(99 * lengths.size()) / 100]);
+               kUsualRunsOfSpeeds * lengths[(99 * lengths.size()) / 100]);
   for (const auto& [begin, end] : runs) {
     const double speed = Speed(samples[begin], type);
     if (speed == 0.0 || end - begin <= limit) continue;
@@ -116,7 +116,7 @@ StatusOr<CleanedLog<WheelSample>> CleanWheel(
   }
   CleanedLog<WheelSample> cleaned = LeaveOutFaults(samples, kinds, origin);
   const size_t num_bad = samples.size() - cleaned.samples.size();
-  if (num_bad > kMaxBadShare * samples.size()) {
+  if (num_bad > kMaxBadWheelShare * samples.size()) {
     return Status::Error(origin.path + ": " + std::to_string(num_bad) + " of " +
                          std::to_string(samples.size()) +
                          " samples are bad; check units and driver. First: " +

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/first_not_before.h"
 #include "core/so3.h"
 #include "sensors/io/log_checks.h"
 #include "sensors/smoother/standstill.h"
@@ -13,19 +14,6 @@ namespace {
 
 // Images further apart than this belong to different recordings.
 constexpr double kMaxFilledGapS = 600.0;
-timestamp_t NsFromSeconds(double seconds) {
-  return std::llround(1e9 * seconds);
-}
-
-template <typename Sample>
-typename std::vector<Sample>::const_iterator FirstNotBefore(
-    const std::vector<Sample>& samples, timestamp_t time_ns) {
-  return std::lower_bound(samples.begin(), samples.end(), time_ns,
-                          [](const Sample& sample, timestamp_t time) {
-                            return sample.timestamp_ns < time;
-                          });
-}
-
 template <typename Sample>
 double RateHz(const std::vector<Sample>& samples) {
   std::vector<timestamp_t> times;

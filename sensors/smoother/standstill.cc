@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/first_not_before.h"
 #include "core/median.h"
 #include "core/so3.h"
 #include "sensors/io/log_checks.h"
@@ -32,15 +33,6 @@ constexpr int kMinNumBlocks = 3;
 constexpr double kPriorBlocks = 2.0;
 
 using SampleIterator = std::vector<ImuSample>::const_iterator;
-
-template <typename Sample>
-typename std::vector<Sample>::const_iterator FirstNotBefore(
-    const std::vector<Sample>& samples, timestamp_t time_ns) {
-  return std::lower_bound(samples.begin(), samples.end(), time_ns,
-                          [](const Sample& sample, timestamp_t time) {
-                            return sample.timestamp_ns < time;
-                          });
-}
 
 struct SampleMoments {
   Eigen::Vector3d mean_rate = Eigen::Vector3d::Zero();
@@ -80,7 +72,7 @@ bool WheelsStandStill(const std::vector<WheelSpeed>& speeds,
 // Whether the machine stands still in the second around a time.
 StandstillKind FindCandidate(const MotionLogs& logs, timestamp_t time_ns,
                              const ImuNoise& noise, double imu_rate_hz) {
-  const timestamp_t half = std::llround(1e9 * kHalfWindowS);
+  const timestamp_t half = NsFromSeconds(kHalfWindowS);
   const timestamp_t start = time_ns - half, end = time_ns + half;
   const auto first = FirstNotBefore(logs.imu, start);
   const auto last = FirstNotBefore(logs.imu, end);
