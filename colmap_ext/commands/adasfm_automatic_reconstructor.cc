@@ -73,6 +73,9 @@ void AddFeatureOptions(FeatureOptions* features, CommandOptions* command) {
                       "larger photos are scaled down for the detector [px]");
   command->AddDefault("max_num_features", &features->max_num_features,
                       "features of a photo at most");
+  command->AddDefault("extractor", &features->extractor,
+                      "SIFT by colmap, or by opencv: on the CPU in less than "
+                      "half of the time, not for the GPU");
   command->AddDefault("first_octave", &features->first_octave,
                       "SIFT begins with the photo at twice its size (-1), or "
                       "as it is (0): four times as fast, with fewer features");

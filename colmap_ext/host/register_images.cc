@@ -200,6 +200,10 @@ bool FeatureOptions::IsValid(std::string* error) const {
   } else if (first_octave < -1 || first_octave > 0) {
     *error =
         "first_octave = " + std::to_string(first_octave) + " must be -1 or 0";
+  } else if (extractor != "colmap" && extractor != "opencv") {
+    *error = "extractor = " + extractor + " must be colmap or opencv";
+  } else if (extractor == "opencv" && (first_octave == 0 || use_gpu == 1)) {
+    *error = "extractor = opencv takes first_octave = -1 only, and has no GPU";
   } else {
     return true;
   }

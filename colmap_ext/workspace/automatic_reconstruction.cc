@@ -12,6 +12,7 @@
 #include "colmap_ext/bags/extract_video.h"
 #include "colmap_ext/coarse/global_report.h"
 #include "colmap_ext/database/prior_tables.h"
+#include "colmap_ext/features/extract_sift.h"
 #include "colmap_ext/host/color_points.h"
 #include "colmap_ext/host/model.h"
 #include "colmap_ext/io/digest.h"
@@ -251,12 +252,20 @@ Status Reconstructor::ExtractAll(const std::vector<std::string>& names) {
           std::to_string(names.size()) + " files (the first one is " +
           images->unreadable.front() + ")"});
   }
-  return ExtractFeatures(
-      options_.features, paths_.image_path, database_path_,
-      InWorkspace("logs/features.log"),
+  const ProgressCallback extraction_progress =
       [&progress](const std::string& what, double share_done) {
         progress(what, 0.1 + 0.9 * share_done);
-      });
+      };
+  if (options_.features.extractor == "opencv") {
+    SiftFeatureOptions sift;
+    sift.max_image_size = options_.features.max_image_size;
+    sift.max_num_features = options_.features.max_num_features;
+    return ExtractSiftOfDatabase(sift, options_.features.num_threads,
+                                 paths_.image_path, database_path_,
+                                 extraction_progress);
+  }
+  return ExtractFeatures(options_.features, paths_.image_path, database_path_,
+                         InWorkspace("logs/features.log"), extraction_progress);
 }
 
 Status Reconstructor::Features() {
@@ -276,6 +285,7 @@ Status Reconstructor::Features() {
       {"single_camera", std::to_string(features.single_camera)},
       {"max_image_size", std::to_string(features.max_image_size)},
       {"max_num_features", std::to_string(features.max_num_features)},
+      {"extractor", features.extractor},
       {"first_octave", std::to_string(features.first_octave)}};
   return RunStep("features", inputs,
                  {[this] { return ResetFeatures(paths_.workspace_path); },

@@ -1,0 +1,121 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "colmap_ext/features/sift_features.h"
+
+#include <algorithm>
+#include <cmath>
+#include <opencv2/features2d.hpp>
+#include <opencv2/imgproc.hpp>
+#include <stdexcept>
+#include <tuple>
+#include <vector>
+
+namespace adasfm {
+namespace {
+
+// COLMAP's defaults (SiftExtractionOptions); its peak threshold is this one
+// divided by the number of scales, as OpenCV does itself.
+constexpr int kScalesPerOctave = 3;
+constexpr double kContrastThreshold = 0.02;
+constexpr double kEdgeThreshold = 10.0;
+constexpr double kFirstSigma = 1.6;
+// OpenCV counts from the centre of the first pixel, COLMAP from its corner.
+// OpenCV's doubled image lies a quarter of a pixel beside: pixel x of the image
+// is at 2 x + 0.5, and the keypoint's place there is only halved.
+constexpr float kCenterFromCorner = 0.5F;
+constexpr float kDoublingShift = -0.25F;
+// OpenCV gives the diameter at one sigma.
+constexpr float kScaleFromSize = 0.5F;
+constexpr float kDescriptorFactor = 512.0F;
+
+// Scales the image down to options.max_image_size. Returns the factor from its
+// pixels to those of the image as it was, for x and for y.
+Eigen::Vector2f LimitSize(int max_image_size, cv::Mat* image) {
+  const int larger = std::max(image->cols, image->rows);
+  if (larger <= max_image_size) return Eigen::Vector2f::Ones();
+  const double factor = static_cast<double>(max_image_size) / larger;
+  const cv::Size size(std::max(1, static_cast<int>(image->cols * factor)),
+                      std::max(1, static_cast<int>(image->rows * factor)));
+  const Eigen::Vector2f scale(static_cast<float>(image->cols) / size.width,
+                              static_cast<float>(image->rows) / size.height);
+  cv::Mat resized;
+  cv::resize(*image, resized, size, 0.0, 0.0, cv::INTER_AREA);
+  *image = resized;
+  return scale;
+}
+
+// The largest ones first; equal sizes in an order that does not depend on the
+// detector's threads.
+void KeepLargest(size_t max_count, std::vector<cv::KeyPoint>* keypoints) {
+  const auto key = [](const cv::KeyPoint& keypoint) {
+    return std::make_tuple(-keypoint.size, keypoint.pt.y, keypoint.pt.x,
+                           keypoint.angle);
+  };
+  std::sort(keypoints->begin(), keypoints->end(),
+            [&key](const cv::KeyPoint& a, const cv::KeyPoint& b) {
+              return key(a) < key(b);
+            });
+  if (keypoints->size() > max_count) keypoints->resize(max_count);
+}
+
+void WriteKeypoint(
+    const cv::KeyPoint& keypoint, const Eigen::Vector2f& scale,
+    Eigen::Ref<Eigen::Matrix<float, 1, 6, Eigen::RowMajor>> row) {
+  constexpr float kOffset = kCenterFromCorner + kDoublingShift;
+  const float sigma = kScaleFromSize * keypoint.size * scale.mean();
+  const float angle = keypoint.angle * static_cast<float>(M_PI / 180.0);
+  row << (keypoint.pt.x + kOffset) * scale.x(),
+      (keypoint.pt.y + kOffset) * scale.y(), sigma * std::cos(angle),
+      -sigma * std::sin(angle), sigma * std::sin(angle),
+      sigma * std::cos(angle);
+}
+
+}  // namespace
+
+bool SiftFeatureOptions::IsValid(std::string* error) const {
+  if (max_image_size < 1) {
+    *error = "max_image_size = " + std::to_string(max_image_size) +
+             " must be positive";
+  } else if (max_num_features < 1) {
+    *error = "max_num_features = " + std::to_string(max_num_features) +
+             " must be positive";
+  } else {
+    return true;
+  }
+  return false;
+}
+
+SiftFeatures ExtractSiftFeatures(const SiftFeatureOptions& options,
+                                 const cv::Mat& image) {
+  std::string error;
+  if (!options.IsValid(&error)) throw std::invalid_argument(error);
+  cv::Mat limited = image;
+  const Eigen::Vector2f scale = LimitSize(options.max_image_size, &limited);
+  const cv::Ptr<cv::SIFT> sift = cv::SIFT::create(
+      /*nfeatures=*/0, kScalesPerOctave, kContrastThreshold, kEdgeThreshold,
+      kFirstSigma);
+  std::vector<cv::KeyPoint> keypoints;
+  sift->detect(limited, keypoints);
+  KeepLargest(options.max_num_features, &keypoints);
+  cv::Mat numbers;
+  if (!keypoints.empty()) sift->compute(limited, keypoints, numbers);
+
+  SiftFeatures features;
+  features.keypoints.resize(keypoints.size(), Eigen::NoChange);
+  features.descriptors.resize(keypoints.size(), Eigen::NoChange);
+  for (size_t i = 0; i < keypoints.size(); ++i) {
+    WriteKeypoint(keypoints[i], scale, features.keypoints.row(i));
+    const Eigen::Map<const Eigen::Matrix<float, 1, 128>> descriptor(
+        numbers.ptr<float>(i));
+    const float sum = std::max(descriptor.sum(), 1.0F);
+    features.descriptors.row(i) =
+        (descriptor / sum)
+            .cwiseSqrt()
+            .unaryExpr([](float number) {
+              return std::min(std::round(kDescriptorFactor * number), 255.0F);
+            })
+            .cast<uint8_t>();
+  }
+  return features;
+}
+
+}  // namespace adasfm
