@@ -15,14 +15,16 @@ class Failed(Exception):
   """A command that did not end well; its output is in the log."""
 
 
-def run(arguments, log_path, timeout=None):
-  """Runs a command; returns its Usage. Raises Failed."""
+def run(arguments, log_path, timeout=None, environment=None):
+  """Runs a command, with these variables besides; returns its Usage. Raises
+  Failed."""
   started = time.monotonic()
   with open(log_path, 'ab') as log:
     log.write(('$ ' + ' '.join(arguments) + '\n').encode())
     log.flush()
     process = subprocess.Popen(arguments, stdout=log, stderr=log,
-                               stdin=subprocess.DEVNULL)
+                               stdin=subprocess.DEVNULL,
+                               env=dict(os.environ, **(environment or {})))
     # wait4 gives this child's own peak memory, but knows no timeout.
     killed = threading.Event()
 

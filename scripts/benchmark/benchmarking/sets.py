@@ -23,7 +23,8 @@ KINDS = {
 }
 
 # Real sequences (or worlds of other generators) in the folder --data_path.
-REAL_SETS = ['kitti01-51', 'kitti06-51', 'kitti07-160', 'world-alias-300']
+REAL_SETS = ['kitti01-51', 'kitti06-51', 'kitti07-160', 'world-alias-300',
+             'world-clean-300', 'world-hard-400', 'world-kitti10-592']
 
 QUICK = ['clean-250', 'clean-500', 'clean-1000', 'alias-300', 'blackout-250',
          'straight-250', 'sparse-250', 'fisheye-250']
@@ -73,8 +74,23 @@ def make_database(name, folder, args):
   if os.path.exists(database):
     return source
   if os.path.exists(os.path.join(source, 'database.db')):
-    shutil.copy(os.path.join(source, 'database.db'), database)
+    shutil.copyfile(os.path.join(source, 'database.db'), database)
     return source
+  extract_and_match(name, source, args, log_path)
+  shutil.copyfile(features_path(name, args), database)
+  return source
+
+
+def features_path(name, args):
+  """COLMAP's own work, which our version does not change."""
+  return os.path.join(args.features_path, name + '.db')
+
+
+def extract_and_match(name, source, args, log_path):
+  database = features_path(name, args)
+  if os.path.exists(database):
+    return
+  os.makedirs(args.features_path, exist_ok=True)
   temporary = database + '.part'
   if os.path.exists(temporary):
     os.remove(temporary)
@@ -90,4 +106,3 @@ def make_database(name, folder, args):
        '--SequentialMatching.overlap', '8', '--%s.use_gpu' % matching, '0'],
       log_path)
   os.rename(temporary, database)
-  return source
