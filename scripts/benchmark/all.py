@@ -108,8 +108,9 @@ class Benchmark:
     if self.args.run and names:
       call('benchmark.py', [
           *names, '--methods', ','.join(methods), *peers, '--output_path',
-          self.folder, '--data_path', self.args.data_path, '--colmap',
-          self.args.colmap])
+          self.folder, '--data_path', self.args.data_path,
+          '--features_path', os.path.join(self.args.output_path, 'features'),
+          '--colmap', self.args.colmap])
 
   def entries(self, names, methods):
     """The rows of a table, of one version."""
@@ -194,6 +195,10 @@ STEPS = {
     'readme': lambda args: Benchmark(args).readme(),
     'cleaner': lambda args: Benchmark(args).cleaner(),
     'ablations': lambda args: Benchmark(args).ablations(),
+    'two_view': lambda args: run_script(args, 'two_view', 'two_view_tables.py',
+                                        '--data_path', args.data_path,
+                                        '--features_path', os.path.join(
+                                            args.output_path, 'features')),
     'stress_worlds': lambda args: run_script(args, 'stress_worlds',
                                              'stress_worlds.py'),
     'global_results': lambda args: run_script(

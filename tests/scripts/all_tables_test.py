@@ -168,7 +168,7 @@ class PagesTest(Folder):
         ('README.md', ['summary']), ('docs/guide/cleaner.md', ['cleaner']),
         ('docs/results/benchmark.md', ['peers', 'ablations', 'growth']),
         *(('docs/results/%s.md' % step, [step]) for step in
-          all_tables.STEPS if step.startswith(('global_', 'stress_')))):
+          all_tables.STEPS if step.startswith(('global_', 'stress_', 'two_')))):
       text = read(os.path.join(root, page))
       for table in tables:
         write(self.path('copy.md'), text)

@@ -74,23 +74,28 @@ def make_database(name, folder, args):
   if os.path.exists(database):
     return source
   if os.path.exists(os.path.join(source, 'database.db')):
-    shutil.copyfile(os.path.join(source, 'database.db'), database)
+    copy_whole(os.path.join(source, 'database.db'), database)
     return source
-  extract_and_match(name, source, args, log_path)
-  shutil.copyfile(features_path(name, args), database)
+  copy_features(name, source, database, args, log_path)
   return source
 
 
-def features_path(name, args):
-  """COLMAP's own work, which our version does not change."""
-  return os.path.join(args.features_path, name + '.db')
+def copy_features(name, source, database, args, log_path):
+  """COLMAP's own work on real photos, which our version does not change."""
+  features = os.path.join(args.features_path, name + '.db')
+  if not os.path.exists(features):
+    os.makedirs(args.features_path, exist_ok=True)
+    extract_and_match(source, features, args, log_path)
+  copy_whole(features, database)
 
 
-def extract_and_match(name, source, args, log_path):
-  database = features_path(name, args)
-  if os.path.exists(database):
-    return
-  os.makedirs(args.features_path, exist_ok=True)
+def copy_whole(source, target):
+  """An interrupted copy has another name."""
+  shutil.copyfile(source, target + '.part')
+  os.replace(target + '.part', target)
+
+
+def extract_and_match(source, database, args, log_path):
   temporary = database + '.part'
   if os.path.exists(temporary):
     os.remove(temporary)
