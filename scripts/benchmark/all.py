@@ -222,7 +222,7 @@ def parse_arguments(words=None):
                       help='any of: %s; all when none is named' %
                       ', '.join(STEPS))
   parser.add_argument('--quick', action='store_true',
-                      help="only README's table: 20 minutes on two cores")
+                      help="only README's table: some 25 minutes on two cores")
   parser.add_argument('--draw', dest='run', action='store_const', const=0,
                       default=1, help='run nothing: only write the tables')
   parser.add_argument('--output_path',
@@ -231,8 +231,8 @@ def parse_arguments(words=None):
   parser.add_argument('--data_path',
                       default=os.path.join(ROOT, '..', 'shared', 'data'),
                       help='folder of the recordings')
-  parser.add_argument('--colmap', default=os.path.join(ROOT, 'build', 'bin',
-                                                       'colmap'),
+  build = os.environ.get('ADASFM_BUILD_DIR') or os.path.join(ROOT, 'build')
+  parser.add_argument('--colmap', default=os.path.join(build, 'bin', 'colmap'),
                       help='our launcher, built from these sources')
   parser.add_argument('--colmap4', default='',
                       help="COLMAP 4's program; default: Debian sid's, fetched")

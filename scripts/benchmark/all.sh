@@ -5,8 +5,8 @@
 # tables into the pages. Interrupted, it goes on where it was. What is missing
 # (the recordings, another COLMAP) is left out with one line.
 #
-#   scripts/benchmark/all.sh --quick    README's table and COLMAP 4 beside it: 20
-#                                       minutes on two idle cores
+#   scripts/benchmark/all.sh --quick    README's table and COLMAP 4 beside it: some
+#                                       25 minutes on two idle cores
 #   scripts/benchmark/all.sh            everything: a night
 #   scripts/benchmark/all.sh -h         all options
 set -euo pipefail

@@ -177,9 +177,9 @@ class PagesTest(Folder):
 
 def record(name, method, models, num_images=100, error=''):
   if error:
-    return {'set': name, 'method': method, 'seconds': 0, 'cpu_seconds': 0,
-            'peak_mib': 0, 'step_cpu_seconds': {}, 'evaluation': None,
-            'error': error}
+    return {'set': name, 'method': method, 'seconds': 2.0, 'cpu_seconds': 3.0,
+            'peak_mib': 50, 'step_cpu_seconds': {'failed': 3.0},
+            'evaluation': None, 'error': error}
   return {'set': name, 'method': method, 'seconds': 10.0, 'cpu_seconds': 15.0,
           'peak_mib': 100, 'step_cpu_seconds': {'clean': 5.0, 'map': 10.0},
           'evaluation': {'num_true_images': num_images, 'sim3': {'scale': 1.0}},
@@ -241,7 +241,7 @@ class AllTest(Folder):
     page = read(self.path('docs', 'results', 'benchmark.md'))
     self.assertIn('| 60 + 30 | 3.000, 0.050 | folded, in 2 models, 10 images '
                   'lost | 10.0 | 15.0 | 100 |', page)
-    self.assertIn('| mapper ended with 1 |', page)
+    self.assertIn('| no model: mapper ended with 1 | 2.0 | 3.0 | 50 |', page)
     figures = json.loads(read(self.path('figures', 'benchmark.json')))
     self.assertEqual(len(figures['rows']), 8)
 

@@ -199,7 +199,8 @@ def run_method(name, method, folder, source, args):
   try:
     _, steps = _run_steps(method, folder, source, args)
   except Failed as error:
-    return [dict(_record(name, method, {}, None), error=str(error))]
+    return [dict(_record(name, method, {'failed': error.usage}, None),
+                 error=str(error))]
   records = [_record(name, method, steps, score('model'))]
   records[0]['models'] = list_models(os.path.join(folder, 'model'),
                                      ground_truth, args, log_path)

@@ -78,9 +78,9 @@ def detail_row(name, heading, record):
   times = '%.1f | %.1f | %d' % (record['seconds'], record['cpu_seconds'],
                                 record['peak_mib'])
   if not record.get('models'):
-    return '| %s | %s | - | - | %s | %s |' % (
-        name, heading, record.get('error', 'no model').split(', see ')[0],
-        times if record['seconds'] else ' | | ')
+    why = record.get('error', '').split(', see ')[0]
+    return '| %s | %s | - | - | no model%s | %s |' % (
+        name, heading, why and ': ' + why, times)
   models = record['models']
   return '| %s | %s | %s | %s | %s | %s |' % (
       name, heading, ' + '.join(str(m['images']) for m in models),
