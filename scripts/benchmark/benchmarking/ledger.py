@@ -16,7 +16,8 @@ import subprocess
 
 # The product: what a figure can depend on.
 PRODUCT = ('CMakeLists.txt', 'cmake', 'core', 'sensors', 'global', 'partition',
-           'synthetic', 'colmap_ext')
+           'synthetic', 'colmap_ext', 'scripts/clean_database.sh',
+           'scripts/drop_weak_joins.py')
 
 
 class MixedVersions(Exception):
