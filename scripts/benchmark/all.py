@@ -13,6 +13,7 @@ import argparse
 import os
 import subprocess
 import sys
+import time
 
 ROOT = os.path.abspath(os.path.join(os.path.dirname(__file__), '..', '..'))
 
@@ -258,6 +259,7 @@ def main():
   sources = hash_sources(ROOT)
   for step in args.steps:
     print('== %s' % step, flush=True)
+    started = time.monotonic()
     try:
       STEPS[step](args)
     except MixedVersions as error:
@@ -266,6 +268,8 @@ def main():
       sys.exit('%s: %s ended with %d' % (step, error.cmd[1], error.returncode))
     if hash_sources(ROOT) != sources:
       sys.exit('%s: the sources changed meanwhile: run it again' % step)
+    print('%s: %.1f min' % (step, (time.monotonic() - started) / 60),
+          flush=True)
   print('done; git diff shows the tables')
 
 
