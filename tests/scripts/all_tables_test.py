@@ -110,6 +110,15 @@ class VersionTest(Folder):
     os.rename(self.path('core', 'a.cc'), self.path('core', 'b.cc'))
     self.assertNotEqual(hash_sources(self.folder), changed)
 
+  def test_a_row_during_which_the_sources_change_does_not_count(self):
+    source = self.path('core', 'a.cc')
+    write(source, 'int a;')
+    ledger = Ledger(self.path('rows.jsonl'), make_stamp(self.folder),
+                    self.folder)
+    with self.assertRaisesRegex(MixedVersions, 'changed while one ran'):
+      ledger.run('one', lambda: write(source, 'int b;') or [{}])
+    self.assertFalse(os.path.exists(self.path('rows.jsonl')))
+
   def test_tables_are_made_of_one_version(self):
     write(self.path('core', 'a.cc'), 'int a;')
     page = self.path('page.md')

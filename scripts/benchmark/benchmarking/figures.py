@@ -39,7 +39,7 @@ def open_ledger(args):
   runs of this version; those of other versions are removed."""
   os.makedirs(args.output_path, exist_ok=True)
   ledger = Ledger(os.path.join(args.output_path, 'rows.jsonl'),
-                  make_stamp(args.root))
+                  make_stamp(args.root), args.root)
   folder = 'runs-' + ledger.stamp['sources']
   for name in os.listdir(args.output_path):
     if name.startswith('runs-') and name != folder:

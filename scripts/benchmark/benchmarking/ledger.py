@@ -21,7 +21,8 @@ PRODUCT = ('CMakeLists.txt', 'cmake', 'core', 'sensors', 'global', 'partition',
 
 
 class MixedVersions(Exception):
-  """Rows of one table come from different sources or machines."""
+  """Rows of one table, or parts of a row, come from different sources or
+  machines."""
 
 
 def hash_sources(root):
@@ -76,9 +77,11 @@ def _identity(stamp):
 
 class Ledger:
 
-  def __init__(self, path, stamp):
+  def __init__(self, path, stamp, root=None):
+    """With root, rows during which its sources change are refused."""
     self.path = path
     self.stamp = stamp
+    self.root = root
     self.last = {}
     if os.path.exists(path):
       with open(path) as file:
@@ -105,6 +108,9 @@ class Ledger:
                'date': datetime.date.today().isoformat(),
                'load': round(os.getloadavg()[0], 1)}
       records = entry['records'] = function()
+      if self.root and hash_sources(self.root) != self.stamp['sources']:
+        raise MixedVersions('the sources changed while %s ran: run it again' %
+                            key)
       line = json.dumps(entry) + '\n'
       if self._ends_within_a_line():
         line = '\n' + line
