@@ -30,12 +30,14 @@ def make_photos(name, args):
   if name != RENDERED:
     return os.path.join(args.data_path, name)
   folder = os.path.join(args.output_path, name + '-photos')
-  if not os.path.exists(os.path.join(folder, 'gt.txt')):
-    shutil.rmtree(folder, ignore_errors=True)
-    os.makedirs(folder)
-    run([args.colmap, 'adasfm_synthesizer', '--output_path', folder,
+  if not os.path.exists(folder):
+    temporary = folder + '.part'
+    shutil.rmtree(temporary, ignore_errors=True)
+    os.makedirs(temporary)
+    run([args.colmap, 'adasfm_synthesizer', '--output_path', temporary,
          '--num_images', name.split('-')[1], '--render', '1'],
         os.path.join(args.output_path, 'make.log'))
+    os.rename(temporary, folder)
   return folder
 
 
