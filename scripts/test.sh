@@ -3,29 +3,55 @@
 # Sets up what is missing and runs all tests: format, layers, unit and
 # command-line tests with warnings as errors, the report in a browser, the
 # packages, the documentation's commands, and the pure layers' tests once more
-# under AddressSanitizer and UBSan.
+# under AddressSanitizer and UBSan. Says at the end what was tested in which half
+# hour, and which tests took longest.
 #
 #   scripts/test.sh [--no-sanitizers]
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 
 jobs=$(nproc)
+build=${ADASFM_BUILD_DIR:-build}
+steps=$(mktemp)
+logs=()
+
+# Also when a test fails.
+report() {
+  if [ ${#logs[@]} != 0 ]; then
+    printf '\n== What was tested when\n'
+    python3 scripts/checks/test_times.py "$steps" "${logs[@]}" || true
+  fi
+  rm -f "$steps"
+}
+trap report EXIT
+
+step() {
+  printf '\n== %s\n' "$1"
+  printf '%s\t%s\n' "$(date +%s)" "$1" >> "$steps"
+}
+
+# run_tests BUILD_DIR
+run_tests() {
+  logs+=("$1/Testing/Temporary/LastTest.log")
+  ctest --test-dir "$1" --output-on-failure --parallel "$jobs"
+}
+
+step 'Setting up and building'
 scripts/setup.sh --for-tests
-printf '\n== Checking format and layers\n'
+step 'Checking format and layers'
 scripts/checks/check_format.sh
 scripts/checks/check_layers.sh
 scripts/checks/check_host_part.sh
 
 if [ "${1:-}" != --no-sanitizers ]; then
-  printf '\n== Building the pure layers with sanitizers (about 4 minutes the first time)\n'
+  step 'Building the pure layers with sanitizers (about 4 minutes the first time)'
   cmake -S . -B build-sanitize -G Ninja -DCMAKE_BUILD_TYPE=RelWithDebInfo \
     -DADASFM_WITH_COLMAP=OFF -DADASFM_BUILD_BENCHMARKS=OFF \
     -DADASFM_SANITIZE=ON -DADASFM_WERROR=ON > /dev/null
   cmake --build build-sanitize --parallel "$jobs"
-  printf '\n== Running the unit tests under AddressSanitizer and UBSan\n'
-  ctest --test-dir build-sanitize --output-on-failure --parallel "$jobs"
+  step 'Running the unit tests under AddressSanitizer and UBSan'
+  run_tests build-sanitize
 fi
 
-printf '\n== Running all tests\n'
-ctest --test-dir "${ADASFM_BUILD_DIR:-build}" --output-on-failure \
-  --parallel "$jobs"
+step 'Running all tests'
+run_tests "$build"

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <base/reconstruction.h>
-
 #include <array>
 #include <limits>
 #include <map>
@@ -11,6 +9,7 @@
 #include <vector>
 
 #include "colmap_ext/bundle_adjustment/shared_errors.h"
+#include "colmap_ext/host/colmap.h"
 #include "core/camera_rig.h"
 #include "core/position_prior.h"
 #include "core/relative_pose_prior.h"

@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "colmap_ext/bundle_adjustment/create_reprojection_cost.h"
 
-#include <base/camera_models.h>
+#include <ceres/autodiff_cost_function.h>
+
+#include "colmap_ext/host/visit_camera_model.h"
 
 namespace adasfm {
 
@@ -33,17 +35,15 @@ bool NormalizeKeypoint(const colmap::Camera& camera, const Eigen::Vector2d& xy,
 std::unique_ptr<ceres::CostFunction> CreateCameraCost(
     const colmap::Camera& camera, const Eigen::Vector2d& xy, double sigma_px,
     const AdjustedPose* pose) {
-  switch (camera.ModelId()) {
-#define CAMERA_MODEL_CASE(Model)                         \
-  case colmap::Model::kModelId:                          \
-    return std::make_unique<ceres::AutoDiffCostFunction< \
-        CameraReprojectionCost<colmap::Model>, 2, 6, 3,  \
-        static_cast<int>(colmap::Model::kNumParams)>>(   \
-        new CameraReprojectionCost<colmap::Model>(xy, sigma_px, pose));
-    CAMERA_MODEL_CASES
-#undef CAMERA_MODEL_CASE
-  }
-  return nullptr;
+  std::unique_ptr<ceres::CostFunction> cost;
+  VisitCameraModel(camera.ModelId(), [&](auto model) {
+    using Model = decltype(model);
+    using Cost = CameraReprojectionCost<Model>;
+    cost = std::make_unique<ceres::AutoDiffCostFunction<
+        Cost, 2, 6, 3, static_cast<int>(Model::kNumParams)>>(
+        new Cost(xy, sigma_px, pose));
+  });
+  return cost;
 }
 
 }  // namespace adasfm

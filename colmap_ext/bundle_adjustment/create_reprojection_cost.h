@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <base/camera.h>
 #include <ceres/cost_function.h>
 
 #include <Eigen/Core>
@@ -9,6 +8,7 @@
 
 #include "colmap_ext/bundle_adjustment/adjusted_pose.h"
 #include "colmap_ext/bundle_adjustment/reprojection_cost.h"
+#include "colmap_ext/host/colmap.h"
 
 namespace adasfm {
 

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <base/reconstruction.h>
-
 #include <map>
 #include <optional>
 #include <string>
@@ -11,6 +9,7 @@
 #include "colmap_ext/bundle_adjustment/balance_priors.h"
 #include "colmap_ext/bundle_adjustment/bundle_adjustment.h"
 #include "colmap_ext/bundle_adjustment/find_focal_length_error.h"
+#include "colmap_ext/host/colmap.h"
 #include "colmap_ext/scene/align_to_positions.h"
 #include "colmap_ext/scene/scene_data.h"
 #include "core/bearing.h"

@@ -1,10 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "colmap_ext/datasets/write_synthetic_world.h"
 
-#include <base/camera_models.h>
-#include <base/database.h>
-#include <estimators/two_view_geometry.h>
-
 #include <algorithm>
 #include <cstdio>
 #include <filesystem>
@@ -15,6 +11,7 @@
 #include <system_error>
 #include <vector>
 
+#include "colmap_ext/host/colmap.h"
 #include "colmap_ext/io/output_files.h"
 #include "core/so3.h"
 #include "core/sqlite.h"

@@ -1,11 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// COLMAP specialises vectors of Eigen's types: before anything that uses them.
-#include <util/alignment.h>
-
 #include <string>
 
+// COLMAP specialises vectors of Eigen's types: before anything that uses them.
+#include "colmap_ext/host/colmap.h"
 #include "core/geodesy.h"
 #include "core/status.h"
 #include "synthetic/synthetic_world.h"

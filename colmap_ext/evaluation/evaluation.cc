@@ -206,9 +206,7 @@ NamedPoses PosesOfModel(const colmap::Reconstruction& reconstruction) {
   NamedPoses poses;
   for (const image_t image_id : reconstruction.RegImageIds()) {
     const colmap::Image& image = reconstruction.Image(image_id);
-    const Eigen::Vector4d& qvec = image.Qvec();
-    poses[image.Name()] = Rigid3d(
-        Eigen::Quaterniond(qvec(0), qvec(1), qvec(2), qvec(3)), image.Tvec());
+    poses[image.Name()] = CamFromWorld(image);
   }
   return poses;
 }

@@ -1,13 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <base/reconstruction.h>
-
 #include <map>
 #include <string>
 #include <vector>
 
 #include "colmap_ext/evaluation/relative_pose_auc.h"
+#include "colmap_ext/host/colmap.h"
 #include "core/rigid3d.h"
 #include "core/status.h"
 #include "core/types.h"

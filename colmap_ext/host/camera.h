@@ -1,12 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <base/camera.h>
-
 #include <Eigen/Core>
 #include <optional>
 #include <vector>
 
+#include "colmap_ext/host/colmap.h"
 #include "core/bearing.h"
 
 namespace adasfm {

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <base/camera.h>
-
 #include <Eigen/Core>
 #include <cstdint>
 #include <functional>
@@ -11,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "colmap_ext/host/colmap.h"
 #include "core/rigid3d.h"
 #include "core/sqlite.h"
 #include "core/status.h"

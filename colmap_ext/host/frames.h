@@ -1,12 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <base/reconstruction.h>
-
 #include <cstdint>
 #include <map>
 #include <string>
 
+#include "colmap_ext/host/colmap.h"
 #include "core/camera_rig.h"
 #include "core/sqlite.h"
 #include "core/status.h"

@@ -1,14 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <base/correspondence_graph.h>
-#include <base/reconstruction.h>
-
 #include <Eigen/Core>
 #include <memory>
 #include <string>
 #include <vector>
 
+#include "colmap_ext/host/colmap.h"
 #include "core/rigid3d.h"
 #include "core/types.h"
 

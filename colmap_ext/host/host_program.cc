@@ -5,7 +5,6 @@
 #include <signal.h>
 #include <sys/wait.h>
 #include <unistd.h>
-#include <util/version.h>
 
 #include <chrono>
 #include <cstdio>
@@ -148,8 +147,6 @@ std::optional<Version> ParseColmapVersion(const std::string& version) {
   }
   return numbers;
 }
-
-std::string LinkedColmapVersion() { return colmap::COLMAP_VERSION; }
 
 std::string FindHostConflict(const std::string& host_path,
                              const std::string& database_path) {

@@ -1,11 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <base/reconstruction.h>
-
 #include <string>
 #include <vector>
 
+#include "colmap_ext/host/colmap.h"
 #include "colmap_ext/host/frames.h"
 #include "core/status.h"
 

@@ -1,11 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <base/reconstruction.h>
-
 #include <set>
 #include <vector>
 
+#include "colmap_ext/host/colmap.h"
 #include "colmap_ext/mapper/local_mapper_scene.h"
 #include "core/sim3d.h"
 #include "core/types.h"

@@ -1,14 +1,13 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <base/reconstruction.h>
-
 #include <memory>
 #include <set>
 #include <string>
 
 #include "colmap_ext/bundle_adjustment/balance_priors.h"
 #include "colmap_ext/bundle_adjustment/bundle_adjustment.h"
+#include "colmap_ext/host/colmap.h"
 #include "colmap_ext/mapper/initial_pair.h"
 #include "colmap_ext/mapper/local_mapper_scene.h"
 #include "colmap_ext/mapper/register_image.h"

@@ -1,13 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <base/reconstruction.h>
-
 #include <map>
 #include <memory>
 #include <set>
 #include <vector>
 
+#include "colmap_ext/host/colmap.h"
 #include "colmap_ext/host/host_mapper.h"
 #include "colmap_ext/scene/scene_data.h"
 #include "core/rigid3d.h"

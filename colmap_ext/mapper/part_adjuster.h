@@ -1,12 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <base/reconstruction.h>
-
 #include <set>
 #include <vector>
 
 #include "colmap_ext/bundle_adjustment/bundle_adjustment.h"
+#include "colmap_ext/host/colmap.h"
 #include "colmap_ext/mapper/local_mapper.h"
 #include "colmap_ext/mapper/local_mapper_scene.h"
 

@@ -1,11 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <base/reconstruction.h>
-
 #include <set>
 #include <string>
 
+#include "colmap_ext/host/colmap.h"
 #include "core/status.h"
 #include "core/types.h"
 

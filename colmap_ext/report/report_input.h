@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <base/reconstruction.h>
-
 #include <map>
 #include <optional>
 #include <string>
@@ -10,6 +8,7 @@
 
 #include "colmap_ext/database/prior_tables.h"
 #include "colmap_ext/evaluation/evaluation.h"
+#include "colmap_ext/host/colmap.h"
 #include "colmap_ext/report/report.h"
 #include "colmap_ext/report/report_pairs.h"
 #include "colmap_ext/report/report_scene.h"

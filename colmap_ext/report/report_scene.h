@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <base/reconstruction.h>
-
 #include <map>
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -10,6 +8,7 @@
 #include <vector>
 
 #include "colmap_ext/database/prior_tables.h"
+#include "colmap_ext/host/colmap.h"
 #include "core/rigid3d.h"
 #include "core/types.h"
 

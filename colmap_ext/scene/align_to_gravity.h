@@ -1,12 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <base/reconstruction.h>
-
 #include <Eigen/Geometry>
 #include <map>
 #include <optional>
 
+#include "colmap_ext/host/colmap.h"
 #include "colmap_ext/scene/scene_data.h"
 #include "core/sim3d.h"
 

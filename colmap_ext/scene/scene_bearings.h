@@ -1,11 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <base/reconstruction.h>
-
 #include <map>
 #include <vector>
 
+#include "colmap_ext/host/colmap.h"
 #include "colmap_ext/scene/scene_data.h"
 #include "core/bearing.h"
 #include "core/types.h"

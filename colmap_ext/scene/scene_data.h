@@ -1,14 +1,13 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <base/camera.h>
-
 #include <Eigen/Core>
 #include <map>
 #include <optional>
 #include <string>
 #include <vector>
 
+#include "colmap_ext/host/colmap.h"
 #include "colmap_ext/host/frames.h"
 #include "core/camera_rig.h"
 #include "core/position_prior.h"

@@ -2,25 +2,26 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Runs COLMAP's mappers and AdaSfM side by side on the same databases.
 
-Every figure of the README's tables comes from here. For each set it makes or
-copies a database and runs the methods in turn; with --repeats the methods
-alternate. Each run appends a JSON line to results.jsonl; results.md and the
-plots are drawn from all lines of that file, so a benchmark may be continued.
-Sets are made by `adasfm_synthesizer`; real sequences are used when a folder
-with them is given.
+For each set it makes or copies a database and runs the methods in turn; with
+--repeats the methods alternate. Each run appends a line to rows.jsonl and is not
+run again with the same version of the sources on the same machine, so a
+benchmark may be continued; results.json, results.md and the plots are drawn from
+all lines of today's version. Sets are made by `adasfm_synthesizer`; real
+sequences are used when a folder with them is given. all.sh calls this script for
+the tables of README.md and docs/.
 """
 
 import argparse
 import json
 import os
-import platform
 import re
-import subprocess
 import sys
 
 ROOT = os.path.abspath(os.path.join(os.path.dirname(__file__), '..', '..'))
 
 from benchmarking import sets, tables  # noqa: E402
+from benchmarking.figures import open_ledger  # noqa: E402
+from benchmarking.host_options import version_of  # noqa: E402
 from benchmarking.methods import ABLATIONS, METHODS, run_method  # noqa: E402
 
 # Sets beyond this size are run with AdaSfM alone unless --methods says more.
@@ -55,12 +56,18 @@ def parse_arguments():
                       help='our launcher')
   parser.add_argument('--host_colmap', default='',
                       help="the host's executable; default: through ours")
+  parser.add_argument('--features_path', default='',
+                      help="folder of COLMAP's databases of real photos; "
+                      'default: features in that of --output_path')
   parser.add_argument('--max_num_images', type=int, default=0,
                       help='worlds have no more than so many images (100 or '
                       'more, as blackouts have a size), and real sets are '
                       'left out: to see soon whether it all runs; 0: as named')
   parser.add_argument('--seed', type=int, default=1, help='of the worlds')
   args = parser.parse_args()
+  args.root = ROOT
+  args.features_path = args.features_path or os.path.join(args.output_path,
+                                                          'features')
   args.peers = {}
   for peer in args.peer:
     match = re.fullmatch(r'([^=]+)=([^:]+):([^:]+)(:cleaned)?', peer)
@@ -102,17 +109,14 @@ def methods_of(name, args):
   return METHODS + list(args.peers)
 
 
-def describe_machine():
-  commit = subprocess.run(['git', '-C', ROOT, 'describe', '--always',
-                           '--dirty'], capture_output=True, text=True)
-  return {'commit': commit.stdout.strip(), 'cores': os.cpu_count(),
-          'machine': platform.machine(),
-          'load': round(os.getloadavg()[0], 1)}
+def spec_of(method, args):
+  """What a run depends on besides the product."""
+  executable, *how = args.peers.get(method, (args.host_colmap or args.colmap,))
+  return [version_of(executable), args.seed, args.timeout, *how]
 
 
-def read_records(path):
-  with open(path) as file:
-    return [json.loads(line) for line in file]
+def key_of(name, method, repeat):
+  return '%s %s %d' % (name, method, repeat)
 
 
 def write_tables(records, folder):
@@ -143,23 +147,30 @@ def write_tables(records, folder):
 
 def main():
   args = parse_arguments()
-  os.makedirs(args.output_path, exist_ok=True)
-  results_path = os.path.join(args.output_path, 'results.jsonl')
+  top = args.output_path
+  ledger = open_ledger(args)
+  specs = {}
   for name in args.sets:
     folder = os.path.join(args.output_path, name)
     os.makedirs(folder, exist_ok=True)
-    source = sets.make_database(name, folder, args)
-    for _ in range(args.repeats):
+    for repeat in range(args.repeats):
       for method in methods_of(name, args):
         print('%s: %s' % (name, method), file=sys.stderr, flush=True)
-        machine = describe_machine()
-        records = run_method(name, method, os.path.join(folder, method),
-                             source, args)
-        with open(results_path, 'a') as file:
-          for record in records:
-            file.write(json.dumps(dict(record, **machine)) + '\n')
-  records = read_records(results_path)
-  write_tables(records, args.output_path)
+        if method not in specs:
+          specs[method] = spec_of(method, args)
+
+        def execute():
+          source = sets.make_database(name, folder, args)
+          return run_method(name, method, os.path.join(folder, method), source,
+                            args)
+
+        ledger.run(key_of(name, method, repeat), execute, specs[method])
+  entries = ledger.current()
+  records = [record for entry in entries for record in entry['records']]
+  with open(os.path.join(top, 'results.json'), 'w') as file:
+    json.dump({'stamp': ledger.stamp, 'records': records}, file, indent=1)
+    file.write('\n')
+  write_tables(records, top)
   print(tables.long_table(records))
 
 

@@ -10,13 +10,13 @@ truth before and after. Needs only Python's standard library.
 """
 
 import argparse
+import functools
 import json
 import os
 import shutil
 import statistics
-import sys
 
-from benchmarking.figures import add_arguments, write_results
+from benchmarking.figures import add_arguments, run_table
 from benchmarking.methods import evaluate
 from benchmarking.process import Failed, run
 
@@ -137,6 +137,10 @@ def run_variant(variant, folder, args):
   return record
 
 
+def run_row(variant, num_images, seed, args):
+  return run_variant(variant, make_world(num_images, seed, args), args)
+
+
 def failed(figures):
   return (not figures or figures['images'] < figures['true_images'] or
           figures['rmse_m'] > MAX_ERROR_M)
@@ -250,8 +254,7 @@ def histogram_table(pairs):
 
 def report(records, args):
   pairs = [r['pairs'] for r in records if 'pairs' in r]
-  lines = ['# Figures of the coarse global stage', '',
-           'Written by `scripts/benchmark/global_tables.py`; the runs behind it are in '
+  lines = ['Written by `scripts/benchmark/global_tables.py`; the runs behind it are in '
            '`%s`. Worlds: `adasfm_synthesizer %s`, %s images, '
            'seeds %s. Errors are the RMSE of camera centres after a '
            'similarity. A model that lacks images or errs by more than '
@@ -310,17 +313,12 @@ def parse_arguments():
 
 def main():
   args = parse_arguments()
-  records = []
-  for seed in args.seeds:
-    for num_images in args.sizes:
-      folder = make_world(num_images, seed, args)
-      for variant in args.variants:
-        record = run_variant(variant, folder, args)
-        records.append(record)
-        print('%s, %s: %s' % (record['world'], variant,
-                              record.get('error') or record.get('coarse')),
-              file=sys.stderr, flush=True)
-      write_results(records, report(records, args), args)
+  run_table({'%s %s' % (world_name(num_images, seed), variant):
+             ([VARIANTS[variant], hard_options(args), args.compare_pairs,
+               variant in args.mapper_variants],
+              functools.partial(run_row, variant, num_images, seed, args))
+             for seed in args.seeds for num_images in args.sizes
+             for variant in args.variants}, report, args)
 
 
 if __name__ == '__main__':

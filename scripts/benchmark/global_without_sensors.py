@@ -9,14 +9,14 @@ docs/results/global_without_sensors.md and the figures behind it
 """
 
 import argparse
+import functools
 import json
 import os
 import shutil
 import statistics
-import sys
 
-from benchmarking.figures import (add_arguments, measure, world_folder,
-                                  write_results)
+from benchmarking.figures import (add_arguments, measure, run_table,
+                                  world_folder)
 from benchmarking.methods import fixed_intrinsics
 from benchmarking.process import Failed, run
 
@@ -76,7 +76,7 @@ def run_world(name, seed, args):
     run_ours(folder, args, record)
     run_host(folder, args, record)
   except Failed as error:
-    record['error'] = os.path.basename(str(error))
+    record['error'] = str(error).split(', see ')[0]
   if not args.keep:
     shutil.rmtree(folder)
   return record
@@ -121,8 +121,7 @@ def count_folded(records):
 
 
 def report(records, args):
-  lines = ['# Without sensors', '',
-           'Written by `scripts/benchmark/global_without_sensors.py`; the runs behind it are '
+  lines = ['Written by `scripts/benchmark/global_without_sensors.py`; the runs behind it are '
            'in `%s`. Worlds of %d images by `adasfm_synthesizer`, seeds %s; '
            'the same database for all, fixed intrinsics, the logs not imported. '
            'Errors are the RMSE of camera centres after a similarity, of the '
@@ -180,13 +179,10 @@ def parse_arguments():
 
 def main():
   args = parse_arguments()
-  records = []
-  for name in args.worlds:
-    for seed in args.seeds:
-      records.append(run_world(name, seed, args))
-      print('%s, seed %d: %s' % (name, seed, records[-1]), file=sys.stderr,
-            flush=True)
-      write_results(records, report(records, args), args)
+  run_table({'%s %d' % (name, seed):
+             ([WORLDS[name], args.num_images, args.host_colmap],
+              functools.partial(run_world, name, seed, args))
+             for name in args.worlds for seed in args.seeds}, report, args)
 
 
 if __name__ == '__main__':

@@ -10,13 +10,13 @@ writes docs/results/global_worlds.md and the figures behind it
 """
 
 import argparse
+import functools
 import json
 import os
 import shutil
-import sys
 
-from benchmarking.figures import (add_arguments, measure, world_folder,
-                                  write_results)
+from benchmarking.figures import (add_arguments, measure, run_table,
+                                  world_folder)
 from benchmarking.process import Failed, run
 from benchmarking.spoil import (add_imu_noise, cut_logs, forget_focal_length,
                                 keep_every, scale_focal_length, scale_wheels,
@@ -163,7 +163,7 @@ def run_world(name, seed, args):
   try:
     run_commands(WORLDS[name], folder, args, record)
   except Failed as error:
-    record['error'] = os.path.basename(str(error))
+    record['error'] = str(error).split(', see ')[0]
   if not args.keep:
     shutil.rmtree(folder)
   return record
@@ -201,8 +201,7 @@ def describe(record):
 
 
 def report(records, args):
-  lines = ['# Other worlds, worse sensors', '',
-           'Written by `scripts/benchmark/global_worlds.py`; the runs behind it are in '
+  lines = ['Written by `scripts/benchmark/global_worlds.py`; the runs behind it are in '
            '`%s`. Each world is `adasfm_synthesizer %s` with what its '
            'name says. Errors are the RMSE of camera centres after a similarity; '
            'scale is not known without wheels.' % (
@@ -245,14 +244,11 @@ def parse_arguments():
 
 def main():
   args = parse_arguments()
-  records = []
-  for name in args.worlds or WORLDS:
-    for seed in args.seeds:
-      records.append(run_world(name, seed, args))
-      print('%s, seed %d: %s %s' % (name, seed, records[-1].get('coarse'),
-                                    describe(records[-1])),
-            file=sys.stderr, flush=True)
-      write_results(records, report(records, args), args)
+  run_table({'%s %d' % (name, seed):
+             ([WORLDS[name]['synthesizer'], args.run_mapper],
+              functools.partial(run_world, name, seed, args))
+             for name in args.worlds or WORLDS for seed in args.seeds},
+            report, args)
 
 
 if __name__ == '__main__':

@@ -12,14 +12,14 @@ standard library.
 """
 
 import argparse
-import datetime
+import functools
 import json
 import os
-import platform
 import shutil
 import sys
 
-from benchmarking.figures import add_arguments, measure, world_folder
+from benchmarking.figures import (add_arguments, measure, run_table,
+                                  world_folder)
 from benchmarking.process import Failed, run
 
 # Without logs the scale drifts: a fold errs by more of the way driven.
@@ -31,7 +31,7 @@ ALL_LOGS = ('imu', 'wheel')
 # synthesizer.
 def dial(figures=(), images=150, logs=ALL_LOGS, bar_m=0.5,
          max_drift=MAX_DRIFT_WITHOUT_LOGS, **options):
-  return {'figures': figures, 'images': images, 'logs': logs, 'bar_m': bar_m,
+  return {'figures': list(figures), 'images': images, 'logs': list(logs), 'bar_m': bar_m,
           'max_drift': max_drift, 'options': options}
 
 
@@ -222,18 +222,15 @@ def format_figure(name, value):
 
 
 def report(records, args):
-  version = args.version or 'of the tree'
   lines = [
-      '# Worlds under stress', '',
-      'Written by `scripts/benchmark/stress_worlds.py --seeds %s` with version '
-      '%s on %d cores (%s), %s. Each row is one world: its dial with the value '
+      'Written by `scripts/benchmark/stress_worlds.py --seeds %s`. '
+      'Each row is one world: its dial with the value '
       'that `world.json` counted, then images and RMSE of camera centres after a '
       'similarity (the worst model where there are several), with the logs and '
       'without any. The bar is 0.5 m (lanes: 0.1 m, GNSS alone: 1 m) and, '
       'without logs, at least %g %% of the way. Warnings about images and parts that '
       'are left out do not count as warnings about a model.' % (
-          args.seeds, version, os.cpu_count(), platform.machine(),
-          datetime.date.today().isoformat(), 100 * MAX_DRIFT_WITHOUT_LOGS), '',
+          args.seeds, 100 * MAX_DRIFT_WITHOUT_LOGS), '',
       '| dial | seed | what the world has | images | m | verdict | images, no '
       'logs | m | verdict |',
       '|---|---|---|---|---|---|---|---|---|']
@@ -265,7 +262,6 @@ def parse_arguments():
                       help='with logs, without, or both')
   parser.add_argument('--run_mapper', type=int, default=1,
                       help='0: coarse models only')
-  parser.add_argument('--version', default='', help='stands in the table')
   args = parser.parse_args()
   for name in args.dials:
     if name not in DIALS:
@@ -284,23 +280,11 @@ def list_seeds(text):
 
 def main():
   args = parse_arguments()
-  records = []
-  for name in args.dials or DIALS:
-    for seed in list_seeds(args.seeds):
-      record = run_dial(name, seed, args)
-      records.append(record)
-      print(name, seed, record.get('error', ''), *(
-          '| %s: %s %s %s' % (key, record[key].get('images'),
-                              record[key].get('rmse_m'),
-                              record[key]['verdict'] + ' ' + '; '.join(
-                                  w[:60] for w in
-                                  record[key].get('warnings', [])))
-          for key in ('with', 'without') if key in record), flush=True)
-      with open(args.figures_path, 'w') as file:
-        json.dump(records, file, indent=1)
-        file.write('\n')
-      with open(args.table_path, 'w') as file:
-        file.write(report(records, args))
+  run_table({'%s %d' % (name, seed):
+             ([DIALS[name], args.runs, args.run_mapper],
+              functools.partial(run_dial, name, seed, args))
+             for name in args.dials or DIALS
+             for seed in list_seeds(args.seeds)}, report, args)
 
 
 if __name__ == '__main__':

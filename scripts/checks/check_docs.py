@@ -45,7 +45,6 @@ COMMAND = re.compile(
     r'|[\w./$"-]*/bin/\w)')
 # What is appended to a command when it is run, so that it takes seconds.
 SMALLER = {
-    'scripts/benchmark/benchmark.sh': '--max_num_images 100 --methods limit',
     'scripts/benchmark/benchmark.py':
         '--max_num_images 100 --methods adasfm_no_candidates',
     'scripts/benchmark/global_tables.py': '--sizes 100 --num_seeds 1',

@@ -247,10 +247,11 @@ done
 
 # Those of COLMAP 3.8 are run with the documentation test.
 if [[ $newest == 4.* ]]; then
-  echo "== The guides' commands with COLMAP $newest"
+  echo "== The commands of README.md and the guides with COLMAP $newest"
   guides=$here/../../docs/guide
   ADASFM_HOST_COLMAP=${programs[$newest]} call check_docs.py \
     python3 "$here/../../scripts/checks/check_docs.py" "$ours" --run \
+    "$here/../../README.md" \
     "$guides"/tutorial.md "$guides"/pair_selection.md "$guides"/cleaner.md
 fi
 

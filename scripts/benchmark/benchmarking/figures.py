@@ -3,35 +3,74 @@
 
 import json
 import os
+import shutil
+import sys
 
+from benchmarking.ledger import Ledger, describe, make_stamp
 from benchmarking.methods import evaluate
+from benchmarking.pages import write_table
 
 
 def add_arguments(parser, script, name, output_path):
   root = os.path.abspath(os.path.join(os.path.dirname(script), '..', '..'))
+  parser.set_defaults(root=root)
   parser.add_argument('--output_path', default=output_path,
-                      help='folder of worlds and runs')
+                      help='folder of worlds and runs, and of rows.jsonl, the '
+                      'rows that are done')
+  parser.add_argument('--run', type=int, default=1,
+                      help='0: only write the table of the rows that are done')
   parser.add_argument('--keep', type=int, default=0,
                       help="1: keep the runs' models and databases")
   parser.add_argument('--table_path',
                       default=os.path.join(root, 'docs', 'results',
                                            name + '.md'),
-                      help='the table')
+                      help='the page with the table, between markers')
   parser.add_argument('--figures_path',
                       default=os.path.join(root, 'benchmark', 'results',
                                            name + '.json'),
                       help='the figures behind the table')
   parser.add_argument('--colmap', default=os.path.join(root, 'build', 'bin',
                                                        'colmap'),
-                      help='our launcher')
+                      help='our launcher, built from these sources')
 
 
-def write_results(records, text, args):
-  with open(args.figures_path, 'w') as file:
-    json.dump(records, file, indent=1)
+def open_ledger(args):
+  """The rows in args.output_path, which becomes the folder for the worlds and
+  runs of this version; those of other versions are removed."""
+  os.makedirs(args.output_path, exist_ok=True)
+  ledger = Ledger(os.path.join(args.output_path, 'rows.jsonl'),
+                  make_stamp(args.root), args.root)
+  folder = 'runs-' + ledger.stamp['sources']
+  for name in os.listdir(args.output_path):
+    if name.startswith('runs-') and name != folder:
+      shutil.rmtree(os.path.join(args.output_path, name))
+  args.output_path = os.path.join(args.output_path, folder)
+  os.makedirs(args.output_path, exist_ok=True)
+  return ledger
+
+
+def run_table(rows, report, args):
+  """Runs the rows that are not done and writes the table; rows: {key: (spec,
+  function that gives the record)}, report: text of records and args."""
+  ledger = open_ledger(args)
+  for key, (spec, function) in rows.items() if args.run else ():
+    records = ledger.run(key, lambda: [function()], spec)
+    print('%s: %s' % (key, json.dumps(records[0])[:500]), file=sys.stderr,
+          flush=True)
+  entries = ledger.entries(list(rows))
+  write_figures(args.figures_path, entries)
+  text = report([r for e in entries for r in e['records']], args)
+  name = os.path.splitext(os.path.basename(args.table_path))[0]
+  write_table(args.table_path, name, text + '\n' + describe(entries))
+
+
+def write_figures(path, entries):
+  with open(path, 'w') as file:
+    json.dump({'stamp': entries[0]['stamp'],
+               'rows': [dict(key=e['key'], date=e['date'],
+                             records=e['records']) for e in entries]},
+              file, indent=1)
     file.write('\n')
-  with open(args.table_path, 'w') as file:
-    file.write(text)
 
 
 def world_folder(name, seed, args):

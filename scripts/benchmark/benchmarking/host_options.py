@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Names of COLMAP's options, which moved to other groups in newer versions."""
 
+import re
 import subprocess
 
 
@@ -8,6 +9,14 @@ def has_option(colmap, command, option):
   result = subprocess.run([colmap, command, '-h'], check=False, text=True,
                           capture_output=True)
   return '--%s ' % option in result.stdout + result.stderr
+
+
+def version_of(colmap):
+  """As 4.2.1; empty when the program does not say. Ours says its host's."""
+  result = subprocess.run([colmap, 'help'], check=False, text=True,
+                          capture_output=True)
+  match = re.search(r'COLMAP (\d+(?:\.\d+)+)', result.stdout + result.stderr)
+  return match.group(1) if match else ''
 
 
 def feature_groups(colmap):

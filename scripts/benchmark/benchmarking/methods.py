@@ -10,6 +10,7 @@ from benchmarking.limit import write_true_poses
 from benchmarking.process import Failed, run
 from benchmarking.trajectories import write_prior_trajectory
 
+SCRIPTS = os.path.join(os.path.dirname(os.path.abspath(__file__)), '..', '..')
 METHODS = ['mapper', 'hierarchical_mapper', 'adasfm', 'adasfm_no_sensors',
            'limit']
 
@@ -52,8 +53,21 @@ def run_mapper(command, executable, folder, source, args):
   return output, {command: usage}
 
 
-def clean_database(folder, source, args, sensors, options):
-  """Imports the logs and makes the coarse model, which cleans the matches."""
+def clean_database(folder, source, args):
+  """As users do who keep their COLMAP (docs/guide/cleaner.md)."""
+  database = os.path.join(folder, 'database.db')
+  cleaned = os.path.join(folder, 'cleaned.db')
+  arguments = [os.path.join(SCRIPTS, 'clean_database.sh'), database, cleaned]
+  if os.path.isfile(os.path.join(source, 'sensors.yaml')):
+    arguments.append(source)
+  usage = run(arguments, os.path.join(folder, 'run.log'), args.timeout,
+              environment={'COLMAP': args.colmap})
+  os.replace(cleaned, database)
+  return {'clean': usage}
+
+
+def make_coarse_model(folder, source, args, sensors, options):
+  """Imports the logs and runs adasfm_global."""
   database = os.path.join(folder, 'database.db')
   log_path = os.path.join(folder, 'run.log')
   steps = {}
@@ -73,13 +87,13 @@ def clean_database(folder, source, args, sensors, options):
 
 
 def run_adasfm(folder, source, args, sensors, options):
-  steps = clean_database(folder, source, args, sensors, options)
+  steps = make_coarse_model(folder, source, args, sensors, options)
   database = os.path.join(folder, 'database.db')
   log_path = os.path.join(folder, 'run.log')
   output = os.path.join(folder, 'model')
   steps['mapper'] = run([args.colmap, 'adasfm_mapper', '--database_path',
                          database, '--input_path',
-                         os.path.join(folder, 'global', '0'),
+                         os.path.join(folder, 'global'),
                          '--output_path', output] + options.get('mapper', []),
                         log_path, args.timeout)
   return output, steps
@@ -127,12 +141,28 @@ def evaluate(model_path, ground_truth_path, args, log_path):
     return json.load(file)
 
 
+def list_models(folder, ground_truth_path, args, log_path):
+  """Images and error of every model of a run, the largest first."""
+  models = []
+  for name in os.listdir(folder) if os.path.isdir(folder) else ():
+    path = os.path.join(folder, name)
+    evaluation = (evaluate(path, ground_truth_path, args, log_path)
+                  if name.isdigit() and os.path.isdir(path) else None)
+    if evaluation:
+      models.append({
+          'images': evaluation['num_images'],
+          'rmse_m': evaluation['sim3_least_squares']['translation_rmse_m']})
+  return sorted(models, key=lambda model: -model['images'])
+
+
 def _record(name, method, steps, evaluation):
   record = {'set': name, 'method': method}
   record['seconds'] = round(sum(u.seconds for u in steps.values()), 2)
   record['cpu_seconds'] = round(sum(u.cpu_seconds for u in steps.values()), 2)
   record['peak_mib'] = round(max([u.peak_mib for u in steps.values()] or [0]))
   record['step_seconds'] = {k: round(u.seconds, 2) for k, u in steps.items()}
+  record['step_cpu_seconds'] = {k: round(u.cpu_seconds, 2)
+                                for k, u in steps.items()}
   record['evaluation'] = evaluation
   return record
 
@@ -142,8 +172,7 @@ def _run_steps(method, folder, source, args):
     executable, command, cleaned = args.peers[method]
     steps = {}
     if cleaned:
-      sensors = os.path.isfile(os.path.join(source, 'sensors.yaml'))
-      steps = clean_database(folder, source, args, sensors, {})
+      steps = clean_database(folder, source, args)
     output, own_steps = run_mapper(command, executable, folder, source, args)
     return output, dict(steps, **own_steps)
   if method == 'limit':
@@ -170,8 +199,11 @@ def run_method(name, method, folder, source, args):
   try:
     _, steps = _run_steps(method, folder, source, args)
   except Failed as error:
-    return [dict(_record(name, method, {}, None), error=str(error))]
+    return [dict(_record(name, method, {'failed': error.usage}, None),
+                 error=str(error))]
   records = [_record(name, method, steps, score('model'))]
+  records[0]['models'] = list_models(os.path.join(folder, 'model'),
+                                     ground_truth, args, log_path)
   if method == 'adasfm':
     coarse = {k: steps[k] for k in ('import', 'global')}
     records.insert(0, _record(name, 'adasfm_global', coarse,

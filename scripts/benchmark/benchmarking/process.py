@@ -14,15 +14,21 @@ Usage = namedtuple('Usage', 'seconds cpu_seconds peak_mib')
 class Failed(Exception):
   """A command that did not end well; its output is in the log."""
 
+  def __init__(self, message, usage):
+    super().__init__(message)
+    self.usage = usage
 
-def run(arguments, log_path, timeout=None):
-  """Runs a command; returns its Usage. Raises Failed."""
+
+def run(arguments, log_path, timeout=None, environment=None):
+  """Runs a command, with these variables besides; returns its Usage. Raises
+  Failed."""
   started = time.monotonic()
   with open(log_path, 'ab') as log:
     log.write(('$ ' + ' '.join(arguments) + '\n').encode())
     log.flush()
     process = subprocess.Popen(arguments, stdout=log, stderr=log,
-                               stdin=subprocess.DEVNULL)
+                               stdin=subprocess.DEVNULL,
+                               env=dict(os.environ, **(environment or {})))
     # wait4 gives this child's own peak memory, but knows no timeout.
     killed = threading.Event()
 
@@ -37,10 +43,11 @@ def run(arguments, log_path, timeout=None):
     if timer:
       timer.cancel()
   process.returncode = os.waitstatus_to_exitcode(status)
+  usage = Usage(time.monotonic() - started, usage.ru_utime + usage.ru_stime,
+                usage.ru_maxrss / 1024)
   if killed.is_set():
-    raise Failed('%s took more than %g s' % (arguments[1], timeout))
+    raise Failed('%s took more than %g s' % (arguments[1], timeout), usage)
   if process.returncode != 0:
     raise Failed('%s ended with %d, see %s' %
-                 (arguments[1], process.returncode, log_path))
-  return Usage(time.monotonic() - started, usage.ru_utime + usage.ru_stime,
-               usage.ru_maxrss / 1024)
+                 (arguments[1], process.returncode, log_path), usage)
+  return usage

@@ -23,7 +23,8 @@ KINDS = {
 }
 
 # Real sequences (or worlds of other generators) in the folder --data_path.
-REAL_SETS = ['kitti01-51', 'kitti06-51', 'kitti07-160', 'world-alias-300']
+REAL_SETS = ['kitti01-51', 'kitti06-51', 'kitti07-160', 'world-alias-300',
+             'world-clean-300', 'world-hard-400', 'world-kitti10-592']
 
 QUICK = ['clean-250', 'clean-500', 'clean-1000', 'alias-300', 'blackout-250',
          'straight-250', 'sparse-250', 'fisheye-250']
@@ -73,8 +74,28 @@ def make_database(name, folder, args):
   if os.path.exists(database):
     return source
   if os.path.exists(os.path.join(source, 'database.db')):
-    shutil.copy(os.path.join(source, 'database.db'), database)
+    copy_whole(os.path.join(source, 'database.db'), database)
     return source
+  copy_features(name, source, database, args, log_path)
+  return source
+
+
+def copy_features(name, source, database, args, log_path):
+  """COLMAP's own work on real photos, which our version does not change."""
+  features = os.path.join(args.features_path, name + '.db')
+  if not os.path.exists(features):
+    os.makedirs(args.features_path, exist_ok=True)
+    extract_and_match(source, features, args, log_path)
+  copy_whole(features, database)
+
+
+def copy_whole(source, target):
+  """An interrupted copy has another name."""
+  shutil.copyfile(source, target + '.part')
+  os.replace(target + '.part', target)
+
+
+def extract_and_match(source, database, args, log_path):
   temporary = database + '.part'
   if os.path.exists(temporary):
     os.remove(temporary)
@@ -90,4 +111,3 @@ def make_database(name, folder, args):
        '--SequentialMatching.overlap', '8', '--%s.use_gpu' % matching, '0'],
       log_path)
   os.rename(temporary, database)
-  return source

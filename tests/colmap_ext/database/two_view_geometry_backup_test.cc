@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "colmap_ext/database/two_view_geometry_backup.h"
 
-#include <base/database.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <filesystem>
 
 #include "colmap_ext/datasets/write_synthetic_world.h"
+#include "colmap_ext/host/colmap.h"
 #include "colmap_ext/scene/scene_data.h"
 #include "core/so3.h"
 #include "tests/testing/colmap_ext/temporary_folder.h"

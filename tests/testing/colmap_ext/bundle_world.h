@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <base/reconstruction.h>
-
 #include <cmath>
 #include <set>
 #include <string>
@@ -10,6 +8,7 @@
 #include <vector>
 
 #include "colmap_ext/bundle_adjustment/bundle_adjustment.h"
+#include "colmap_ext/host/colmap.h"
 #include "colmap_ext/host/pose_conversion.h"
 #include "core/random.h"
 #include "core/so3.h"

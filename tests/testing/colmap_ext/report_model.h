@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <base/reconstruction.h>
-
+#include "colmap_ext/host/colmap.h"
 #include "synthetic/synthetic_world.h"
 
 namespace adasfm {

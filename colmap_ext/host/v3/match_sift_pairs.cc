@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "colmap_ext/host/match_sift_pairs.h"
+#include "colmap_ext/host/v3/match_sift_pairs.h"
 
 #include <feature/utils.h>
 #include <util/random.h>
@@ -9,7 +9,7 @@
 #include <stdexcept>
 #include <string>
 
-#include "colmap_ext/host/verify_prediction.h"
+#include "colmap_ext/host/v3/verify_prediction.h"
 #include "colmap_ext/matching/match_descriptors.h"
 #include "core/parallel.h"
 

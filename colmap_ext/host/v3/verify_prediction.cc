@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "colmap_ext/host/verify_prediction.h"
+#include "colmap_ext/host/v3/verify_prediction.h"
 
 #include <base/homography_matrix.h>
 #include <estimators/homography_matrix.h>

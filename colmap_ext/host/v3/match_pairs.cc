@@ -10,7 +10,7 @@
 #include "colmap_ext/host/database_schema.h"
 #include "colmap_ext/host/features.h"
 #include "colmap_ext/host/host_features.h"
-#include "colmap_ext/host/match_sift_pairs.h"
+#include "colmap_ext/host/v3/match_sift_pairs.h"
 #include "colmap_ext/io/capture_output.h"
 #include "core/parallel.h"
 
