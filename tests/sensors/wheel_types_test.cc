@@ -215,7 +215,7 @@ TEST(WheelTypes, OneEncoderWithGyroscopeGivesMetres) {
 // Wheels on a clock of their own: a search of the shift brings them near, and
 // what is left is an unknown of the smoother.
 TEST(WheelTypes, TheClockOfTheWheelsIsCorrected) {
-  for (const double shift_s : {-0.12, -0.06, 0.0, 0.05}) {
+  for (const double shift_s : {-0.12, -0.04, 0.0, 0.05}) {
     Drive drive;
     drive.UseEncoder();
     drive.UseSteering();
