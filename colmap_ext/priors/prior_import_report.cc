@@ -94,9 +94,8 @@ std::string FormatPriorImport(const PriorImport& import) {
     text << "wheels              " << summary.wheel_rate_hz << " Hz, "
          << summary.num_wheel_gaps << " gaps (longest "
          << summary.max_wheel_gap_s << " s), scale " << summary.wheel_scale
-         << " +- " << summary.wheel_scale_sigma << ", "
-         << summary.wheel_delay_s << " +- " << summary.wheel_delay_sigma_s
-         << " s behind the IMU\n"
+         << " +- " << summary.wheel_scale_sigma << ", " << summary.wheel_delay_s
+         << " +- " << summary.wheel_delay_sigma_s << " s behind the IMU\n"
          << "driving direction   " << summary.wheel_mount_deg.x() << " left, "
          << summary.wheel_mount_deg.y() << " down of T_imu_wheel's, +- "
          << summary.wheel_mount_sigma_deg.x() << " and "
