@@ -29,6 +29,8 @@ namespace {
 constexpr int kMaxNumCorrections = 3;
 constexpr double kMaxNoiseFactor = 5.0;
 constexpr double kMinNoiseChange = 1.2;
+// The smoother finds a delay of the wheels that is within its prior.
+constexpr double kMaxDelaySigmas = 2.0;
 // Below it gyroscope and pictures have nothing in common, as logs of another
 // drive; a stabilised video keeps the slow turns.
 constexpr double kMinSameMotionCorrelation = 0.4;
@@ -215,7 +217,11 @@ void PriorEstimator::CorrectWheelClock() {
   if (options_.estimate_time_shift == 0) return;
   const std::optional<double> shift_s =
       FindWheelClockShift(logs_.imu, logs_.wheel, calibration_);
-  if (!shift_s) return;
+  // What is near is an unknown of the smoother, which knows it better.
+  if (!shift_s || std::abs(*shift_s) <
+                      kMaxDelaySigmas * options_.fusion.wheel_delay_sigma_s) {
+    return;
+  }
   for (WheelSpeed& speed : logs_.wheel) {
     speed.timestamp_ns += NsFromSeconds(*shift_s);
   }

@@ -65,6 +65,8 @@ void SummarizeFusion(const OdometryFusionProblem& problem,
   if (!(logs.wheel.empty() && logs.odometry.empty())) {
     summary->wheel_scale = fused.wheel_scale;
     summary->wheel_scale_sigma = fused.wheel_scale_sigma;
+    summary->wheel_delay_s = fused.wheel_delay_s;
+    summary->wheel_delay_sigma_s = fused.wheel_delay_sigma_s;
     summary->wheel_mount_deg = RadToDeg(1.0) * fused.wheel_mount;
     summary->wheel_mount_sigma_deg = RadToDeg(1.0) * fused.wheel_mount_sigma;
   }

@@ -49,6 +49,10 @@ struct SensorSummary {
   double timeshift_cam_imu_s = 0.0;
   double visual_timeshift_correction_s = 0.0;
   bool timeshift_was_corrected = false;
+  // How long the wheels' readings lie behind their times, as the smoother has
+  // it.
+  double wheel_delay_s = 0.0;
+  double wheel_delay_sigma_s = 0.0;
   // What was added to the times of the wheels.
   double wheel_clock_shift_s = 0.0;
   // Vision against the gyroscope, and whether that was reason to use no IMU.

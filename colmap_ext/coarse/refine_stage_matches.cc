@@ -3,14 +3,33 @@
 
 #include <algorithm>
 #include <map>
+#include <optional>
 #include <set>
 #include <vector>
 
+#include "colmap_ext/bundle_adjustment/estimate_keypoint_sigma.h"
 #include "colmap_ext/host/pose_conversion.h"
 #include "colmap_ext/scene/scene_bearings.h"
 
 namespace adasfm {
 namespace {
+
+// Noise of both keypoints moves either one off its line by sqrt(2) sigma; 3 of
+// these, in both views, is what the distances of a true match sum to at most.
+constexpr double kMaxErrorPerSigma = 2.0 * 3.0 * 1.4142;
+
+// eps_M, or what the keypoints' noise asks for where that is more: photos of
+// large sensors have keypoints that err by two pixels, and half of their true
+// matches lie beyond 4 px.
+MatchRefinementOptions FitToNoise(MatchRefinementOptions options,
+                                  const colmap::Reconstruction& model) {
+  const std::optional<double> sigma_px = EstimateKeypointSigma(model);
+  if (sigma_px) {
+    options.max_epipolar_error_px =
+        std::max(options.max_epipolar_error_px, kMaxErrorPerSigma * *sigma_px);
+  }
+  return options;
+}
 
 // Pairs whose matches show another place than the poses say. Refinement cannot
 // tell: two look-alike places on one straight street differ only by a motion
@@ -95,9 +114,9 @@ void RefineStageMatches(const GlobalStageOptions& options,
     if (result->models[i].cameras_refined) {
       refined = ComputeModelBearings(model, options.num_threads);
     }
-    const MatchRefinementReport report =
-        RefineMatches(options.refinement, CamsFromWorld(model),
-                      refined.empty() ? bearings : refined, candidates[i]);
+    const MatchRefinementReport report = RefineMatches(
+        FitToNoise(options.refinement, model), CamsFromWorld(model),
+        refined.empty() ? bearings : refined, candidates[i]);
     MatchRefinementReport& total = result->refinement;
     total.pairs.insert(total.pairs.end(), report.pairs.begin(),
                        report.pairs.end());

@@ -45,6 +45,8 @@ void AddFusionOptions(OdometryFusionOptions* fusion, CommandOptions* command) {
       "difference of the wheels before any data, 1 sigma [1/m]");
   add("wheel_mount_sigma_deg", &fusion->wheel_mount_sigma_deg,
       "driving direction against T_imu_wheel, 1 sigma [deg]; 0 trusts it");
+  add("wheel_delay_sigma_s", &fusion->wheel_delay_sigma_s,
+      "how long wheel readings lie behind their times, 1 sigma [s]");
   add("lateral_speed_noise", &fusion->lateral_speed_noise,
       "sideways speed of the wheel frame [m/s/sqrt(Hz)]");
   add("vertical_speed_noise", &fusion->vertical_speed_noise,

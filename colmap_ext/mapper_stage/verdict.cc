@@ -367,22 +367,23 @@ Verdict AssessModels(const std::vector<AssessedModel>& models,
   JudgeMatchedImages(models, rest, &judge);
   JudgePriors(verdict, &judge);
   if (models.size() > 1) JudgeEachModel(models, verdict.num_images, &judge);
-  bool has_priors = false;
+  bool know_lengths = false;
   for (size_t k = 0; k < models.size(); ++k) {
     JudgeStage(models.size() == 1 ? "" : "model " + std::to_string(k) + ": ",
                *models[k].summary,
                static_cast<int>(models[k].model->NumRegImages()), &judge);
-    has_priors = has_priors || !models[k].data->priors.empty() ||
-                 !models[k].data->frame_priors.empty();
+    know_lengths = know_lengths || HasLengths(models[k].data->priors) ||
+                   HasLengths(models[k].data->frame_priors);
   }
   for (const std::string& warning : warnings) {
     judge.Doubt("an earlier step warned: " + warning);
   }
-  if (!verdict.is_metric && has_priors) {
+  // An IMU alone knows none: that is no reason to doubt the rest.
+  if (!verdict.is_metric && know_lengths) {
     judge.Doubt("lengths " +
                 OfModels(verdict.num_models - verdict.num_metric_models,
                          verdict.num_models) +
-                "are in no unit, since no sensor knows them");
+                "are in no unit, though sensors know some");
   }
   judge.Decide(&verdict);
   return verdict;

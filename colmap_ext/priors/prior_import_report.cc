@@ -94,7 +94,8 @@ std::string FormatPriorImport(const PriorImport& import) {
     text << "wheels              " << summary.wheel_rate_hz << " Hz, "
          << summary.num_wheel_gaps << " gaps (longest "
          << summary.max_wheel_gap_s << " s), scale " << summary.wheel_scale
-         << " +- " << summary.wheel_scale_sigma << "\n"
+         << " +- " << summary.wheel_scale_sigma << ", " << summary.wheel_delay_s
+         << " +- " << summary.wheel_delay_sigma_s << " s behind the IMU\n"
          << "driving direction   " << summary.wheel_mount_deg.x() << " left, "
          << summary.wheel_mount_deg.y() << " down of T_imu_wheel's, +- "
          << summary.wheel_mount_sigma_deg.x() << " and "
@@ -160,6 +161,8 @@ std::string PriorImportToJson(const PriorImport& import) {
       {"max_wheel_gap_s", summary.max_wheel_gap_s},
       {"wheel_scale", summary.wheel_scale},
       {"wheel_scale_sigma", summary.wheel_scale_sigma},
+      {"wheel_delay_s", summary.wheel_delay_s},
+      {"wheel_delay_sigma_s", summary.wheel_delay_sigma_s},
       {"wheel_mount_deg", ToList(summary.wheel_mount_deg)},
       {"wheel_mount_sigma_deg", ToList(summary.wheel_mount_sigma_deg)},
       {"distance_m", summary.distance_m},

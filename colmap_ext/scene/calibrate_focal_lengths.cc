@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "colmap_ext/scene/calibrate_focal_lengths.h"
 
+#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -17,10 +18,18 @@ namespace adasfm {
 namespace {
 
 // Factors of the given focal length, as logarithms: from 0.38 to 2.6 of it,
-// then around the best one.
+// then, with the distortion, around the best one in steps that become finer.
 constexpr int kNumSteps = 6;  // to either side
 constexpr double kCoarseStep = 0.16;
-constexpr double kFineStep = 0.03;
+struct Steps {
+  double log_factor;
+  double distortion;
+};
+constexpr Steps kSteps[] = {{0.08, 0.1}, {0.03, 0.04}};
+constexpr int kMaxNumMoves = 20;
+// What is believed of a lens that nobody has calibrated: the share by which it
+// moves a point 45 degrees off the axis.
+constexpr double kDistortionSigma = 0.2;
 // Pairs with few matches fit many focal lengths.
 constexpr size_t kMinNumMatches = 30;
 constexpr int kMinNumPairs = 5;
@@ -37,17 +46,30 @@ struct PairPoints {
 
 using CostCurve = std::vector<double>;
 
-std::vector<double> Grid(double center, double step) {
-  std::vector<double> grid;
-  for (int k = -kNumSteps; k <= kNumSteps; ++k) {
-    grid.push_back(center + k * step);
+// A camera's focal length, as the logarithm of its factor, and its first
+// coefficient of distortion.
+struct Lens {
+  double log_factor = 0.0;
+  double distortion = 0.0;
+};
+
+// Where the first coefficient of distortion stands when it is unknown: nobody
+// has given one. Not for FOV, where zero is no lens.
+std::optional<size_t> FindUnknownDistortion(const colmap::Camera& camera) {
+  const std::vector<size_t>& indices = camera.ExtraParamsIdxs();
+  if (indices.empty() || camera.ModelName() == "FOV") return std::nullopt;
+  for (const size_t index : indices) {
+    if (camera.Params(index) != 0.0) return std::nullopt;
   }
-  return grid;
+  return indices.front();
 }
 
-colmap::Camera ScaleFocalLength(colmap::Camera camera, double log_factor) {
+colmap::Camera WithLens(colmap::Camera camera, const Lens& lens) {
+  if (const auto index = FindUnknownDistortion(camera)) {
+    camera.Params(*index) = lens.distortion;
+  }
   for (const size_t index : camera.FocalLengthIdxs()) {
-    camera.Params(index) *= std::exp(log_factor);
+    camera.Params(index) *= std::exp(lens.log_factor);
   }
   return camera;
 }
@@ -121,12 +143,12 @@ double ComputeCost(const FocalLengthCalibrationOptions& options,
 std::vector<CostCurve> ComputeCurves(
     const FocalLengthCalibrationOptions& options,
     const std::vector<PairPoints>& pairs, const colmap::Camera& camera,
-    const std::vector<double>& grid) {
+    const std::vector<Lens>& grid) {
   std::vector<CostCurve> curves(pairs.size());
   ParallelFor(options.num_threads, pairs.size(), [&](size_t i) {
-    for (const double log_factor : grid) {
+    for (const Lens& lens : grid) {
       curves[i].push_back(
-          ComputeCost(options, pairs[i], ScaleFocalLength(camera, log_factor)));
+          ComputeCost(options, pairs[i], WithLens(camera, lens)));
     }
     const double least = *std::min_element(curves[i].begin(), curves[i].end());
     for (double& cost : curves[i]) {
@@ -136,11 +158,16 @@ std::vector<CostCurve> ComputeCurves(
   return curves;
 }
 
-int FindBest(const std::vector<CostCurve>& curves, size_t grid_size) {
+double PriorCost(const Lens& lens) {
+  return std::pow(lens.distortion / kDistortionSigma, 2);
+}
+
+int FindBest(const std::vector<CostCurve>& curves,
+             const std::vector<Lens>& grid) {
   int best = 0;
   double least = std::numeric_limits<double>::infinity();
-  for (size_t k = 0; k < grid_size; ++k) {
-    double sum = 0.0;
+  for (size_t k = 0; k < grid.size(); ++k) {
+    double sum = PriorCost(grid[k]);
     for (const CostCurve& curve : curves) sum += curve[k];
     if (sum < least) {
       least = sum;
@@ -150,40 +177,96 @@ int FindBest(const std::vector<CostCurve>& curves, size_t grid_size) {
   return best;
 }
 
+// A lens between its neighbours: three of its distortion or, where that is an
+// unknown, row by row of three distortions.
+std::vector<Lens> Neighbors(const Lens& lens, const Steps& steps) {
+  std::vector<Lens> neighbors;
+  const int num_rows = steps.distortion > 0.0 ? 1 : 0;
+  for (int row = -num_rows; row <= num_rows; ++row) {
+    for (int column = -1; column <= 1; ++column) {
+      neighbors.push_back({lens.log_factor + column * steps.log_factor,
+                           lens.distortion + row * steps.distortion});
+    }
+  }
+  return neighbors;
+}
+
 struct Minimum {
-  double log_factor = 0.0;
-  double sigma = 0.0;
+  Lens lens;
+  double sigma = 0.0;  // of the logarithm
 };
 
-// Of the parabola through the best point and its neighbours.
+// Derivatives of a curve over Neighbors, per step.
+Eigen::Vector2d Slope(const CostCurve& c) {
+  if (c.size() == 3) return {0.5 * (c[2] - c[0]), 0.0};
+  return 0.5 * Eigen::Vector2d(c[5] - c[3], c[7] - c[1]);
+}
+
+Eigen::Matrix2d Curvature(const CostCurve& c) {
+  Eigen::Matrix2d curvature = Eigen::Matrix2d::Zero();
+  if (c.size() == 3) {
+    curvature(0, 0) = c[2] - 2.0 * c[1] + c[0];
+    return curvature;
+  }
+  const double mixed = 0.25 * (c[8] - c[6] - c[2] + c[0]);
+  curvature << c[5] - 2.0 * c[4] + c[3], mixed, mixed, c[7] - 2.0 * c[4] + c[1];
+  return curvature;
+}
+
+// Of the paraboloid through the best lens and its neighbours.
 std::optional<Minimum> FitMinimum(const std::vector<CostCurve>& curves,
-                                  const std::vector<double>& grid) {
-  const int best = FindBest(curves, grid.size());
-  if (best == 0 || best + 1 == static_cast<int>(grid.size())) {
-    return std::nullopt;
+                                  const Lens& best, const Steps& steps) {
+  CostCurve prior;
+  for (const Lens& lens : Neighbors(best, steps)) {
+    prior.push_back(PriorCost(lens));
   }
-  double slope = 0.0, curvature = 0.0, squared_slopes = 0.0;
+  Eigen::Vector2d slope = Slope(prior);
+  Eigen::Matrix2d curvature = Curvature(prior);
+  Eigen::Matrix2d squared_slopes = Eigen::Matrix2d::Zero();
   for (const CostCurve& curve : curves) {
-    const double pair_slope =
-        (curve[best + 1] - curve[best - 1]) / (2.0 * kFineStep);
-    slope += pair_slope;
-    squared_slopes += pair_slope * pair_slope;
-    curvature += (curve[best + 1] - 2.0 * curve[best] + curve[best - 1]) /
-                 (kFineStep * kFineStep);
+    const Eigen::Vector2d of_pair = Slope(curve);
+    slope += of_pair;
+    squared_slopes += of_pair * of_pair.transpose();
+    curvature += Curvature(curve);
   }
-  if (!(curvature > 0.0)) return std::nullopt;
-  return Minimum{grid[best] - slope / curvature,
-                 std::sqrt(squared_slopes) / curvature};
+  if (steps.distortion == 0.0) curvature(1, 1) = 1.0;
+  const Eigen::LLT<Eigen::Matrix2d> llt(curvature);
+  if (llt.info() != Eigen::Success) return std::nullopt;
+  const Eigen::Vector2d step = -llt.solve(slope).cwiseMax(-1.0).cwiseMin(1.0);
+  const Eigen::Vector2d gain = llt.solve(Eigen::Vector2d::UnitX());
+  return Minimum{{best.log_factor + steps.log_factor * step[0],
+                  best.distortion + steps.distortion * step[1]},
+                 steps.log_factor * std::sqrt(gain.dot(squared_slopes * gain))};
 }
 
 std::optional<Minimum> FindFocalLength(
     const FocalLengthCalibrationOptions& options,
     const std::vector<PairPoints>& pairs, const colmap::Camera& camera) {
-  const std::vector<double> coarse = Grid(0.0, kCoarseStep);
-  const int best =
-      FindBest(ComputeCurves(options, pairs, camera, coarse), coarse.size());
-  const std::vector<double> fine = Grid(coarse[best], kFineStep);
-  return FitMinimum(ComputeCurves(options, pairs, camera, fine), fine);
+  std::vector<Lens> coarse;
+  for (int k = -kNumSteps; k <= kNumSteps; ++k) {
+    coarse.push_back({k * kCoarseStep, 0.0});
+  }
+  const int first =
+      FindBest(ComputeCurves(options, pairs, camera, coarse), coarse);
+  if (first == 0 || first == 2 * kNumSteps) return std::nullopt;
+  const bool has_distortion = FindUnknownDistortion(camera).has_value();
+  Lens best = coarse[first];
+  std::optional<Minimum> fit;
+  int num_moves = 0;
+  for (Steps steps : kSteps) {
+    if (!has_distortion) steps.distortion = 0.0;
+    while (num_moves++ < kMaxNumMoves) {
+      const std::vector<Lens> lenses = Neighbors(best, steps);
+      const std::vector<CostCurve> curves =
+          ComputeCurves(options, pairs, camera, lenses);
+      const size_t k = FindBest(curves, lenses);
+      fit = FitMinimum(curves, best, steps);
+      if (2 * k + 1 == lenses.size()) break;
+      best = lenses[k];
+      fit.reset();
+    }
+  }
+  return fit;
 }
 
 }  // namespace
@@ -213,13 +296,13 @@ std::vector<CalibratedFocalLength> CalibrateFocalLengths(
     const std::optional<Minimum> minimum =
         FindFocalLength(options, pairs, camera);
     if (!minimum || minimum->sigma > options.max_relative_sigma ||
-        std::abs(minimum->log_factor) < kMinNumSigmas * minimum->sigma) {
+        std::abs(minimum->lens.log_factor) < kMinNumSigmas * minimum->sigma) {
       continue;
     }
     CalibratedFocalLength found;
     found.camera_id = camera_id;
     found.given_px = camera.MeanFocalLength();
-    camera = ScaleFocalLength(camera, minimum->log_factor);
+    camera = WithLens(camera, minimum->lens);
     found.found_px = camera.MeanFocalLength();
     found.relative_sigma = minimum->sigma;
     found.num_pairs = static_cast<int>(pairs.size());

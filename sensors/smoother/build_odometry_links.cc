@@ -169,6 +169,8 @@ std::vector<OdometryLink> BuildOdometryLinks(
       link.has_imu = true;
       link.imu = PreintegrateImu(logs.imu, start, end, bias,
                                  calibration.imu_noise, &profile);
+      link.rate_change = InterpolateImu(logs.imu, end).angular_velocity -
+                         InterpolateImu(logs.imu, start).angular_velocity;
     }
     if (CoversInterval(logs.odometry, start, end, options.max_wheel_gap_s)) {
       link.has_wheel = true;

@@ -97,6 +97,7 @@ class LinkBuilder {
     num_rows_ += N;
   }
 
+  void AddWheelDelay(int forward_row);
   void AddWheelYaw(double weight);
   void AddPlanarRotation();
 

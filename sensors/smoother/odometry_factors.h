@@ -17,12 +17,14 @@ inline constexpr int kLinkSize = 2 * ChainState::kSize + ChainGlobals::kSize;
 //   IMU       Log(dR^T A), A v_k+1 - v_k - R_k^T G dt - dv,
 //             u - v_k dt - R_k^T G dt^2 / 2 - dp      (joint 9x9 covariance)
 //   biases    b_k+1 - b_k                             (random walk)
-//   wheels    q (u + A l - l) - (M d + N (phi x d))   (3x3 / weight), along the
-//             direction of driving first
-//   yaw       q' z . Log(A) - curvature * distance - yaw
+//   wheels    q (u + A l - l) - (M d + N (phi x d)) - D s f   (3x3 / weight),
+//             along the direction of driving first
+//   yaw       q' z . (Log(A) - D w) - curvature * distance - yaw
 //   vision    Log(Exp(Log(V) / s)^T A)                (sigma / weight)
 //   rest      Log(A), u, v_k, v_k+1                   (at a standstill)
-// plus weak priors where a link has no sensor for a coordinate.
+// with D the wheels' delay, s and w the changes of the wheel frame's speed and
+// of the body's rate over the link, f forward in the middle of the turn, plus
+// weak priors where a link has no sensor for a coordinate.
 struct LinkResiduals {
   Eigen::VectorXd values;
   Eigen::Matrix<double, Eigen::Dynamic, kLinkSize> jacobian;

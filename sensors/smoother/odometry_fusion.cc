@@ -296,13 +296,14 @@ void Smoother::CheckNoise(size_t k, const LinkResiduals& residuals,
 void Smoother::FillCovariances(OdometryFusionResult* result) const {
   using Shared = SharedUncertainty;
   constexpr int kMount = 2 * ChainState::kSize + ChainGlobals::kMountYaw;
+  constexpr int kDelay = 2 * ChainState::kSize + ChainGlobals::kWheelDelay;
   const size_t num_links = problem_.links.size();
   result->motions.resize(num_links);
   Shared shared;
   NoiseChecks checks;
   // How a motion moves with one sigma of each shared coordinate.
   std::vector<Eigen::Matrix<double, 6, Shared::kSize>> by_shared(num_links);
-  double accel_variance = 0.0, length_variance = 0.0;
+  double accel_variance = 0.0, length_variance = 0.0, delay_variance = 0.0;
   Eigen::Array2d mount_variance(0.0, 0.0);
   ComputeChainCovariances(
       num_links, FirstMessage(), [this](size_t k) { return Equations(k); },
@@ -326,6 +327,7 @@ void Smoother::FillCovariances(OdometryFusionResult* result) const {
         length_variance = covariance(Shared::Column(Shared::kScale),
                                      Shared::Column(Shared::kScale));
         mount_variance = covariance.diagonal().segment<2>(kMount);
+        delay_variance = covariance(kDelay, kDelay);
       });
   result->accelerometer_check = checks.accelerometer;
   result->wheel_speed_check = checks.wheel_speed.Check();
@@ -343,6 +345,7 @@ void Smoother::FillCovariances(OdometryFusionResult* result) const {
           .eval();
   result->gyroscope_bias_sigma =
       std::sqrt(result->gyroscope_bias_covariance.trace() / 3.0);
+  result->wheel_delay_sigma_s = std::sqrt(delay_variance);
   result->accelerometer_bias_sigma = std::sqrt(accel_variance / num_links);
   const double length = globals_.values[ChainGlobals::kLoggedLength];
   result->wheel_scale_sigma =
@@ -360,6 +363,7 @@ void Smoother::FillResult(OdometryFusionResult* result) const {
     result->gyroscope_bias += state.state.bias.gyroscope / states_.size();
   }
   result->wheel_scale = 1.0 / globals_.values[ChainGlobals::kLoggedLength];
+  result->wheel_delay_s = globals_.values[ChainGlobals::kWheelDelay];
   result->wheel_mount = globals_.values.segment<2>(ChainGlobals::kMountYaw);
   if (!problem_.links.empty()) FillCovariances(result);
   result->slipping_links = FindSlippingLinks();

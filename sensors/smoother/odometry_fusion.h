@@ -28,6 +28,9 @@ struct OdometryFusionOptions {
   // The direction of driving against T_imu_wheel: mounts are rarely measured
   // better. 0 trusts T_imu_wheel.
   double wheel_mount_sigma_deg = 2.0;
+  // How long the wheels' readings lie behind their times, s: half of the log's
+  // period where a speed is a difference of counts, and the way over a bus.
+  double wheel_delay_sigma_s = 0.03;
   // Sideways and vertical speed of the wheel frame, m/s/sqrt(Hz).
   // (vertical is larger: springs, and slopes that T_imu_wheel does not follow).
   double lateral_speed_noise = 0.05;
@@ -73,6 +76,9 @@ struct OdometryLink {
   double dt_s = 0.0;
   bool has_imu = false;
   ImuPreintegration imu;
+  // By how much the body turns faster at the link's end than at its start, as
+  // the gyroscope has it, rad/s.
+  Eigen::Vector3d rate_change = Eigen::Vector3d::Zero();
   bool has_wheel = false;
   WheelMotion wheel;
   // The wheels see no turn (WheelType::kSpeed).
@@ -145,6 +151,9 @@ struct OdometryFusionResult {
   // (to the left) and its y axis (down), rad.
   Eigen::Vector2d wheel_mount = Eigen::Vector2d::Zero();
   Eigen::Vector2d wheel_mount_sigma = Eigen::Vector2d::Zero();
+  // Wheel readings tell what was this long ago, s; 1 sigma.
+  double wheel_delay_s = 0.0;
+  double wheel_delay_sigma_s = 0.0;
   // rad/s in the body (IMU) frame: mean over the states, and the mean of their
   // covariances (rad^2/s^2).
   Eigen::Vector3d gyroscope_bias = Eigen::Vector3d::Zero();

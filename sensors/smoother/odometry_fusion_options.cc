@@ -13,6 +13,7 @@ bool OdometryFusionOptions::IsValid(std::string* error) const {
       {"wheel_scale_sigma", wheel_scale_sigma},
       {"wheel_track_sigma", wheel_track_sigma},
       {"wheel_curvature_sigma", wheel_curvature_sigma},
+      {"wheel_delay_sigma_s", wheel_delay_sigma_s},
       {"lateral_speed_noise", lateral_speed_noise},
       {"vertical_speed_noise", vertical_speed_noise},
       {"planar_rotation_noise", planar_rotation_noise},

@@ -38,6 +38,7 @@ void LinkBuilder::AddWheel(double weight) {
   values_.segment<3>(row) = (wheel_from_start * values_.segment<3>(row)).eval();
   jacobian_.middleRows<3>(row) =
       (wheel_from_start * jacobian_.middleRows<3>(row)).eval();
+  if (link_.has_imu) AddWheelDelay(row);
   Whiten<3>(wheel_from_start * wheel.covariance * wheel_from_start.transpose() /
             weight);
   rows_.wheel_speed = {row, 1};
@@ -53,23 +54,46 @@ void LinkBuilder::AddWheel(double weight) {
   if (!link_.has_imu) AddPlanarRotation();
 }
 
+// To first order a path that begins and ends earlier is shorter by the delay
+// times the speed's growth. The speed is the state's: a log's is rounded, and
+// what multiplies an unknown should not err.
+void LinkBuilder::AddWheelDelay(int forward_row) {
+  const Rigid3d& imu_from_wheel = context_.problem->imu_from_wheel;
+  const Eigen::Vector3d forward =
+      imu_from_wheel.rotation * Eigen::Vector3d::UnitX();
+  const double speed_change =
+      forward.dot(second_.state.velocity_in_imu - first_.state.velocity_in_imu +
+                  link_.rate_change.cross(imu_from_wheel.translation));
+  const double delay_s = globals_.values[ChainGlobals::kWheelDelay];
+  values_[forward_row] -= delay_s * speed_change;
+  jacobian_.block<1, 3>(forward_row, kSecond + ChainState::kVelocity) -=
+      delay_s * forward.transpose();
+  jacobian_.block<1, 3>(forward_row, kFirst + ChainState::kVelocity) +=
+      delay_s * forward.transpose();
+  jacobian_(forward_row, kGlobals + ChainGlobals::kWheelDelay) = -speed_change;
+}
+
 void LinkBuilder::AddWheelYaw(double weight) {
   const WheelMotion& wheel = link_.wheel;
   const Eigen::Vector3d up =
       context_.problem->imu_from_wheel.rotation * Eigen::Vector3d::UnitZ();
   const Eigen::Vector3d turn = LogSo3(a_rotation_);
+  const double rate_change = link_.has_imu ? up.dot(link_.rate_change) : 0.0;
+  const double delay_s = globals_.values[ChainGlobals::kWheelDelay];
+  const double true_yaw = up.dot(turn) - delay_s * rate_change;
   const double root_weight = std::sqrt(weight / wheel.yaw_variance);
   const int row = num_rows_++;
   rows_.wheel_yaw = {row, 1};
   const double logged_per_true = globals_.values[ChainGlobals::kLoggedYaw];
   values_[row] = root_weight *
-                 (logged_per_true * up.dot(turn) -
+                 (logged_per_true * true_yaw -
                   globals_.values[ChainGlobals::kCurvature] * wheel.distance_m -
                   wheel.yaw_rad);
   AddRelativeRotation<1>(row, root_weight * logged_per_true * up.transpose() *
                                   RightJacobianInverseSo3(turn));
-  jacobian_(row, kGlobals + ChainGlobals::kLoggedYaw) =
-      root_weight * up.dot(turn);
+  jacobian_(row, kGlobals + ChainGlobals::kLoggedYaw) = root_weight * true_yaw;
+  jacobian_(row, kGlobals + ChainGlobals::kWheelDelay) =
+      -root_weight * logged_per_true * rate_change;
   jacobian_(row, kGlobals + ChainGlobals::kCurvature) =
       -root_weight * wheel.distance_m;
   wheel_chi2_ += values_[row] * values_[row] / weight;

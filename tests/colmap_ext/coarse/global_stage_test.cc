@@ -107,6 +107,28 @@ TEST(RunGlobalStageTest, RefinedMatchesAreTrueOnes) {
   EXPECT_GT(num_refuted, 0);
 }
 
+// With keypoints that err by 2 px half of the true matches are further than 4
+// px off their lines.
+TEST(RunGlobalStageTest, NoisyKeypointsKeepTheirMatches) {
+  SyntheticWorldOptions options = SmallWorld();
+  options.pixel_noise_px = 2.0;
+  const SyntheticWorld world = BuildSyntheticWorld(options);
+  const SceneData scene = BuildSyntheticScene(world, SyntheticPriorOptions());
+  const GlobalStageResult result = RunStage(scene);
+  size_t num_kept = 0, num_true_raw = 0;
+  for (const NewTwoViewGeometry& geometry : result.geometries) {
+    num_kept += geometry.inlier_matches.size();
+  }
+  for (const ScenePair& pair : scene.pairs) {
+    for (const FeatureMatch& match : pair.raw_matches) {
+      num_true_raw +=
+          world.images[pair.image_id1 - 1].landmark_ids[match.point2D_idx1] ==
+          world.images[pair.image_id2 - 1].landmark_ids[match.point2D_idx2];
+    }
+  }
+  EXPECT_GT(num_kept, 0.85 * num_true_raw);
+}
+
 // Two-view verification takes the motion against cars ahead for that of the
 // camera. The odometry refutes it, and the matches of the town, among the raw
 // ones, hold the images.

@@ -144,6 +144,11 @@ TEST_F(VerdictTest, WhatTheStagesSaid) {
   summary_.parts[0].failure.clear();
   summary_.is_metric = false;
   ExpectResult(Assess(), VerdictResult::kDoubtful, "no metres");
+  // An IMU alone tells no lengths.
+  for (RelativePosePrior& prior : world_.data.priors) {
+    prior.flags &= ~kPriorLength;
+  }
+  ExpectResult(Assess(), VerdictResult::kGood, "no metres");
 }
 
 TEST_F(VerdictTest, SeveralModelsAreJudgedTogetherAndEachByItself) {

@@ -48,6 +48,43 @@ TEST(CalibrateFocalLengths, FindsTheTruthWithinItsSigma) {
   }
 }
 
+// Keypoints of a lens with barrel distortion, which the database gives as zero.
+void DistortKeypoints(double coefficient, SceneData* scene) {
+  colmap::Camera& camera = scene->cameras.at(1);
+  const double focal_px = camera.MeanFocalLength();
+  const Eigen::Vector2d center(camera.PrincipalPointX(),
+                               camera.PrincipalPointY());
+  camera.SetModelIdFromName("SIMPLE_RADIAL");
+  camera.SetParams({focal_px, center.x(), center.y(), 0.0});
+  for (auto& [image_id, image] : scene->images) {
+    for (Eigen::Vector2d& keypoint : image.keypoints) {
+      const Eigen::Vector2d ray = (keypoint - center) / focal_px;
+      keypoint =
+          center + focal_px * (1.0 + coefficient * ray.squaredNorm()) * ray;
+    }
+  }
+}
+
+// With the distortion taken for zero the second seed is 26 % too long, at a
+// sigma of 2 %.
+TEST(CalibrateFocalLengths, FindsTheTruthOfADistortingLens) {
+  constexpr double kDistortion = -0.08;
+  for (const uint64_t seed : {1, 2, 3}) {
+    const SyntheticWorld world = BuildSyntheticWorld(Drive(seed));
+    SceneData scene = SceneWithFocalLength(world, 1.0);
+    DistortKeypoints(kDistortion, &scene);
+    colmap::Camera& camera = scene.cameras.at(1);
+    camera.SetFocalLength(1.6 * camera.FocalLength());
+    const auto found =
+        CalibrateFocalLengths(FocalLengthCalibrationOptions(), &scene);
+    ASSERT_EQ(found.size(), 1) << seed;
+    EXPECT_LT(found[0].relative_sigma, 0.04);
+    EXPECT_NEAR(std::log(found[0].found_px / world.camera.focal_px), 0.0,
+                4.0 * found[0].relative_sigma);
+    EXPECT_NEAR(camera.Params(3), kDistortion, 0.04);
+  }
+}
+
 TEST(CalibrateFocalLengths, KnownAndRightOnesStay) {
   const SyntheticWorld world = BuildSyntheticWorld(Drive(1));
   SceneData known = SceneWithFocalLength(world, 1.6);
