@@ -63,15 +63,13 @@ TEST(LinearAdjustment, ForeseesAnAdjustmentWithOtherSigmas) {
   const PriorBundleAdjustmentProblem problem = ProblemOf(world, model);
   PriorBundleAdjustmentOptions options;
   options.function_tolerance = 1e-10;
+  options.prior_loss_scale = 1e3;  // Plain squares: the step is linear.
   ReducedSystem system;
   ASSERT_TRUE(AdjustBundle(options, problem, &model, &system).success);
   LinearAdjustment linear(system, problem.priors, options.prior_loss_scale);
   options.prior_sigma_factors = {0.5, 2.0, 0.3, 1.0};
   PriorComponents foreseen;
-  // Once more with the robust weights of where the first step ends.
-  for (int k = 0; k < 3; ++k) {
-    ASSERT_TRUE(linear.Solve(options.prior_sigma_factors, &foreseen));
-  }
+  ASSERT_TRUE(linear.Solve(options.prior_sigma_factors, &foreseen));
   const PriorBundleAdjustmentSummary summary =
       AdjustBundle(options, problem, &model);
   ASSERT_TRUE(summary.success);
@@ -114,9 +112,11 @@ TEST(AdjustBundleInBalance, DividesByTheRedundancy) {
         AdjustBundleInBalance(balance, {}, problem, &model, &factor);
     const double mean_square = ComputePriorMeanSquare(
         CorrectSharedErrors({}, summary.shared_errors, problem.priors), model);
-    EXPECT_LT(mean_square, 0.8 * summary.prior_chi2_per_dof) << "seed " << seed;
-    EXPECT_GT(summary.prior_chi2_per_dof, 0.7) << "seed " << seed;
-    EXPECT_LT(summary.prior_chi2_per_dof, 1.3) << "seed " << seed;
+    EXPECT_LT(1.05 * mean_square, summary.prior_chi2_per_dof)
+        << "seed " << seed;
+    // 1 sigma of some 200 redundant residuals is 0.1; the largest of three
+    // kinds is reported.
+    EXPECT_NEAR(summary.prior_chi2_per_dof, 1.0, 0.4) << "seed " << seed;
   }
 }
 
