@@ -63,7 +63,9 @@ TEST(LinearAdjustment, ForeseesAnAdjustmentWithOtherSigmas) {
   const PriorBundleAdjustmentProblem problem = ProblemOf(world, model);
   PriorBundleAdjustmentOptions options;
   options.function_tolerance = 1e-10;
-  options.prior_loss_scale = 1e3;  // Plain squares: the step is linear.
+  // Plain squares: robust weights would change with the step.
+  options.prior_loss_scale = 1e3;
+  options.reproj_loss_scale_px = 0.0;
   ReducedSystem system;
   ASSERT_TRUE(AdjustBundle(options, problem, &model, &system).success);
   LinearAdjustment linear(system, problem.priors, options.prior_loss_scale);
