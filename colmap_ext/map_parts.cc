@@ -21,6 +21,7 @@
 #include "colmap_ext/read_coarse_models.h"
 #include "colmap_ext/scene/georeference.h"
 #include "core/check_options.h"
+#include "core/prior_lengths.h"
 #include "core/sqlite.h"
 
 namespace adasfm {
@@ -157,12 +158,7 @@ void AlignCoarseModel(ComponentToMap* component,
   SceneData& data = component->data;
   if (data.positions.empty()) return;
   const CoarsePoseMap& coarse = component->coarse;
-  const bool is_metric = std::any_of(data.priors.begin(), data.priors.end(),
-                                     [&coarse](const RelativePosePrior& prior) {
-                                       return prior.HasLength() &&
-                                              coarse.count(prior.image_id1) &&
-                                              coarse.count(prior.image_id2);
-                                     });
+  const bool is_metric = HasLengthsBetween(coarse, data.priors);
   const PositionAlignment alignment =
       AlignSceneToPositions(data, coarse, is_metric);
   component->initial_position_loss_scale = PositionLossScale(

@@ -4,6 +4,7 @@
 #include <cstdio>
 #include <set>
 
+#include "core/prior_lengths.h"
 #include "core/so3.h"
 #include "global/coarse_pose_estimator.h"
 #include "global/loop_closures/drop_contradicted_steps.h"
@@ -19,12 +20,6 @@ std::string DescribeCameraMount(const CameraMountReport& mount) {
   std::snprintf(text, sizeof(text), ", camera turned by %.2f +- %.2f deg",
                 RadToDeg(mount.turn_rad.norm()), RadToDeg(mount.sigma_rad));
   return text;
-}
-
-bool AnyLength(const std::vector<RelativePosePrior>& priors) {
-  return std::any_of(
-      priors.begin(), priors.end(),
-      [](const RelativePosePrior& prior) { return prior.HasLength(); });
 }
 
 }  // namespace
@@ -138,7 +133,7 @@ DriveOdometry CoarsePoseEstimator::BuildDriveOdometry(
   VisualSteps steps = CompleteSteps();
   if (!steps.priors.empty()) {
     OdometryChainOptions options = options_.chain;
-    if (!AnyLength(priors_)) {
+    if (!HasLengths(priors_)) {
       options.scale_drift_ratio = options_.visual_steps.scale_drift_ratio;
       options.driving_direction_sigma_rad = 0.0;
     }

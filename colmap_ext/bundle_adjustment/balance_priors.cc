@@ -3,10 +3,14 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
+#include <optional>
 #include <stdexcept>
 
 #include "colmap_ext/bundle_adjustment/estimate_keypoint_sigma.h"
+#include "colmap_ext/bundle_adjustment/linear_adjustment.h"
 #include "colmap_ext/bundle_adjustment/prior_components.h"
+#include "colmap_ext/bundle_adjustment/reduced_system.h"
 
 namespace adasfm {
 namespace {
@@ -19,31 +23,49 @@ constexpr double kSearchFunctionTolerance = 1e-3;
 // Steps of the search: small ones would only repeat the adjustment.
 constexpr double kMinStep = 1.25;
 constexpr double kMaxStep = 2.0;
-// Sigmas of priors are lowered this often, at most to this share (the importer
-// grants noise figures the same factor), and for as long as they change by
-// more.
-constexpr int kMaxNumCorrections = 2;
+// Where the priors' sigmas are found the model is as good as in its last
+// adjustment; the linear step does the rest.
+constexpr int kNumIterationsBeforeSigmas = 1;
+// Sigmas of priors are lowered to this share at most: the importer grants noise
+// figures the same factor.
 constexpr double kMinSigmaFactor = 0.2;
-constexpr double kMinSigmaChange = 1.1;
+// The search for them, each step a linear one, ends when none changes by more.
+constexpr double kMaxSigmaChange = 1.03;
+constexpr int kMaxNumSigmaSteps = 20;
+
+struct PriorSigmaEstimate {
+  PriorSigmaFactors factors = {1.0, 1.0, 1.0, 1.0};
+  // At these sigmas.
+  PriorComponents components;
+};
 
 // Lowers the sigmas that the residuals refute as too large, as far as one
-// standard deviation of the estimate goes; whether any moved enough to matter.
-bool LowerSigmas(const PriorComponents& components,
-                 PriorSigmaFactors* factors) {
-  bool any = false;
-  for (int k = 0; k < kNumPriorTerms; ++k) {
-    const PriorComponent& component = components[k];
-    if (component.mean_square == 0.0) continue;  // Too few.
-    const double factor =
-        std::clamp((*factors)[k] * std::sqrt(component.VarianceFactor() +
-                                             component.VarianceFactorSigma()),
-                   kMinSigmaFactor, 1.0);
-    const double change = factor / (*factors)[k];
-    if (std::max(change, 1.0 / change) < kMinSigmaChange) continue;
-    (*factors)[k] = factor;
-    any = true;
+// standard deviation of the estimate goes. None when the system is singular.
+std::optional<PriorSigmaEstimate> EstimatePriorSigmas(
+    LinearAdjustment* linear) {
+  PriorSigmaEstimate estimate;
+  PriorSigmaFactors& factors = estimate.factors;
+  PriorComponents& components = estimate.components;
+  double change = std::numeric_limits<double>::infinity();
+  for (int step = 0; step < kMaxNumSigmaSteps && change > kMaxSigmaChange;
+       ++step) {
+    if (!linear->Solve(factors, &components)) return std::nullopt;
+    change = 1.0;
+    for (int k = 0; k < kNumPriorTerms; ++k) {
+      if (components[k].num_residuals == 0) continue;
+      const double factor =
+          std::clamp(factors[k] * std::sqrt(components[k].Chi2PerDof()),
+                     kMinSigmaFactor, 1.0);
+      change = std::max({change, factor / factors[k], factors[k] / factor});
+      factors[k] = factor;
+    }
   }
-  return any;
+  for (int k = 0; k < kNumPriorTerms; ++k) {
+    factors[k] =
+        std::min(1.0, factors[k] * std::sqrt(1.0 + components[k].Chi2Sigma()));
+  }
+  if (!linear->Solve(factors, &components)) return std::nullopt;
+  return estimate;
 }
 
 // One adjustment, repeated until its sigmas agree with its residuals.
@@ -68,17 +90,13 @@ class BalancedAdjustment {
 
   PriorBundleAdjustmentSummary Run() {
     const bool has_priors = !problem_.priors.empty();
-    const bool estimates_priors = has_priors &&
-                                  balance_.estimate_keypoint_sigma &&
-                                  balance_.estimate_prior_sigmas;
-    if (estimates_priors) EstimatePriorSigmas();
+    if (has_priors && balance_.estimate_keypoint_sigma &&
+        balance_.estimate_prior_sigmas && IsSmallEnough()) {
+      EstimateSigmas();
+    }
     if (has_priors && balance_.enabled) RaiseKeypointSigma();
     if (!is_final_) Adjust(given_.function_tolerance);
-    if (summary_.success && has_priors) {
-      PriorComponents components = Components();
-      if (estimates_priors) EstimateRedundancies(&components);
-      summary_.prior_chi2_per_dof = LargestChi2PerDof(components);
-    }
+    if (summary_.success && has_priors) DescribePriors();
     return summary_;
   }
 
@@ -87,61 +105,98 @@ class BalancedAdjustment {
     options_.function_tolerance = function_tolerance;
     options_.keypoint_sigma_px = given_.keypoint_sigma_px * factor_;
     is_final_ = function_tolerance == given_.function_tolerance;
-    const int num_iterations = summary_.num_iterations;
-    summary_ = AdjustBundle(options_, problem_, &reconstruction_);
-    summary_.num_iterations += num_iterations;
+    system_ = ReducedSystem();
+    Add(AdjustBundle(options_, problem_, &reconstruction_,
+                     NeedsSystem() ? &system_ : nullptr));
     return summary_.success;
   }
 
+  void Add(const PriorBundleAdjustmentSummary& summary) {
+    const int num_iterations = summary_.num_iterations;
+    summary_ = summary;
+    summary_.num_iterations += num_iterations;
+  }
+
+  // Beyond, not even the adjustment factorises its equations.
+  bool IsSmallEnough() const {
+    return static_cast<int>(problem_.images.size()) <=
+           options_.max_num_images_sparse;
+  }
+
+  // For the redundancies of the priors, which an estimate of their sigmas has
+  // found already as long as keypoints weigh the same.
+  bool NeedsSystem() const {
+    return is_final_ && balance_.estimate_keypoint_sigma &&
+           !problem_.priors.empty() && IsSmallEnough() &&
+           redundancies_factor_ != factor_;
+  }
+
+  // At the poses as they are, with the shares of the last estimate.
   PriorComponents Components() const {
-    return ComputePriorComponents(
+    PriorComponents components = ComputePriorComponents(
         options_.prior_sigma_factors,
         CorrectSharedErrors(options_.shared_errors, summary_.shared_errors,
                             problem_.priors),
         reconstruction_);
-  }
-
-  bool EstimateRedundancies(PriorComponents* components) const {
-    return adasfm::EstimateRedundancies(options_, problem_,
-                                        summary_.shared_errors, reconstruction_,
-                                        components);
+    for (int k = 0; k < kNumPriorTerms; ++k) {
+      components[k].redundancy_share = components_[k].redundancy_share;
+    }
+    return components;
   }
 
   // While keypoints weigh what their residuals show: a larger sigma would
   // explain what is left of the priors by itself.
-  void EstimatePriorSigmas() {
-    for (int k = 0; k < kMaxNumCorrections; ++k) {
-      if (!Adjust(given_.function_tolerance)) return;
-      PriorComponents components = Components();
-      if (!EstimateRedundancies(&components) ||
-          !LowerSigmas(components, &options_.prior_sigma_factors)) {
-        return;
-      }
-      is_final_ = false;
-    }
+  void EstimateSigmas() {
+    PriorBundleAdjustmentOptions options = options_;
+    options.keypoint_sigma_px = given_.keypoint_sigma_px * factor_;
+    options.max_num_iterations = kNumIterationsBeforeSigmas;
+    Add(AdjustBundle(options, problem_, &reconstruction_, &system_));
+    if (!summary_.success) return;
+    LinearAdjustment linear(system_, problem_.priors, options.prior_loss_scale);
+    const std::optional<PriorSigmaEstimate> estimate =
+        EstimatePriorSigmas(&linear);
+    if (!estimate) return;
+    options_.prior_sigma_factors = estimate->factors;
+    components_ = estimate->components;
+    redundancies_factor_ = factor_;
   }
 
   // The search needs no last digits.
   void RaiseKeypointSigma() {
     const double tolerance =
         std::max(given_.function_tolerance, kSearchFunctionTolerance);
-    if (!is_final_ && !Adjust(tolerance)) return;
-    while (factor_ < balance_.max_sigma_factor) {
-      const double chi2 = LargestChi2PerDof(Components());
-      if (chi2 > balance_.max_chi2_per_dof) {
+    if (!HasEstimate()) {
+      if (!Adjust(tolerance)) return;
+      components_ = Components();
+    }
+    while (true) {
+      const double mean_square = LargestMeanSquare(components_);
+      const bool raises = mean_square > balance_.max_mean_square &&
+                          factor_ < balance_.max_sigma_factor;
+      if (!raises && is_final_) return;
+      if (raises) {
         factor_ = std::min(
             balance_.max_sigma_factor,
-            factor_ * std::clamp(std::sqrt(chi2 / balance_.max_chi2_per_dof),
-                                 kMinStep, kMaxStep));
-      } else if (is_final_) {
-        return;
+            factor_ *
+                std::clamp(std::sqrt(mean_square / balance_.max_mean_square),
+                           kMinStep, kMaxStep));
       }
-      if (!Adjust(chi2 > balance_.max_chi2_per_dof
-                      ? tolerance
-                      : given_.function_tolerance)) {
-        return;
-      }
+      if (!Adjust(raises ? tolerance : given_.function_tolerance)) return;
+      components_ = Components();
     }
+  }
+
+  bool HasEstimate() const { return redundancies_factor_ > 0.0; }
+
+  void DescribePriors() {
+    summary_.priors_in_balance =
+        LargestMeanSquare(Components()) <= balance_.max_mean_square;
+    if (system_.rest.rows() > 0) {
+      LinearAdjustment linear(system_, problem_.priors,
+                              options_.prior_loss_scale);
+      linear.Solve({1.0, 1.0, 1.0, 1.0}, &components_);
+    }
+    summary_.prior_chi2_per_dof = LargestChi2PerDof(Components());
   }
 
   const PriorBalanceOptions& balance_;
@@ -152,6 +207,12 @@ class BalancedAdjustment {
   double& factor_;
   colmap::Reconstruction& reconstruction_;
   PriorBundleAdjustmentSummary summary_;
+  // Linearised at its end, where asked for.
+  ReducedSystem system_;
+  // The newest known, and the factor of the keypoint sigma at which its
+  // redundancies were found.
+  PriorComponents components_;
+  double redundancies_factor_ = 0.0;
   // The last adjustment was with the sigmas in use and the tolerance given.
   bool is_final_ = false;
 };
@@ -159,8 +220,8 @@ class BalancedAdjustment {
 }  // namespace
 
 bool PriorBalanceOptions::IsValid(std::string* error) const {
-  if (!(max_chi2_per_dof >= 1.0)) {
-    *error = "max_chi2_per_dof is " + std::to_string(max_chi2_per_dof) +
+  if (!(max_mean_square >= 1.0)) {
+    *error = "max_mean_square is " + std::to_string(max_mean_square) +
              ", but honest priors need at least 1";
     return false;
   }
@@ -172,9 +233,9 @@ bool PriorBalanceOptions::IsValid(std::string* error) const {
   return true;
 }
 
-double ComputePriorChi2PerDof(const std::vector<PosePriorEdge>& priors,
+double ComputePriorMeanSquare(const std::vector<PosePriorEdge>& priors,
                               const colmap::Reconstruction& reconstruction) {
-  return LargestChi2PerDof(
+  return LargestMeanSquare(
       ComputePriorComponents({1.0, 1.0, 1.0, 1.0}, priors, reconstruction));
 }
 

@@ -18,9 +18,9 @@ namespace adasfm {
 // never blamed (docs/reference/mapper.md).
 struct PriorBalanceOptions {
   bool enabled = true;
-  // Squared whitened residuals per degree of freedom that priors may have;
-  // honest ones have 1 or less.
-  double max_chi2_per_dof = 1.5;
+  // Mean of the squared whitened residuals that priors may have; honest ones
+  // have 1 or less.
+  double max_mean_square = 1.5;
   // The search begins with the noise of keypoints that their residuals show
   // (estimate_keypoint_sigma.h), where there are enough.
   bool estimate_keypoint_sigma = true;
@@ -36,11 +36,10 @@ struct PriorBalanceOptions {
   bool IsValid(std::string* error) const;
 };
 
-// The squared whitened residual per degree of freedom, at the reconstruction's
-// poses, of the priors between images that points hold too: the largest of the
-// means over rotation, direction and length terms. Each term counts at most 25,
-// so that a slipping wheel does not speak for all. 0 without priors.
-double ComputePriorChi2PerDof(const std::vector<PosePriorEdge>& priors,
+// The mean squared whitened residual, at the reconstruction's poses, of the
+// priors between images that points hold too: the largest of those of rotation,
+// direction and length terms. 0 without priors.
+double ComputePriorMeanSquare(const std::vector<PosePriorEdge>& priors,
                               const colmap::Reconstruction& reconstruction);
 
 // The priors of which a term is more than ten sigmas off: a model that folds

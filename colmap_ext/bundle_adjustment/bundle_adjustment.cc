@@ -8,6 +8,7 @@
 
 #include "colmap_ext/bundle_adjustment/bundle_problem.h"
 #include "colmap_ext/bundle_adjustment/position_priors.h"
+#include "colmap_ext/bundle_adjustment/reduced_system.h"
 #include "core/parallel.h"
 
 namespace adasfm {
@@ -177,7 +178,7 @@ bool PriorBundleAdjustmentOptions::IsValid(std::string* error) const {
 PriorBundleAdjustmentSummary AdjustBundle(
     const PriorBundleAdjustmentOptions& options,
     const PriorBundleAdjustmentProblem& problem,
-    colmap::Reconstruction* reconstruction) {
+    colmap::Reconstruction* reconstruction, ReducedSystem* system) {
   std::string error;
   if (!options.IsValid(&error)) throw std::invalid_argument(error);
 
@@ -214,6 +215,7 @@ PriorBundleAdjustmentSummary AdjustBundle(
   if (summary.success) {
     bundle.WriteTo(reconstruction);
     summary.shared_errors = bundle.EstimatedSharedErrors();
+    if (system != nullptr) *system = BuildReducedSystem(&bundle);
   }
   return summary;
 }

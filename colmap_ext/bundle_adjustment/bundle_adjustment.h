@@ -146,20 +146,26 @@ struct PriorBundleAdjustmentSummary {
   PriorSigmaFactors prior_sigma_factors = {1.0, 1.0, 1.0, 1.0};
   std::string message;
   // Of the priors, where AdjustBundleInBalance made the adjustment: the largest
-  // chi-square per degree of freedom of a kind of term.
+  // chi-square per degree of freedom of a kind of term (with the redundancy
+  // only where it estimates the keypoint sigma),
   double prior_chi2_per_dof = 0.0;
+  // and whether their mean squares are within what the balance asks for.
+  bool priors_in_balance = true;
   // Of the priors with a duration; all zero on failure.
   SharedErrors shared_errors;
 };
 
+struct ReducedSystem;
+
 // Adjusts poses, points and, on request, intrinsics of the reconstruction with
-// the priors. Metres are kept when the priors have lengths; otherwise seven
-// degrees of freedom are held by the first image and the distance to the image
-// farthest from it. On failure the reconstruction is left as it was.
+// the priors; `system` (optional) is the adjustment linearised at its end
+// (reduced_system.h). Metres are kept when the priors have lengths; otherwise
+// seven degrees of freedom are held by the first image and the distance to the
+// image farthest from it. On failure the reconstruction is left as it was.
 PriorBundleAdjustmentSummary AdjustBundle(
     const PriorBundleAdjustmentOptions& options,
     const PriorBundleAdjustmentProblem& problem,
-    colmap::Reconstruction* reconstruction);
+    colmap::Reconstruction* reconstruction, ReducedSystem* system = nullptr);
 
 // The priors of an adjustment without the shared errors that it found.
 std::vector<PosePriorEdge> CorrectSharedErrors(

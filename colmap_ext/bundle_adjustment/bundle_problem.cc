@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <utility>
 
 #include "colmap_ext/bundle_adjustment/create_reprojection_cost.h"
@@ -114,10 +115,10 @@ void BundleProblem::AddMountPriors(const CameraRigs& rigs) {
   }
 }
 
-void BundleProblem::AddCost(ceres::CostFunction* cost,
-                            ceres::LossFunction* loss,
-                            const std::vector<const ImageBlock*>& images,
-                            const std::vector<double*>& others) {
+ceres::ResidualBlockId BundleProblem::AddCost(
+    ceres::CostFunction* cost, ceres::LossFunction* loss,
+    const std::vector<const ImageBlock*>& images,
+    const std::vector<double*>& others) {
   std::vector<double*> parameters;
   bool is_derived = false;
   for (const ImageBlock* image : images) {
@@ -133,7 +134,7 @@ void BundleProblem::AddCost(ceres::CostFunction* cost,
     other_costs_.push_back(std::move(rig_cost));
   }
   parameters.insert(parameters.end(), others.begin(), others.end());
-  problem_->AddResidualBlock(cost, loss, parameters);
+  return problem_->AddResidualBlock(cost, loss, parameters);
 }
 
 std::vector<BundleProblem::Observation> BundleProblem::FindObservations(
@@ -235,15 +236,19 @@ void BundleProblem::AddPriors(const std::vector<PosePriorEdge>& edges) {
       const Term term = static_cast<Term>(k);
       const double sigma = edge.SigmaOf(term);
       if (!std::isfinite(sigma) || !(sigma > 0.0)) continue;
-      AddPrior(edge, term, &image1->second, &image2->second,
-               edge.is_held_by_points ? prior_loss_.get() : nullptr);
+      prior_blocks_.push_back(
+          {AddPrior(edge, term, &image1->second, &image2->second,
+                    edge.is_held_by_points ? prior_loss_.get() : nullptr),
+           static_cast<size_t>(&edge - edges.data()), term});
     }
   }
 }
 
-void BundleProblem::AddPrior(const PosePriorEdge& edge,
-                             PosePriorCost::Term term, ImageBlock* image1,
-                             ImageBlock* image2, ceres::LossFunction* loss) {
+ceres::ResidualBlockId BundleProblem::AddPrior(const PosePriorEdge& edge,
+                                               PosePriorCost::Term term,
+                                               ImageBlock* image1,
+                                               ImageBlock* image2,
+                                               ceres::LossFunction* loss) {
   const double sigma_factor =
       edge.dt_s < 0.0 ? 1.0
                       : options_.prior_sigma_factors[static_cast<size_t>(term)];
@@ -251,9 +256,9 @@ void BundleProblem::AddPrior(const PosePriorEdge& edge,
                                               image1->pose, image2->pose);
   const std::vector<double*> shared = SharedParameters(edge, *cost, term);
   other_costs_.push_back(std::move(cost));
-  AddCost(other_costs_.back().get(), loss, {image1, image2}, shared);
   image1->num_priors += 1;
   image2->num_priors += 1;
+  return AddCost(other_costs_.back().get(), loss, {image1, image2}, shared);
 }
 
 void BundleProblem::SetConstantBlocks(
@@ -285,6 +290,13 @@ void BundleProblem::SetConstantBlocks(
           new ceres::SubsetManifold(block.params.size(), constant));
     }
   }
+}
+
+bool BundleProblem::IsPoint(const double* parameters) const {
+  if (points_.empty()) return false;
+  const std::less<const void*> is_before;
+  return !is_before(parameters, points_.data()) &&
+         is_before(parameters, points_.data() + points_.size());
 }
 
 std::shared_ptr<ceres::ParameterBlockOrdering> BundleProblem::Ordering() {

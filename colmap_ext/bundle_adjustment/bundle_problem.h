@@ -50,6 +50,18 @@ class BundleProblem final : private ceres::EvaluationCallback {
                    std::unique_ptr<ceres::LossFunction> loss,
                    const std::vector<image_t>& image_ids);
 
+  // The residual block of one term of a prior.
+  struct PriorBlock {
+    ceres::ResidualBlockId residual = nullptr;
+    size_t prior = 0;  // In the problem's priors.
+    PriorTerm term = PriorTerm::kRotation;
+  };
+  // In the order in which they were added.
+  const std::vector<PriorBlock>& PriorBlocks() const { return prior_blocks_; }
+  bool IsPoint(const double* parameters) const;
+  // To the parameters as they are.
+  void UpdatePoses();
+
   // Points are eliminated first.
   std::shared_ptr<ceres::ParameterBlockOrdering> Ordering();
   ceres::Problem* CeresProblem() { return problem_.get(); }
@@ -93,12 +105,12 @@ class BundleProblem final : private ceres::EvaluationCallback {
   void AddRigs(const CameraRigs& rigs,
                const colmap::Reconstruction& reconstruction);
   void AddMountPriors(const CameraRigs& rigs);
-  void UpdatePoses();
   // Adds a residual on the poses of images and on other parameters; `cost` is
   // owned by this object already.
-  void AddCost(ceres::CostFunction* cost, ceres::LossFunction* loss,
-               const std::vector<const ImageBlock*>& images,
-               const std::vector<double*>& others = {});
+  ceres::ResidualBlockId AddCost(ceres::CostFunction* cost,
+                                 ceres::LossFunction* loss,
+                                 const std::vector<const ImageBlock*>& images,
+                                 const std::vector<double*>& others = {});
   void AddPoints(const colmap::Reconstruction& reconstruction);
   // The usable observations of a point, in order of image ids.
   std::vector<Observation> FindObservations(
@@ -107,9 +119,10 @@ class BundleProblem final : private ceres::EvaluationCallback {
   void AddObservation(const colmap::Reconstruction& reconstruction,
                       const Observation& observation, PointBlock* point);
   void AddPriors(const std::vector<PosePriorEdge>& edges);
-  void AddPrior(const PosePriorEdge& edge, PosePriorCost::Term term,
-                ImageBlock* image1, ImageBlock* image2,
-                ceres::LossFunction* loss);
+  ceres::ResidualBlockId AddPrior(const PosePriorEdge& edge,
+                                  PosePriorCost::Term term, ImageBlock* image1,
+                                  ImageBlock* image2,
+                                  ceres::LossFunction* loss);
   // The parameters of the shared errors that the edge has part in.
   std::vector<double*> SharedParameters(const PosePriorEdge& edge,
                                         const PosePriorCost& cost,
@@ -147,6 +160,7 @@ class BundleProblem final : private ceres::EvaluationCallback {
   std::unique_ptr<ceres::LossFunction> reprojection_loss_;
   std::unique_ptr<ceres::LossFunction> prior_loss_;
   std::unique_ptr<ceres::Problem> problem_;
+  std::vector<PriorBlock> prior_blocks_;
   int num_adjusted_images_ = 0;
 };
 

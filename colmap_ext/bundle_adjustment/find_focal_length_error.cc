@@ -101,10 +101,10 @@ std::optional<FocalLengthError> FindFocalLengthError(
   const PriorBundleAdjustmentSummary with_free =
       AdjustBundle(free_options, problem, &free);
   if (!with_given.success || !with_free.success ||
-      ComputePriorChi2PerDof(
+      ComputePriorMeanSquare(
           CorrectSharedErrors(options.shared_errors, with_free.shared_errors,
                               problem.priors),
-          free) > balance.max_chi2_per_dof) {
+          free) > balance.max_mean_square) {
     return std::nullopt;
   }
   // Half the squares of the residuals are the cost.

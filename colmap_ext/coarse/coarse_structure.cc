@@ -90,8 +90,7 @@ void FillFigures(const CoarseStructureOptions& options, CoarseModel* model) {
         num_points < options.min_num_points_per_image;
   }
   model->prior_chi2_per_dof = model->rounds.back().prior_chi2_per_dof;
-  model->priors_agree =
-      model->prior_chi2_per_dof <= options.balance.max_chi2_per_dof;
+  model->priors_agree = model->rounds.back().priors_in_balance;
 }
 
 // Moves the poses into the frame of the positions, if they fit.

@@ -81,8 +81,8 @@ void AddMapperOptions(MapperCommandOptions* options, CommandOptions* command) {
   add("balance_priors", &local.balance.enabled,
       "raise the keypoint sigma until the priors agree within their "
       "covariance");
-  add("max_prior_chi2", &local.balance.max_chi2_per_dof,
-      "squared whitened residual per degree of freedom that priors may have");
+  add("max_prior_chi2", &local.balance.max_mean_square,
+      "mean squared whitened residual that priors may have");
   add("max_keypoint_sigma_factor", &local.balance.max_sigma_factor,
       "largest factor by which the keypoint sigma is raised");
   add("filter_max_reproj_error_px", &local.filter_max_reproj_error_px,

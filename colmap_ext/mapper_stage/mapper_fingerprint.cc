@@ -67,7 +67,7 @@ void AddBalance(const PriorBalanceOptions& balance, Hash* hash) {
   hash->Add(balance.enabled);
   hash->Add(balance.estimate_keypoint_sigma);
   hash->Add(balance.estimate_prior_sigmas);
-  hash->Add(balance.max_chi2_per_dof);
+  hash->Add(balance.max_mean_square);
   hash->Add(balance.max_sigma_factor);
 }
 

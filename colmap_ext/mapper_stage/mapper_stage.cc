@@ -16,6 +16,7 @@
 #include "colmap_ext/mapper_stage/part_memory.h"
 #include "core/option_checker.h"
 #include "core/parallel.h"
+#include "core/prior_lengths.h"
 
 namespace adasfm {
 namespace {
@@ -35,18 +36,6 @@ LocalMapperOptions StricterOptions(LocalMapperOptions options) {
   options.registration.max_reproj_error_px *= 0.5;
   options.initial_pair.max_epipolar_error_px *= 0.5;
   return options;
-}
-
-// Lengths between other images, such as those of another coarse model, say
-// nothing.
-bool IsMetric(const SceneData& data, const CoarsePoseMap& coarse) {
-  const auto has_length = [&coarse](const RelativePosePrior& prior) {
-    return prior.HasLength() && coarse.count(prior.image_id1) > 0 &&
-           coarse.count(prior.image_id2) > 0;
-  };
-  return std::any_of(data.priors.begin(), data.priors.end(), has_length) ||
-         std::any_of(data.frame_priors.begin(), data.frame_priors.end(),
-                     has_length);
 }
 
 MapperStageOptions WithThreads(MapperStageOptions options) {
@@ -90,7 +79,8 @@ MapperStage::MapperStage(const MapperStageOptions& options,
       part_mapper_(std::move(part_mapper)) {
   std::string error;
   if (!options.IsValid(&error)) throw std::invalid_argument(error);
-  summary_.has_metric_sensors = IsMetric(data, coarse);
+  summary_.has_metric_sensors = HasLengthsBetween(coarse, data.priors) ||
+                                HasLengthsBetween(coarse, data.frame_priors);
   summary_.is_georeferenced = !data.positions.empty();
   summary_.is_metric = summary_.has_metric_sensors || summary_.is_georeferenced;
 }

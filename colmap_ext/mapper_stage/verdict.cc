@@ -11,6 +11,7 @@
 
 #include "colmap_ext/host/pose_conversion.h"
 #include "core/median.h"
+#include "core/prior_lengths.h"
 #include "core/so3.h"
 
 namespace adasfm {
@@ -302,12 +303,6 @@ std::string OfModels(int num_models, int num_all_models) {
   if (num_models == num_all_models) return "";
   return "of " + std::to_string(num_models) + " of " +
          std::to_string(num_all_models) + " models ";
-}
-
-bool HasLengths(const std::vector<RelativePosePrior>& priors) {
-  return std::any_of(
-      priors.begin(), priors.end(),
-      [](const RelativePosePrior& prior) { return prior.HasLength(); });
 }
 
 std::string MetricSource(const std::vector<AssessedModel>& models) {

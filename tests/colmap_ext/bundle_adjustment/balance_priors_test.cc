@@ -8,7 +8,7 @@
 namespace adasfm {
 namespace {
 
-TEST(ComputePriorChi2PerDof, IsZeroAtThePriorsAndCapsWhatIsWild) {
+TEST(ComputePriorMeanSquare, IsZeroAtThePriorsAndCapsWhatIsWild) {
   const MapperWorld world = BuildDrive(1);
   colmap::Reconstruction model = Reconstruct(world);
   std::vector<PosePriorEdge> priors = ProblemOf(world, model).priors;
@@ -17,22 +17,22 @@ TEST(ComputePriorChi2PerDof, IsZeroAtThePriorsAndCapsWhatIsWild) {
         ComputeCam2FromCam1(CamFromWorld(model.Image(edge.image_id1)),
                             CamFromWorld(model.Image(edge.image_id2)));
   }
-  EXPECT_NEAR(ComputePriorChi2PerDof(priors, model), 0.0, 1e-9);
+  EXPECT_NEAR(ComputePriorMeanSquare(priors, model), 0.0, 1e-9);
   // Two sigmas of length on every edge: a mean square of four.
   std::vector<PosePriorEdge> longer = priors;
   for (PosePriorEdge& edge : longer) {
     Eigen::Vector3d& t = edge.cam2_from_cam1.translation;
     t *= 1.0 + 2.0 * edge.length_sigma_m / t.norm();
   }
-  EXPECT_NEAR(ComputePriorChi2PerDof(longer, model), 4.0, 1e-6);
+  EXPECT_NEAR(ComputePriorMeanSquare(longer, model), 4.0, 1e-6);
   // One edge of n a thousand sigmas off counts 25 / n.
   std::vector<PosePriorEdge> wild = priors;
   wild[5].cam2_from_cam1.translation *= 1e3;
-  EXPECT_NEAR(ComputePriorChi2PerDof(wild, model), 25.0 / priors.size(), 1e-6);
+  EXPECT_NEAR(ComputePriorMeanSquare(wild, model), 25.0 / priors.size(), 1e-6);
   EXPECT_EQ(CountTornPriors(priors, model), 0);
   EXPECT_EQ(CountTornPriors(longer, model), 0);
   EXPECT_EQ(CountTornPriors(wild, model), 1);
-  EXPECT_EQ(ComputePriorChi2PerDof({}, model), 0.0);
+  EXPECT_EQ(ComputePriorMeanSquare({}, model), 0.0);
 }
 
 TEST(AdjustBundleInBalance, LeavesIndependentNoiseAlone) {
@@ -68,17 +68,17 @@ TEST(AdjustBundleInBalance, BelievesPriorsWhereKeypointsShareAnError) {
     AdjustBundleInBalance(balance, {}, problem, &plain, &plain_factor);
 
     EXPECT_EQ(plain_factor, 1.0);
-    const double plain_chi2 = ComputePriorChi2PerDof(problem.priors, plain);
-    EXPECT_GT(plain_chi2, balance.max_chi2_per_dof) << "seed " << seed;
+    const double plain_chi2 = ComputePriorMeanSquare(problem.priors, plain);
+    EXPECT_GT(plain_chi2, balance.max_mean_square) << "seed " << seed;
     EXPECT_GT(factor, 1.0) << "seed " << seed;
     EXPECT_LE(factor, balance.max_sigma_factor);
-    const double chi2 = ComputePriorChi2PerDof(problem.priors, balanced);
+    const double chi2 = ComputePriorMeanSquare(problem.priors, balanced);
     EXPECT_LT(chi2, plain_chi2) << "seed " << seed;
     // The balance is that of priors without the errors that they share.
-    const double own_chi2 = ComputePriorChi2PerDof(
+    const double own_chi2 = ComputePriorMeanSquare(
         CorrectSharedErrors({}, summary.shared_errors, problem.priors),
         balanced);
-    EXPECT_TRUE(own_chi2 <= balance.max_chi2_per_dof ||
+    EXPECT_TRUE(own_chi2 <= balance.max_mean_square ||
                 factor == balance.max_sigma_factor);
   }
 }
@@ -87,9 +87,9 @@ TEST(PriorBalanceOptions, RefusesWhatMakesNoSense) {
   PriorBalanceOptions options;
   std::string error;
   EXPECT_TRUE(options.IsValid(&error));
-  options.max_chi2_per_dof = 0.5;
+  options.max_mean_square = 0.5;
   EXPECT_FALSE(options.IsValid(&error));
-  EXPECT_NE(error.find("max_chi2_per_dof"), std::string::npos);
+  EXPECT_NE(error.find("max_mean_square"), std::string::npos);
 }
 
 }  // namespace

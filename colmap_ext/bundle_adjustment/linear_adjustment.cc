@@ -1,0 +1,149 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "colmap_ext/bundle_adjustment/linear_adjustment.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/random.h"
+
+namespace adasfm {
+namespace {
+
+// A share near zero says that nothing but the priors holds the motions.
+constexpr double kMinShare = 0.005;
+
+}  // namespace
+
+LinearAdjustment::LinearAdjustment(const ReducedSystem& system,
+                                   const std::vector<PosePriorEdge>& priors,
+                                   double prior_loss_scale)
+    : system_(system), priors_(priors), loss_scale_(prior_loss_scale) {
+  for (const ReducedPriorRows& rows : system.priors) {
+    residuals_.push_back(rows.residuals);
+  }
+  weights_.resize(residuals_.size());
+}
+
+bool LinearAdjustment::IsTested(size_t i) const {
+  return IsTestedMeasurement(priors_[system_.priors[i].prior]);
+}
+
+void LinearAdjustment::ComputeWeights(const PriorSigmaFactors& factors) {
+  for (size_t i = 0; i < weights_.size(); ++i) {
+    const ReducedPriorRows& rows = system_.priors[i];
+    const PosePriorEdge& edge = priors_[rows.prior];
+    weights_[i] =
+        edge.dt_s < 0.0 ? 1.0 : 1.0 / factors[static_cast<size_t>(rows.term)];
+    if (!edge.is_held_by_points) continue;  // Plain squares.
+    const double num_scales = weights_[i] * residuals_[i].norm() / loss_scale_;
+    weights_[i] /= std::hypot(1.0, num_scales);
+  }
+}
+
+bool LinearAdjustment::Factorize() {
+  std::vector<Eigen::Triplet<double>> triplets;
+  for (size_t i = 0; i < weights_.size(); ++i) {
+    const std::vector<int>& columns = system_.priors[i].columns;
+    const Eigen::MatrixXd jacobian = weights_[i] * system_.priors[i].jacobian;
+    const Eigen::MatrixXd information = jacobian.transpose() * jacobian;
+    for (size_t row = 0; row < columns.size(); ++row) {
+      for (size_t col = 0; col < columns.size(); ++col) {
+        if (columns[row] < columns[col]) continue;
+        triplets.emplace_back(columns[row], columns[col],
+                              information(row, col));
+      }
+    }
+  }
+  Eigen::SparseMatrix<double> sum(system_.rest.rows(), system_.rest.cols());
+  sum.setFromTriplets(triplets.begin(), triplets.end());
+  sum += system_.rest;
+  if (!is_analyzed_) factorization_.analyzePattern(sum);
+  is_analyzed_ = true;
+  factorization_.factorize(sum);
+  return factorization_.info() == Eigen::Success;
+}
+
+Eigen::VectorXd LinearAdjustment::ToColumns(const RowValues& values) const {
+  Eigen::VectorXd sum = Eigen::VectorXd::Zero(system_.rest.rows());
+  for (size_t i = 0; i < values.size(); ++i) {
+    const ReducedPriorRows& rows = system_.priors[i];
+    const Eigen::VectorXd part =
+        weights_[i] * (rows.jacobian.transpose() * values[i]);
+    for (size_t k = 0; k < rows.columns.size(); ++k) {
+      sum[rows.columns[k]] += part[k];
+    }
+  }
+  return sum;
+}
+
+LinearAdjustment::RowValues LinearAdjustment::SolveForRows(
+    const Eigen::VectorXd& right_hand_side) const {
+  const Eigen::VectorXd step = factorization_.solve(right_hand_side);
+  RowValues values;
+  for (size_t i = 0; i < weights_.size(); ++i) {
+    const ReducedPriorRows& rows = system_.priors[i];
+    Eigen::VectorXd of_columns(rows.columns.size());
+    for (size_t k = 0; k < rows.columns.size(); ++k) {
+      of_columns[k] = step[rows.columns[k]];
+    }
+    values.push_back(weights_[i] * (rows.jacobian * of_columns));
+  }
+  return values;
+}
+
+bool LinearAdjustment::Solve(const PriorSigmaFactors& factors,
+                             PriorComponents* components) {
+  ComputeWeights(factors);
+  if (!Factorize()) return false;
+  RowValues whitened;
+  for (size_t i = 0; i < weights_.size(); ++i) {
+    whitened.push_back(weights_[i] * system_.priors[i].residuals);
+  }
+  const RowValues moved =
+      SolveForRows(-system_.rest_gradient - ToColumns(whitened));
+  *components = PriorComponents();
+  for (size_t i = 0; i < weights_.size(); ++i) {
+    const ReducedPriorRows& rows = system_.priors[i];
+    residuals_[i] = rows.residuals + moved[i] / weights_[i];
+    if (!IsTested(i)) continue;
+    const double factor = factors[static_cast<size_t>(rows.term)];
+    AddPriorTerm(rows.term, (residuals_[i] / factor).squaredNorm(), components);
+  }
+  FinishPriorComponents(components);
+  EstimateRedundancies(components);
+  return true;
+}
+
+void LinearAdjustment::EstimateRedundancies(PriorComponents* components) const {
+  std::array<double, kNumPriorTerms> redundancies = {}, own = {}, squares = {};
+  Random random(1);
+  for (int probe = 0; probe < kNumProbes; ++probe) {
+    RowValues signs;
+    for (size_t i = 0; i < weights_.size(); ++i) {
+      signs.push_back(Eigen::VectorXd::Zero(residuals_[i].size()));
+      if (!IsTested(i)) continue;
+      for (double& sign : signs.back()) {
+        sign = random.UniformInt(0, 1) ? 1.0 : -1.0;
+      }
+    }
+    const RowValues followed = SolveForRows(ToColumns(signs));
+    for (size_t i = 0; i < weights_.size(); ++i) {
+      if (!IsTested(i)) continue;
+      const auto k = static_cast<size_t>(system_.priors[i].term);
+      const Eigen::VectorXd left = signs[i] - followed[i];
+      redundancies[k] += signs[i].dot(left);
+      own[k] += left.squaredNorm();
+      squares[k] += signs[i].squaredNorm();
+    }
+  }
+  for (int k = 0; k < kNumPriorTerms; ++k) {
+    if (squares[k] == 0.0) continue;
+    PriorComponent& component = (*components)[k];
+    component.redundancy_share =
+        std::clamp(redundancies[k] / squares[k], kMinShare, 1.0);
+    component.own_share =
+        std::clamp(own[k] / squares[k], kMinShare, component.redundancy_share);
+  }
+}
+
+}  // namespace adasfm

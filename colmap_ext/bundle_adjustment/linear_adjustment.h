@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <Eigen/SparseCholesky>
+#include <vector>
+
+#include "colmap_ext/bundle_adjustment/prior_components.h"
+#include "colmap_ext/bundle_adjustment/reduced_system.h"
+
+namespace adasfm {
+
+// What a linearised adjustment comes to with other sigmas of its priors.
+//
+// Method: the normal equations of the reduced system, factorised once for each
+// set of sigmas; robust weights of the priors by the residuals of the call
+// before. The traces of the hat matrix come from random signs on all rows
+// (Hutchinson), each one solve: with kNumProbes the standard deviation of a
+// redundancy is at most sqrt(2 (1 - share) n / kNumProbes) of n residuals.
+class LinearAdjustment {
+ public:
+  static constexpr int kNumProbes = 4;
+
+  // priors: the adjustment's. Both are kept by reference.
+  LinearAdjustment(const ReducedSystem& system,
+                   const std::vector<PosePriorEdge>& priors,
+                   double prior_loss_scale);
+
+  // Steps to the optimum with the priors' sigmas times these factors (on top of
+  // those of the adjustment), and fills in the components there, with their
+  // redundancies. False when the equations are singular.
+  bool Solve(const PriorSigmaFactors& factors, PriorComponents* components);
+
+ private:
+  // One vector for each of the system's prior rows.
+  using RowValues = std::vector<Eigen::VectorXd>;
+
+  bool IsTested(size_t i) const;
+  void ComputeWeights(const PriorSigmaFactors& factors);
+  bool Factorize();
+  // sum of J^T w values over the rows.
+  Eigen::VectorXd ToColumns(const RowValues& values) const;
+  // w J times the solution for this right hand side.
+  RowValues SolveForRows(const Eigen::VectorXd& right_hand_side) const;
+  void EstimateRedundancies(PriorComponents* components) const;
+
+  const ReducedSystem& system_;
+  const std::vector<PosePriorEdge>& priors_;
+  const double loss_scale_;
+  // In the adjustment's sigmas.
+  RowValues residuals_;
+  // Square roots; the factors of the sigmas are in them.
+  std::vector<double> weights_;
+  bool is_analyzed_ = false;
+  Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>> factorization_;
+};
+
+}  // namespace adasfm

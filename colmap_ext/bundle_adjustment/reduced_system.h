@@ -1,0 +1,41 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <Eigen/Core>
+#include <Eigen/SparseCore>
+#include <vector>
+
+#include "colmap_ext/bundle_adjustment/bundle_adjustment.h"
+
+namespace adasfm {
+
+class BundleProblem;
+
+// The rows of one term of a prior, in the adjustment's sigmas.
+struct ReducedPriorRows {
+  // In the problem's priors.
+  size_t prior = 0;
+  PriorTerm term = PriorTerm::kRotation;
+  Eigen::VectorXd residuals;
+  // One column for each entry of `columns`.
+  Eigen::MatrixXd jacobian;
+  std::vector<int> columns;
+};
+
+// An adjustment, linearised at its values, without the points (Schur
+// complement): a step x of poses, shared errors and intrinsics costs
+//   x^T rest x / 2 + rest_gradient^T x
+//   + sum over the rows r, J of priors of |r + J x|^2 / 2.
+// Constant parameters have no columns.
+struct ReducedSystem {
+  // Keypoints, and what is neither keypoint nor prior between two images: what
+  // is believed of shared errors and mounts, positions. The lower triangle.
+  Eigen::SparseMatrix<double> rest;
+  Eigen::VectorXd rest_gradient;
+  std::vector<ReducedPriorRows> priors;
+};
+
+// With the robust weights of all but the priors as they are; priors have none.
+ReducedSystem BuildReducedSystem(BundleProblem* bundle);
+
+}  // namespace adasfm

@@ -1,0 +1,30 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <algorithm>
+#include <vector>
+
+#include "core/relative_pose_prior.h"
+
+namespace adasfm {
+
+// Whether any of the priors knows a length, and with it the metre.
+inline bool HasLengths(const std::vector<RelativePosePrior>& priors) {
+  return std::any_of(
+      priors.begin(), priors.end(),
+      [](const RelativePosePrior& prior) { return prior.HasLength(); });
+}
+
+// The same of the priors between images of a map or set: lengths between other
+// images, such as those of another coarse model, say nothing.
+template <typename Images>
+bool HasLengthsBetween(const Images& images,
+                       const std::vector<RelativePosePrior>& priors) {
+  return std::any_of(
+      priors.begin(), priors.end(), [&images](const RelativePosePrior& prior) {
+        return prior.HasLength() && images.count(prior.image_id1) > 0 &&
+               images.count(prior.image_id2) > 0;
+      });
+}
+
+}  // namespace adasfm

@@ -1,0 +1,98 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "colmap_ext/bundle_adjustment/reduced_system.h"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Dense>
+
+#include "colmap_ext/bundle_adjustment/bundle_problem.h"
+#include "tests/testing/colmap_ext/bundle_world_problem.h"
+
+namespace adasfm {
+namespace {
+
+// The step and the covariance of all parameters but the points, from the whole
+// Jacobian, points last.
+struct DenseSolution {
+  Eigen::VectorXd step;
+  Eigen::MatrixXd covariance;
+};
+
+DenseSolution SolveDensely(BundleProblem* bundle, int size) {
+  ceres::Problem& problem = *bundle->CeresProblem();
+  std::vector<double*> blocks, points;
+  ceres::Problem::EvaluateOptions options;
+  options.apply_loss_function = false;
+  problem.GetParameterBlocks(&blocks);
+  for (double* block : blocks) {
+    if (problem.IsParameterBlockConstant(block)) continue;
+    (bundle->IsPoint(block) ? points : options.parameter_blocks)
+        .push_back(block);
+  }
+  options.parameter_blocks.insert(options.parameter_blocks.end(),
+                                  points.begin(), points.end());
+  std::vector<double> residuals;
+  ceres::CRSMatrix jacobian;
+  problem.Evaluate(options, nullptr, &residuals, nullptr, &jacobian);
+  Eigen::MatrixXd dense =
+      Eigen::MatrixXd::Zero(jacobian.num_rows, jacobian.num_cols);
+  for (int row = 0; row < jacobian.num_rows; ++row) {
+    for (int k = jacobian.rows[row]; k < jacobian.rows[row + 1]; ++k) {
+      dense(row, jacobian.cols[k]) = jacobian.values[k];
+    }
+  }
+  const Eigen::LDLT<Eigen::MatrixXd> information(dense.transpose() * dense);
+  const Eigen::Map<const Eigen::VectorXd> residual(residuals.data(),
+                                                   residuals.size());
+  const Eigen::VectorXd gradient = dense.transpose() * residual;
+  const Eigen::VectorXd step = information.solve(-gradient);
+  const Eigen::MatrixXd columns = information.solve(
+      Eigen::MatrixXd::Identity(dense.cols(), dense.cols()).leftCols(size));
+  return {step.head(size), columns.topRows(size)};
+}
+
+TEST(ReducedSystem, HasTheStepAndTheCovarianceOfTheWholeAdjustment) {
+  BundleWorldOptions world;
+  world.num_images = 8;
+  world.num_keypoints_per_image = 30;
+  const colmap::Reconstruction model = BuildBundleWorld(world);
+  PriorBundleAdjustmentProblem problem = ProblemOfAll(model);
+  problem.priors = TruePriors(world);
+  for (size_t k = 0; k < problem.priors.size(); ++k) {
+    problem.priors[k].dt_s = 0.3;
+    problem.priors[k].windows = {static_cast<int>(k / 4),
+                                 static_cast<int>(k / 2)};
+  }
+  for (const bool refines_focal_length : {false, true}) {
+    PriorBundleAdjustmentOptions options;
+    options.reproj_loss_scale_px = 0.0;
+    options.refine_focal_length = refines_focal_length;
+    BundleProblem bundle(options, problem, model);
+    bundle.FixFirstPose();
+    const ReducedSystem system = BuildReducedSystem(&bundle);
+    Eigen::MatrixXd information =
+        Eigen::MatrixXd(system.rest).selfadjointView<Eigen::Lower>();
+    Eigen::VectorXd gradient = system.rest_gradient;
+    ASSERT_EQ(system.priors.size(), 3 * problem.priors.size());
+    for (const ReducedPriorRows& rows : system.priors) {
+      Eigen::MatrixXd jacobian =
+          Eigen::MatrixXd::Zero(rows.residuals.size(), gradient.size());
+      for (size_t k = 0; k < rows.columns.size(); ++k) {
+        jacobian.col(rows.columns[k]) = rows.jacobian.col(k);
+      }
+      information += jacobian.transpose() * jacobian;
+      gradient += jacobian.transpose() * rows.residuals;
+    }
+    const DenseSolution dense = SolveDensely(&bundle, gradient.size());
+    const Eigen::LDLT<Eigen::MatrixXd> reduced(information);
+    EXPECT_LT((reduced.solve(-gradient) - dense.step).norm(),
+              1e-6 * dense.step.norm());
+    const Eigen::MatrixXd covariance = reduced.solve(
+        Eigen::MatrixXd::Identity(gradient.size(), gradient.size()));
+    EXPECT_LT((covariance - dense.covariance).norm(),
+              1e-6 * dense.covariance.norm());
+  }
+}
+
+}  // namespace
+}  // namespace adasfm
