@@ -16,6 +16,7 @@
 #include "colmap_ext/mapper_stage/part_memory.h"
 #include "core/option_checker.h"
 #include "core/parallel.h"
+#include "core/release_memory.h"
 
 namespace adasfm {
 namespace {
@@ -278,6 +279,7 @@ Status MapperStage::RunAllParts() {
       Report(line.str(), 0.02 + 0.6 * share);
     }
   });
+  ReleaseFreedMemory();
   summary_.parts_seconds = timer.Seconds();
   for (const Status& status : statuses) {
     if (!status.ok()) return status;
