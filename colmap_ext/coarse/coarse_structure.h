@@ -109,6 +109,6 @@ struct CoarseModel {
 CoarseModel BuildCoarseModel(
     const CoarseStructureOptions& options, const SceneData& scene,
     const std::map<image_t, std::vector<Bearing>>& bearings,
-    const CoarseModelInput& input);
+    CoarseModelInput input);
 
 }  // namespace adasfm
