@@ -174,6 +174,20 @@ Status WriteGlobalResult(const GlobalStageOptions& options,
   return status;
 }
 
+// Raw matches stay in the database until they are needed.
+StatusOr<GlobalStageResult> RunStage(const GlobalStageOptions& options,
+                                     const std::string& database_path,
+                                     const SceneData& scene,
+                                     const ProgressCallback& progress) {
+  StatusOr<RawMatchSource> raw_matches = OpenRawMatches(database_path, scene);
+  if (!raw_matches.ok()) return raw_matches.status();
+  try {
+    return RunGlobalStage(options, scene, progress, std::move(*raw_matches));
+  } catch (const SqliteError& error) {
+    return Status::Error(database_path + ": " + error.what());
+  }
+}
+
 }  // namespace
 
 StatusOr<PriorImport> ImportPriors(const PriorImportOptions& options,
@@ -211,7 +225,6 @@ StatusOr<CoarseModelReport> EstimateCoarseModel(
 
   if (progress) progress("reading", 0.0);
   SceneDataOptions scene_options;
-  scene_options.read_raw_matches = options.refinement.enabled;
   scene_options.use_original_two_view_geometries = true;
   scene_options.min_num_matches = options.poses.min_num_inliers;
   StatusOr<SceneData> scene = ReadSceneData(database_path, scene_options);
@@ -237,7 +250,7 @@ StatusOr<CoarseModelReport> EstimateCoarseModel(
     report.warnings.push_back(kNoPriorsWarning);
   }
   StatusOr<GlobalStageResult> result =
-      RunGlobalStage(options, *scene, progress);
+      RunStage(options, database_path, *scene, progress);
   if (!result.ok()) return result.status();
   if (CountPoints(*result) == 0) {
     return Status::Error(

@@ -5,8 +5,10 @@
 #include <cmath>
 #include <sstream>
 #include <stdexcept>
+#include <unordered_map>
 
 #include "colmap_ext/bundle_adjustment/bundle_problem.h"
+#include "colmap_ext/bundle_adjustment/factor_size.h"
 #include "colmap_ext/bundle_adjustment/position_priors.h"
 #include "colmap_ext/bundle_adjustment/reduced_system.h"
 #include "core/parallel.h"
@@ -74,8 +76,49 @@ void AssignWindows(const SharedErrorOptions& options,
                 edges);
 }
 
+// By index in `images`, those of higher index that see a point together.
+// Priors tie images of one drive that see points together anyway.
+std::vector<std::vector<int>> FindNeighbors(
+    const std::set<image_t>& images,
+    const colmap::Reconstruction& reconstruction) {
+  std::unordered_map<image_t, int> index_of;
+  for (const image_t image_id : images)
+    index_of.emplace(image_id, index_of.size());
+  std::vector<std::vector<int>> neighbors(images.size());
+  std::vector<int> last_seen_from(images.size(), -1);
+  for (const image_t image_id : images) {
+    if (!reconstruction.ExistsImage(image_id)) continue;
+    const int index = index_of.at(image_id);
+    for (const auto& point2D : reconstruction.Image(image_id).Points2D()) {
+      if (!point2D.HasPoint3D()) continue;
+      const auto& point = reconstruction.Point3D(point2D.Point3DId());
+      for (const auto& element : point.Track().Elements()) {
+        const auto other = index_of.find(element.image_id);
+        if (other == index_of.end() || other->second <= index ||
+            last_seen_from[other->second] == index) {
+          continue;
+        }
+        last_seen_from[other->second] = index;
+        neighbors[index].push_back(other->second);
+      }
+    }
+  }
+  return neighbors;
+}
+
+// Whether the factor of the reduced camera system is no larger than that of so
+// many images that all see each other. Drives, nearly banded, stay far below.
+bool HasSmallFactor(size_t num_full_images, const std::set<image_t>& images,
+                    const colmap::Reconstruction& reconstruction) {
+  if (images.size() <= num_full_images) return true;
+  return CountFactorBlocks(FindNeighbors(images, reconstruction)) <=
+         num_full_images * (num_full_images - 1) / 2;
+}
+
 ceres::Solver::Options SolverOptions(
-    const PriorBundleAdjustmentOptions& options, BundleProblem* problem) {
+    const PriorBundleAdjustmentOptions& options,
+    const std::set<image_t>& images,
+    const colmap::Reconstruction& reconstruction, BundleProblem* problem) {
   ceres::Solver::Options solver;
   solver.max_num_iterations = options.max_num_iterations;
   solver.function_tolerance = options.function_tolerance;
@@ -95,7 +138,8 @@ ceres::Solver::Options SolverOptions(
     solver.linear_solver_type = ceres::DENSE_SCHUR;
   } else if (!has_points) {
     solver.linear_solver_type = ceres::SPARSE_NORMAL_CHOLESKY;
-  } else if (num_images <= options.max_num_images_sparse) {
+  } else if (HasSmallFactor(options.max_num_images_sparse, images,
+                            reconstruction)) {
     solver.linear_solver_type = ceres::SPARSE_SCHUR;
   } else {
     solver.linear_solver_type = ceres::ITERATIVE_SCHUR;
@@ -201,8 +245,8 @@ PriorBundleAdjustmentSummary AdjustBundle(
   }
 
   ceres::Solver::Summary solver_summary;
-  ceres::Solve(SolverOptions(options, &bundle), bundle.CeresProblem(),
-               &solver_summary);
+  ceres::Solve(SolverOptions(options, problem.images, *reconstruction, &bundle),
+               bundle.CeresProblem(), &solver_summary);
   summary.num_iterations = solver_summary.num_successful_steps +
                            solver_summary.num_unsuccessful_steps;
   summary.initial_cost = solver_summary.initial_cost;

@@ -10,6 +10,7 @@
 #include "colmap_ext/scene/align_to_gravity.h"
 #include "colmap_ext/scene/georeference.h"
 #include "colmap_ext/scene/scene_bearings.h"
+#include "core/release_memory.h"
 
 namespace adasfm {
 namespace {
@@ -94,17 +95,14 @@ void FillFigures(const CoarseStructureOptions& options, CoarseModel* model) {
 }
 
 // Moves the poses into the frame of the positions, if they fit.
-CoarseModelInput AlignInput(const SceneData& scene,
-                            const CoarseModelInput& input,
-                            PositionAlignment* alignment) {
-  if (scene.positions.empty()) return input;
-  *alignment = AlignSceneToPositions(scene, input.cams_from_world, input.metric,
-                                     input.camera_mount);
-  if (!alignment->success) return input;
-  CoarseModelInput aligned = input;
-  aligned.cams_from_world =
-      TransformCamsFromWorld(alignment->enu_from_world, input.cams_from_world);
-  return aligned;
+void AlignInput(const SceneData& scene, CoarseModelInput* input,
+                PositionAlignment* alignment) {
+  if (scene.positions.empty()) return;
+  *alignment = AlignSceneToPositions(scene, input->cams_from_world,
+                                     input->metric, input->camera_mount);
+  if (!alignment->success) return;
+  input->cams_from_world =
+      TransformCamsFromWorld(alignment->enu_from_world, input->cams_from_world);
 }
 
 void AddPositions(const SceneData& scene, const CoarseModelInput& input,
@@ -272,16 +270,17 @@ bool CoarseStructureOptions::IsValid(std::string* error) const {
 CoarseModel BuildCoarseModel(
     const CoarseStructureOptions& options, const SceneData& scene,
     const std::map<image_t, std::vector<Bearing>>& bearings,
-    const CoarseModelInput& given_input) {
+    CoarseModelInput input) {
   CoarseModel model;
-  const CoarseModelInput input =
-      AlignInput(scene, given_input, &model.positions);
+  AlignInput(scene, &input, &model.positions);
   const bool is_georeferenced = model.positions.success;
   model.metric = input.metric || is_georeferenced;
   model.max_track_bytes = EstimateTrackBytes(input.matches);
   PriorBundleAdjustmentProblem problem = CreateProblem(options, scene, input);
   if (is_georeferenced) AddPositions(scene, input, &problem);
   const RoundTracks tracks = BuildRoundTracks(options, input, problem.images);
+  input.matches.clear();  // The tracks have them.
+  ReleaseFreedMemory();
   model.num_tracks = tracks.all.size();
   model.num_keyframes = tracks.num_keyframes;
 

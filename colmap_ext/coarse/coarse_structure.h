@@ -108,6 +108,6 @@ struct CoarseModel {
 CoarseModel BuildCoarseModel(
     const CoarseStructureOptions& options, const SceneData& scene,
     const std::map<image_t, std::vector<Bearing>>& bearings,
-    const CoarseModelInput& input);
+    CoarseModelInput input);
 
 }  // namespace adasfm

@@ -8,6 +8,7 @@
 
 #include "colmap_ext/coarse/refine_stage_matches.h"
 #include "colmap_ext/scene/scene_bearings.h"
+#include "core/release_memory.h"
 #include "core/so3.h"
 
 namespace adasfm {
@@ -73,34 +74,36 @@ Status NothingHoldsTogether() {
 // matches that agree with the poses.
 std::map<ImagePair, std::vector<FeatureMatch>> MatchAnew(
     const MatchRefinementOptions& options, const SceneData& scene,
-    const GlobalCorrespondences& matches, const CoarseComponent& component,
-    const ViewGraph& graph) {
+    const RawMatchSource& raw_matches,
+    const std::map<image_t, std::vector<Bearing>>& bearings,
+    const CoarseComponent& component, const ViewGraph& graph) {
+  if (!options.enabled) return {};
   std::set<ImagePair> refuted;
   for (const ViewGraphEdge& edge : graph.edges) {
     if (edge.removal == EdgeRemoval::kOdometryPose) refuted.insert(edge.Pair());
   }
-  std::map<ImagePair, std::vector<FeatureMatch>> candidates;
+  std::vector<const ScenePair*> pairs;
   for (const ScenePair& pair : scene.pairs) {
-    const ImagePair key(pair.image_id1, pair.image_id2);
-    if (refuted.count(key) > 0 && !pair.raw_matches.empty()) {
-      candidates[key] = pair.raw_matches;
+    if (refuted.count(ImagePair(pair.image_id1, pair.image_id2)) > 0) {
+      pairs.push_back(&pair);
     }
   }
+  MatchRefinementReport report;
+  RefineRawMatches(options, raw_matches, component.cams_from_world, bearings,
+                   pairs, &report);
   std::map<ImagePair, std::vector<FeatureMatch>> matched;
-  for (RefinedPair& pair : RefineMatches(options, component.cams_from_world,
-                                         matches.bearings, candidates)
-                               .pairs) {
+  for (RefinedPair& pair : report.pairs) {
     if (!pair.removed) matched[pair.pair] = std::move(pair.matches);
   }
   return matched;
 }
 
-// The matches of the edges that hold the component together.
-CoarseModelInput CreateModelInput(const MatchRefinementOptions& options,
-                                  const SceneData& scene,
-                                  const CoarseComponent& component,
-                                  const CoarsePoses& poses,
-                                  const GlobalCorrespondences& matches) {
+// The matches of the edges that hold the component together, taken out of the
+// correspondences, and those of pairs that are matched anew.
+CoarseModelInput CreateModelInput(
+    std::map<ImagePair, std::vector<FeatureMatch>> matched_anew,
+    const CoarseComponent& component, const CoarsePoses& poses,
+    GlobalCorrespondences* correspondences) {
   CoarseModelInput input;
   input.priors = poses.priors;
   if (poses.camera_mount.corrected) {
@@ -108,15 +111,14 @@ CoarseModelInput CreateModelInput(const MatchRefinementOptions& options,
   }
   input.cams_from_world = component.cams_from_world;
   input.metric = component.metric;
-  input.matches = MatchAnew(options, scene, matches, component, poses.graph);
+  input.matches = std::move(matched_anew);
   for (const ViewGraphEdge& edge : poses.graph.edges) {
     if (!edge.IsKept() || edge.source == EdgeSource::kSensor) continue;
     if (component.cams_from_world.count(edge.image_id1) == 0 ||
         component.cams_from_world.count(edge.image_id2) == 0) {
       continue;
     }
-    const auto it = matches.matches.find(edge.Pair());
-    if (it != matches.matches.end()) input.matches.insert(*it);
+    input.matches.insert(correspondences->matches.extract(edge.Pair()));
   }
   return input;
 }
@@ -171,7 +173,8 @@ bool GlobalStageOptions::IsValid(std::string* error) const {
 
 StatusOr<GlobalStageResult> RunGlobalStage(
     const GlobalStageOptions& requested_options, const SceneData& scene,
-    const StageProgress& progress) {
+    const StageProgress& progress, RawMatchSource raw_matches) {
+  if (!raw_matches) raw_matches = RawMatchesOfScene(scene);
   std::string error;
   if (!requested_options.IsValid(&error)) throw std::invalid_argument(error);
   const GlobalStageOptions options = WithThreads(requested_options);
@@ -183,7 +186,7 @@ StatusOr<GlobalStageResult> RunGlobalStage(
 
   // 2.1 View graph.
   Stopwatch watch = begin("view graph", 0.0);
-  const GlobalCorrespondences correspondences =
+  GlobalCorrespondences correspondences =
       FindCorrespondences(scene, options.num_threads);
   const InitialViewGraph initial =
       BuildInitialViewGraph(options.two_view, scene, correspondences.bearings);
@@ -197,22 +200,28 @@ StatusOr<GlobalStageResult> RunGlobalStage(
                           scene.priors, scene.frame_priors);
   AppendSteps(result.poses.steps, &result.steps);
   if (result.poses.components.empty()) return NothingHoldsTogether();
+  ReleaseFreedMemory();
 
   // 2.7 Structure and adjustment.
   for (const CoarseComponent& component : result.poses.components) {
-    const CoarseModelInput input = CreateModelInput(
-        options.refinement, scene, component, result.poses, correspondences);
+    CoarseModelInput input = CreateModelInput(
+        MatchAnew(options.refinement, scene, raw_matches,
+                  correspondences.bearings, component, result.poses.graph),
+        component, result.poses, &correspondences);
     watch = begin(DescribeTrackMemory(input), 0.5);
-    result.models.push_back(BuildCoarseModel(options.structure, scene,
-                                             correspondences.bearings, input));
+    result.models.push_back(BuildCoarseModel(
+        options.structure, scene, correspondences.bearings, std::move(input)));
     result.steps.push_back(
         {"structure", watch.Seconds(), DescribeModel(result.models.back())});
   }
 
   // 2.8 Match refinement.
+  correspondences.matches.clear();
+  ReleaseFreedMemory();
   if (options.refinement.enabled) {
     watch = begin("match refinement", 0.9);
-    RefineStageMatches(options, scene, correspondences.bearings, &result);
+    RefineStageMatches(options, scene, raw_matches, correspondences.bearings,
+                       &result);
     result.steps.push_back(
         {"match refinement", watch.Seconds(), DescribeMatches(result)});
   }

@@ -8,6 +8,7 @@
 #include "colmap_ext/coarse/coarse_structure.h"
 #include "colmap_ext/host/database.h"
 #include "colmap_ext/scene/calibrate_focal_lengths.h"
+#include "colmap_ext/scene/raw_matches.h"
 #include "colmap_ext/scene/scene_data.h"
 #include "colmap_ext/scene/two_view_poses.h"
 #include "core/status.h"
@@ -67,11 +68,13 @@ using StageProgress = std::function<void(const std::string&, double)>;
 //   2.1-2.6  coarse poses                EstimateCoarsePoses
 //   2.7      tracks, points, adjustment  BuildCoarseModel, per component
 //   2.8      match refinement            RefineMatches
-// The scene is read with raw matches and original two-view geometries. An error
-// when the scene has no two images that hold together. Throws
+// The scene is read with original two-view geometries; raw matches, those of
+// the scene if there is no other source, are asked for while the stage works.
+// An error when the scene has no two images that hold together. Throws
 // std::invalid_argument for invalid options.
 StatusOr<GlobalStageResult> RunGlobalStage(const GlobalStageOptions& options,
                                            const SceneData& scene,
-                                           const StageProgress& progress = {});
+                                           const StageProgress& progress = {},
+                                           RawMatchSource raw_matches = {});
 
 }  // namespace adasfm

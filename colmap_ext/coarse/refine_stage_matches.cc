@@ -2,9 +2,11 @@
 #include "colmap_ext/coarse/refine_stage_matches.h"
 
 #include <algorithm>
+#include <iterator>
 #include <map>
 #include <optional>
 #include <set>
+#include <utility>
 #include <vector>
 
 #include "colmap_ext/bundle_adjustment/estimate_keypoint_sigma.h"
@@ -56,17 +58,17 @@ std::set<ImagePair> FindRefutedPairs(const ViewGraph& graph) {
   return refuted;
 }
 
-// By model: the pairs within it and the matches to choose from. Refuted pairs
-// and those between models go to the removed ones.
-using Candidates = std::vector<std::map<ImagePair, std::vector<FeatureMatch>>>;
-Candidates SortCandidates(const SceneData& scene, GlobalStageResult* result) {
+// By model, the pairs within it. Refuted pairs and those between models go to
+// the removed ones.
+std::vector<std::vector<const ScenePair*>> SortPairs(
+    const SceneData& scene, GlobalStageResult* result) {
   std::map<image_t, int> component_of;
   for (size_t i = 0; i < result->models.size(); ++i) {
     for (const image_t id : result->models[i].reconstruction.RegImageIds()) {
       component_of[id] = static_cast<int>(i);
     }
   }
-  Candidates candidates(result->models.size());
+  std::vector<std::vector<const ScenePair*>> pairs(result->models.size());
   const std::set<ImagePair> refuted = FindRefutedPairs(result->poses.graph);
   for (const ScenePair& pair : scene.pairs) {
     const auto it1 = component_of.find(pair.image_id1);
@@ -76,26 +78,26 @@ Candidates SortCandidates(const SceneData& scene, GlobalStageResult* result) {
     } else if (refuted.count(ImagePair(pair.image_id1, pair.image_id2))) {
       result->removed_pairs.emplace_back(pair.image_id1, pair.image_id2);
     } else if (it1->second == it2->second) {
-      candidates[it1->second][ImagePair(pair.image_id1, pair.image_id2)] =
-          pair.raw_matches.empty() ? pair.inlier_matches : pair.raw_matches;
+      pairs[it1->second].push_back(&pair);
     } else {
       // The view graph found no consistent way to join the two components.
       result->removed_pairs.emplace_back(pair.image_id1, pair.image_id2);
     }
   }
-  return candidates;
+  return pairs;
 }
 
 // The refined pairs as new rows and removals.
 void CollectGeometries(GlobalStageResult* result) {
-  for (const RefinedPair& pair : result->refinement.pairs) {
+  for (RefinedPair& pair : result->refinement.pairs) {
     if (pair.removed) {
       result->removed_pairs.push_back(pair.pair);
     } else if (pair.cam2_from_cam1.translation.norm() > 0.0) {
       result->geometries.push_back(
-          {pair.pair, pair.matches, pair.cam2_from_cam1});
+          {pair.pair, std::move(pair.matches), pair.cam2_from_cam1});
     }
   }
+  result->refinement.pairs.clear();
   std::sort(result->removed_pairs.begin(), result->removed_pairs.end());
   std::sort(result->geometries.begin(), result->geometries.end(),
             [](const auto& a, const auto& b) { return a.pair < b.pair; });
@@ -103,26 +105,49 @@ void CollectGeometries(GlobalStageResult* result) {
 
 }  // namespace
 
+void RefineRawMatches(const MatchRefinementOptions& options,
+                      const RawMatchSource& source,
+                      const std::map<image_t, Rigid3d>& cams_from_world,
+                      const std::map<image_t, std::vector<Bearing>>& bearings,
+                      const std::vector<const ScenePair*>& pairs,
+                      MatchRefinementReport* total) {
+  for (size_t begin = 0; begin < pairs.size(); begin += kNumPairsAtATime) {
+    const size_t end = std::min(pairs.size(), begin + kNumPairsAtATime);
+    std::vector<ImagePair> block;
+    for (size_t k = begin; k < end; ++k) {
+      block.emplace_back(pairs[k]->image_id1, pairs[k]->image_id2);
+    }
+    RawMatches candidates = source(block);
+    for (size_t k = begin; k < end; ++k) {
+      candidates.emplace(block[k - begin], pairs[k]->inlier_matches);
+    }
+    MatchRefinementReport report =
+        RefineMatches(options, cams_from_world, bearings, candidates);
+    std::move(report.pairs.begin(), report.pairs.end(),
+              std::back_inserter(total->pairs));
+    total->num_removed_pairs += report.num_removed_pairs;
+    total->num_skipped_pairs += report.num_skipped_pairs;
+    total->num_candidates += report.num_candidates;
+    total->num_kept += report.num_kept;
+  }
+}
+
 void RefineStageMatches(const GlobalStageOptions& options,
-                        const SceneData& scene,
+                        const SceneData& scene, const RawMatchSource& source,
                         const std::map<image_t, std::vector<Bearing>>& bearings,
                         GlobalStageResult* result) {
-  const Candidates candidates = SortCandidates(scene, result);
+  const std::vector<std::vector<const ScenePair*>> pairs =
+      SortPairs(scene, result);
   for (size_t i = 0; i < result->models.size(); ++i) {
     const colmap::Reconstruction& model = result->models[i].reconstruction;
     std::map<image_t, std::vector<Bearing>> refined;
     if (result->models[i].cameras_refined) {
       refined = ComputeModelBearings(model, options.num_threads);
     }
-    const MatchRefinementReport report = RefineMatches(
-        FitToNoise(options.refinement, model), CamsFromWorld(model),
-        refined.empty() ? bearings : refined, candidates[i]);
-    MatchRefinementReport& total = result->refinement;
-    total.pairs.insert(total.pairs.end(), report.pairs.begin(),
-                       report.pairs.end());
-    total.num_removed_pairs += report.num_removed_pairs;
-    total.num_candidates += report.num_candidates;
-    total.num_kept += report.num_kept;
+    RefineRawMatches(FitToNoise(options.refinement, model), source,
+                     CamsFromWorld(model),
+                     refined.empty() ? bearings : refined, pairs[i],
+                     &result->refinement);
   }
   CollectGeometries(result);
 }

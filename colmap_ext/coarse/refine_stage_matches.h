@@ -5,19 +5,31 @@
 #include <vector>
 
 #include "colmap_ext/coarse/global_stage.h"
+#include "colmap_ext/scene/raw_matches.h"
 #include "colmap_ext/scene/scene_data.h"
 #include "core/bearing.h"
 #include "core/types.h"
 
 namespace adasfm {
 
-// Step 8 of the coarse global stage: RefineMatches on the pairs within every
+// RefineMatches on the raw matches of the pairs, or the verified ones where the
+// database has no others, a block of pairs in memory at a time. Appends to the
+// report.
+void RefineRawMatches(const MatchRefinementOptions& options,
+                      const RawMatchSource& source,
+                      const std::map<image_t, Rigid3d>& cams_from_world,
+                      const std::map<image_t, std::vector<Bearing>>& bearings,
+                      const std::vector<const ScenePair*>& pairs,
+                      MatchRefinementReport* total);
+
+// Step 8 of the coarse global stage: RefineRawMatches of the pairs within every
 // model of the result, under the model's poses and, where its adjustment has
 // refined them, its cameras (else the bearings of the scene). Fills the
-// result's refinement, geometries and removed_pairs; pairs that the view graph
+// result's refinement (its pairs become geometries), geometries and
+// removed_pairs; pairs that the view graph
 // refuted and pairs between two models are removed ones.
 void RefineStageMatches(const GlobalStageOptions& options,
-                        const SceneData& scene,
+                        const SceneData& scene, const RawMatchSource& source,
                         const std::map<image_t, std::vector<Bearing>>& bearings,
                         GlobalStageResult* result);
 

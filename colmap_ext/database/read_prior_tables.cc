@@ -5,11 +5,13 @@
 #include <map>
 #include <optional>
 #include <sstream>
+#include <tuple>
 #include <utility>
 
 #include "colmap_ext/database/prior_tables.h"
 #include "colmap_ext/host/database.h"
 #include "colmap_ext/io/double_blob.h"
+#include "core/disjoint_sets.h"
 
 namespace adasfm {
 namespace {
@@ -76,6 +78,37 @@ RelativePosePrior PriorFromRow(const SqliteStatement& statement) {
   return prior;
 }
 
+// Chains of consecutive images one after the other, by their first times, and
+// each in order of time: several drives may have gone on at the same time.
+void SortByChain(const std::map<image_t, timestamp_t>& times,
+                 std::vector<RelativePosePrior>* priors) {
+  std::map<image_t, int> index_of;
+  for (const auto& [image_id, time] : times) {
+    index_of.emplace(image_id, static_cast<int>(index_of.size()));
+  }
+  DisjointSets chains(index_of.size());
+  for (const RelativePosePrior& prior : *priors) {
+    chains.Join(index_of.at(prior.image_id1), index_of.at(prior.image_id2));
+  }
+  std::map<int, std::pair<timestamp_t, image_t>> first_of;
+  for (const auto& [image_id, time] : times) {
+    const auto start = std::make_pair(time, image_id);
+    const auto [first, is_new] =
+        first_of.emplace(chains.Find(index_of.at(image_id)), start);
+    if (!is_new) first->second = std::min(first->second, start);
+  }
+  const auto key = [&](const RelativePosePrior& prior) {
+    return std::make_tuple(
+        first_of.at(chains.Find(index_of.at(prior.image_id1))),
+        times.at(prior.image_id1), times.at(prior.image_id2));
+  };
+  std::stable_sort(
+      priors->begin(), priors->end(),
+      [&key](const RelativePosePrior& a, const RelativePosePrior& b) {
+        return key(a) < key(b);
+      });
+}
+
 void ReadPriors(const IdResolver& ids, SqliteConnection* database,
                 LoadedPriorTables* loaded) {
   if (!database->HasTable("adasfm_relative_pose_priors")) return;
@@ -104,12 +137,7 @@ void ReadPriors(const IdResolver& ids, SqliteConnection* database,
     }
     loaded->tables.priors.push_back(prior);
   }
-  std::stable_sort(
-      loaded->tables.priors.begin(), loaded->tables.priors.end(),
-      [&times](const RelativePosePrior& a, const RelativePosePrior& b) {
-        return std::make_pair(times.at(a.image_id1), times.at(a.image_id2)) <
-               std::make_pair(times.at(b.image_id1), times.at(b.image_id2));
-      });
+  SortByChain(times, &loaded->tables.priors);
 }
 
 void ReadGravity(const IdResolver& ids, SqliteConnection* database,

@@ -4,7 +4,9 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <set>
 
+#include "colmap_ext/scene/pairs_among.h"
 #include "core/so3.h"
 
 namespace adasfm {
@@ -130,11 +132,6 @@ class CandidateBuilder {
   std::map<image_t, Directions> directions_;
 };
 
-bool IsFree(const MapperScene& scene, image_t image_id) {
-  return scene.images.count(image_id) &&
-         !scene.reconstruction.IsImageRegistered(image_id);
-}
-
 }  // namespace
 
 std::vector<InitialPair> FindInitialPairs(const InitialPairOptions& options,
@@ -142,13 +139,18 @@ std::vector<InitialPair> FindInitialPairs(const InitialPairOptions& options,
                                           size_t max_num_pairs) {
   CandidateBuilder builder(options, scene);
   std::vector<Candidate> candidates;
-  for (const ScenePair& pair : scene.data->pairs) {
-    if (pair.inlier_matches.size() < InitialPairOptions::kMinNumPoints ||
-        !IsFree(scene, pair.image_id1) || !IsFree(scene, pair.image_id2)) {
+  std::set<image_t> free_images;
+  for (const image_t image_id : scene.images) {
+    if (!scene.reconstruction.IsImageRegistered(image_id)) {
+      free_images.insert(image_id);
+    }
+  }
+  for (const ScenePair* pair : FindPairsAmong(*scene.data, free_images)) {
+    if (pair->inlier_matches.size() < InitialPairOptions::kMinNumPoints) {
       continue;
     }
     Candidate candidate;
-    if (builder.Build(pair, &candidate)) {
+    if (builder.Build(*pair, &candidate)) {
       candidates.push_back(std::move(candidate));
     }
   }

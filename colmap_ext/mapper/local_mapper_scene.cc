@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <utility>
 
+#include "colmap_ext/scene/pairs_among.h"
+
 namespace adasfm {
 namespace {
 
@@ -21,16 +23,14 @@ void AddImages(const SceneData& data, MapperScene* scene) {
 }
 
 void AddMatches(const SceneData& data, MapperScene* scene) {
-  for (const ScenePair& pair : data.pairs) {
-    if (!scene->images.count(pair.image_id1) ||
-        !scene->images.count(pair.image_id2)) {
-      continue;
-    }
-    scene->mapper.AddMatches(pair.image_id1, pair.image_id2,
-                             pair.inlier_matches);
-    const int num_matches = static_cast<int>(pair.inlier_matches.size());
-    scene->neighbors[pair.image_id1].emplace_back(pair.image_id2, num_matches);
-    scene->neighbors[pair.image_id2].emplace_back(pair.image_id1, num_matches);
+  for (const ScenePair* pair : FindPairsAmong(data, scene->images)) {
+    scene->mapper.AddMatches(pair->image_id1, pair->image_id2,
+                             pair->inlier_matches);
+    const int num_matches = static_cast<int>(pair->inlier_matches.size());
+    scene->neighbors[pair->image_id1].emplace_back(pair->image_id2,
+                                                   num_matches);
+    scene->neighbors[pair->image_id2].emplace_back(pair->image_id1,
+                                                   num_matches);
   }
   for (auto& [image_id, neighbors] : scene->neighbors) {
     std::stable_sort(

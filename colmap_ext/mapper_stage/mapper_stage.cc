@@ -17,6 +17,7 @@
 #include "core/option_checker.h"
 #include "core/parallel.h"
 #include "core/prior_lengths.h"
+#include "core/release_memory.h"
 
 namespace adasfm {
 namespace {
@@ -268,6 +269,7 @@ Status MapperStage::RunAllParts() {
       Report(line.str(), 0.02 + 0.6 * share);
     }
   });
+  ReleaseFreedMemory();
   summary_.parts_seconds = timer.Seconds();
   for (const Status& status : statuses) {
     if (!status.ok()) return status;

@@ -12,6 +12,7 @@
 #include "colmap_ext/mapper_stage/merge_checkpoint.h"
 #include "colmap_ext/scene/align_to_gravity.h"
 #include "core/median.h"
+#include "core/release_memory.h"
 
 namespace adasfm {
 namespace {
@@ -156,6 +157,7 @@ Status MapperStage::RefineMerged(const std::string& fingerprint, int num_done,
     // From the file, as a run that was killed here would: its points have other
     // ids, and so another order.
     scene->reset();
+    ReleaseFreedMemory();
     *scene = BuildWholeScene();
     const StatusOr<int> read = ReadMergeCheckpoint(
         checkpoint_path_, fingerprint, &summary_, scene->get());
@@ -182,6 +184,7 @@ StatusOr<colmap::Reconstruction> MapperStage::Merge(bool require_all_parts) {
     scene.reset();  // Merging needs one of its own.
     status = MergePartModels(fingerprint);
     if (!status.ok()) return status;
+    ReleaseFreedMemory();
     scene = BuildWholeScene();
     num_done = ReadMergeCheckpoint(checkpoint_path_, fingerprint, &summary_,
                                    scene.get());

@@ -9,6 +9,8 @@
 #include <set>
 #include <string>
 
+#include "colmap_ext/scene/pairs_among.h"
+
 namespace adasfm {
 namespace {
 
@@ -29,10 +31,8 @@ double EstimatePartMemoryBytes(const SceneData& data,
     if (image == data.images.end()) continue;
     bytes += kBytesPerKeypoint * image->second.keypoints.size();
   }
-  for (const ScenePair& pair : data.pairs) {
-    if (images.count(pair.image_id1) && images.count(pair.image_id2)) {
-      bytes += kBytesPerMatch * pair.inlier_matches.size();
-    }
+  for (const ScenePair* pair : FindPairsAmong(data, images)) {
+    bytes += kBytesPerMatch * pair->inlier_matches.size();
   }
   return bytes;
 }

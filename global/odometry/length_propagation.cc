@@ -14,6 +14,22 @@ namespace adasfm {
 namespace {
 
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
+// Whose observations are there twice at a time.
+constexpr size_t kNumEdgesAtATime = 1000;
+
+// At most.
+size_t CountObservations(const EdgeLengthOptions& options,
+                         const ViewGraph& graph,
+                         const GlobalCorrespondences& correspondences) {
+  size_t count = 0;
+  for (const ViewGraphEdge& edge : graph.edges) {
+    const auto matches = correspondences.matches.find(edge.Pair());
+    if (!edge.IsKept() || matches == correspondences.matches.end()) continue;
+    count +=
+        2 * std::min<size_t>(options.max_num_matches, matches->second.size());
+  }
+  return count;
+}
 
 }  // namespace
 
@@ -29,18 +45,20 @@ LengthPropagation::LengthPropagation(
         (it == correspondences.bearings.end() ? 0 : it->second.size());
   }
   const size_t num_edges = graph.edges.size();
-  std::vector<std::vector<Observation>> by_edge(num_edges);
-  ParallelFor(options.num_threads, num_edges, [&](size_t e) {
-    by_edge[e] = ObserveEdge(graph.edges[e], correspondences);
-    for (Observation& observation : by_edge[e]) observation.edge = e;
-  });
   edge_begin_.assign(num_edges + 1, 0);
-  for (size_t e = 0; e < num_edges; ++e) {
-    edge_begin_[e + 1] = edge_begin_[e] + by_edge[e].size();
-  }
-  observations_.reserve(edge_begin_.back());
-  for (const auto& edge : by_edge) {
-    observations_.insert(observations_.end(), edge.begin(), edge.end());
+  observations_.reserve(CountObservations(options, graph, correspondences));
+  std::vector<std::vector<Observation>> by_edge(kNumEdgesAtATime);
+  for (size_t begin = 0; begin < num_edges; begin += kNumEdgesAtATime) {
+    const size_t count = std::min(kNumEdgesAtATime, num_edges - begin);
+    ParallelFor(options.num_threads, count, [&](size_t i) {
+      by_edge[i] = ObserveEdge(graph.edges[begin + i], correspondences);
+      for (Observation& observation : by_edge[i]) observation.edge = begin + i;
+    });
+    for (size_t i = 0; i < count; ++i) {
+      observations_.insert(observations_.end(), by_edge[i].begin(),
+                           by_edge[i].end());
+      edge_begin_[begin + i + 1] = observations_.size();
+    }
   }
   LinkKeypoints(keypoint_begin_.back());
   log_lengths_.assign(num_edges, 0.0);

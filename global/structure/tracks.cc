@@ -9,28 +9,69 @@
 namespace adasfm {
 namespace {
 
+using Matches = std::map<ImagePair, std::vector<FeatureMatch>>;
+
+// The keypoints that have matches, numbered in order of (image, keypoint).
+class MatchedKeypoints {
+ public:
+  explicit MatchedKeypoints(const Matches& matches) {
+    for (const auto& [pair, pair_matches] : matches) {
+      Image& image1 = images_[pair.image_id1];
+      Image& image2 = images_[pair.image_id2];
+      for (const FeatureMatch& match : pair_matches) {
+        Mark(match.point2D_idx1, &image1);
+        Mark(match.point2D_idx2, &image2);
+      }
+    }
+    for (auto& [image_id, image] : images_) {
+      for (point2D_t idx = 0; idx < image.number_of.size(); ++idx) {
+        if (image.number_of[idx] == kUnmatched) continue;
+        image.number_of[idx] = static_cast<int>(keypoints_.size());
+        keypoints_.push_back({image_id, idx});
+      }
+    }
+  }
+
+  size_t size() const { return keypoints_.size(); }
+  const TrackElement& operator[](size_t k) const { return keypoints_[k]; }
+  // Numbers of an image's keypoints, by index.
+  const std::vector<int>& NumbersOf(image_t image_id) const {
+    return images_.at(image_id).number_of;
+  }
+
+ private:
+  static constexpr int kUnmatched = -1;
+  struct Image {
+    std::vector<int> number_of;
+  };
+
+  static void Mark(point2D_t idx, Image* image) {
+    if (idx >= image->number_of.size()) {
+      image->number_of.resize(idx + 1, kUnmatched);
+    }
+    image->number_of[idx] = 0;
+  }
+
+  std::map<image_t, Image> images_;
+  std::vector<TrackElement> keypoints_;
+};
+
 // Union-find whose sets know their images, so that no set holds two keypoints
 // of one image.
 class KeypointSets {
  public:
-  explicit KeypointSets(std::vector<TrackElement> keypoints)
-      : keypoints_(std::move(keypoints)),
-        sets_(keypoints_.size()),
-        images_(keypoints_.size()) {
-    for (size_t k = 0; k < keypoints_.size(); ++k) {
-      images_[k] = {keypoints_[k].image_id};
-    }
-  }
-
-  int IndexOf(const TrackElement& keypoint) const {
-    return std::lower_bound(keypoints_.begin(), keypoints_.end(), keypoint) -
-           keypoints_.begin();
-  }
+  explicit KeypointSets(const MatchedKeypoints& keypoints)
+      : keypoints_(keypoints),
+        sets_(keypoints.size()),
+        images_(keypoints.size()) {}
 
   void JoinIfConsistent(int a, int b) {
     a = sets_.Find(a);
     b = sets_.Find(b);
-    if (a == b || ShareImage(images_[a], images_[b])) return;
+    if (a == b) return;
+    if (images_[a].empty()) images_[a] = {keypoints_[a].image_id};
+    if (images_[b].empty()) images_[b] = {keypoints_[b].image_id};
+    if (ShareImage(images_[a], images_[b])) return;
     if (images_[a].size() < images_[b].size()) std::swap(a, b);
     sets_.Join(b, a);
     std::vector<image_t> merged;
@@ -42,15 +83,16 @@ class KeypointSets {
   }
 
   // Sets of at least min_length, in order of their first keypoint.
-  std::vector<Track> Collect(int min_length) {
+  std::vector<Track> Collect(size_t min_length) {
     std::vector<int> track_of(keypoints_.size(), -1);
     std::vector<Track> tracks;
     for (size_t k = 0; k < keypoints_.size(); ++k) {
       const int root = sets_.Find(k);
-      if (images_[root].size() < min_length) continue;
+      const size_t length = std::max<size_t>(1, images_[root].size());
+      if (length < min_length) continue;
       if (track_of[root] < 0) {
         track_of[root] = tracks.size();
-        tracks.emplace_back();
+        tracks.emplace_back().reserve(length);
       }
       tracks[track_of[root]].push_back(keypoints_[k]);
     }
@@ -73,25 +115,11 @@ class KeypointSets {
     return false;
   }
 
-  std::vector<TrackElement> keypoints_;  // sorted
+  const MatchedKeypoints& keypoints_;
   DisjointSets sets_;
-  std::vector<std::vector<image_t>> images_;  // sorted; of roots
+  // Sorted; of roots. Empty for a keypoint that no match has met yet.
+  std::vector<std::vector<image_t>> images_;
 };
-
-std::vector<TrackElement> CollectKeypoints(
-    const std::map<ImagePair, std::vector<FeatureMatch>>& matches) {
-  std::vector<TrackElement> keypoints;
-  for (const auto& [pair, pair_matches] : matches) {
-    for (const FeatureMatch& match : pair_matches) {
-      keypoints.push_back({pair.image_id1, match.point2D_idx1});
-      keypoints.push_back({pair.image_id2, match.point2D_idx2});
-    }
-  }
-  std::sort(keypoints.begin(), keypoints.end());
-  keypoints.erase(std::unique(keypoints.begin(), keypoints.end()),
-                  keypoints.end());
-  return keypoints;
-}
 
 // The first, the last, and evenly spread ones between them, which differ from
 // track to track so that no image always falls out.
@@ -152,42 +180,55 @@ bool TrackOptions::IsValid(std::string* error) const {
   return true;
 }
 
-size_t EstimateTrackBytes(
-    const std::map<ImagePair, std::vector<FeatureMatch>>& matches) {
+size_t EstimateTrackBytes(const Matches& matches) {
   // malloc rounds up to 32 bytes a block.
   constexpr size_t kBlock = 32;
-  size_t num_matches = 0;
+  size_t num_keypoints = 0;
+  size_t num_indices = 0;
+  std::map<image_t, std::pair<size_t, size_t>> images;  // ends, indices
   for (const auto& [pair, pair_matches] : matches) {
-    num_matches += pair_matches.size();
+    auto& [num_ends1, num_indices1] = images[pair.image_id1];
+    auto& [num_ends2, num_indices2] = images[pair.image_id2];
+    num_ends1 += pair_matches.size();
+    num_ends2 += pair_matches.size();
+    for (const FeatureMatch& match : pair_matches) {
+      num_indices1 = std::max<size_t>(num_indices1, match.point2D_idx1 + 1);
+      num_indices2 = std::max<size_t>(num_indices2, match.point2D_idx2 + 1);
+    }
   }
-  // Both ends of every match are listed; vectors grow by doubling, while old
-  // and new are there.
-  const size_t num_keypoints = 2 * num_matches;
-  const size_t listing = 3 * num_keypoints * sizeof(TrackElement);
+  for (const auto& [image_id, counts] : images) {
+    num_keypoints += std::min(counts.first, counts.second);
+    num_indices += counts.second;
+  }
+  // Vectors that grow by doubling, while old and new are there.
+  const size_t numbering =
+      3 * (num_indices * sizeof(int) + num_keypoints * sizeof(TrackElement));
   const size_t per_keypoint =
-      sizeof(TrackElement) + sizeof(int) +                // keypoint, parent
+      sizeof(int) +                                       // parent
       sizeof(std::vector<image_t>) + kBlock +             // its set
       sizeof(int) +                                       // track of the set
       sizeof(Track) + kBlock + 2 * sizeof(TrackElement);  // the track
-  return listing + num_keypoints * per_keypoint;
+  return numbering + num_keypoints * per_keypoint;
 }
 
-std::vector<Track> JoinMatches(
-    const TrackOptions& options,
-    const std::map<ImagePair, std::vector<FeatureMatch>>& matches) {
-  KeypointSets sets(CollectKeypoints(matches));
-  std::vector<const std::pair<const ImagePair, std::vector<FeatureMatch>>*>
-      pairs;
+std::vector<Track> JoinMatches(const TrackOptions& options,
+                               const Matches& matches) {
+  const MatchedKeypoints keypoints(matches);
+  KeypointSets sets(keypoints);
+  std::vector<const Matches::value_type*> pairs;
   for (const auto& pair : matches) pairs.push_back(&pair);
   std::stable_sort(pairs.begin(), pairs.end(),
                    [](const auto* a, const auto* b) {
                      return a->second.size() > b->second.size();
                    });
   for (const auto* pair : pairs) {
+    const std::vector<int>& numbers1 =
+        keypoints.NumbersOf(pair->first.image_id1);
+    const std::vector<int>& numbers2 =
+        keypoints.NumbersOf(pair->first.image_id2);
     for (const FeatureMatch& match : pair->second) {
-      sets.JoinIfConsistent(
-          sets.IndexOf({pair->first.image_id1, match.point2D_idx1}),
-          sets.IndexOf({pair->first.image_id2, match.point2D_idx2}));
+      sets.JoinIfConsistent(numbers1[match.point2D_idx1],
+                            numbers2[match.point2D_idx2]);
     }
   }
   return sets.Collect(options.min_track_length);

@@ -141,6 +141,28 @@ TEST_F(PriorTablesTest, ReadsWhatWasWrittenLast) {
   EXPECT_TRUE(scene->images.at(2).gravity_in_cam.has_value());
 }
 
+// Two robots that drive at the same time: what consecutive motions share is
+// counted along one drive.
+TEST_F(PriorTablesTest, DrivesAtTheSameTimeFollowEachOther) {
+  PriorTables tables = MakeTables(1);
+  const RelativePosePrior prior = tables.priors.front();
+  tables.priors.clear();
+  for (const ImagePair& pair :
+       {ImagePair(1, 3), ImagePair(2, 4), ImagePair(3, 5), ImagePair(4, 6)}) {
+    tables.priors.push_back(prior);
+    tables.priors.back().image_id1 = pair.image_id1;
+    tables.priors.back().image_id2 = pair.image_id2;
+  }
+  ASSERT_TRUE(WritePriorTables(path_, tables).ok());
+  const StatusOr<LoadedPriorTables> loaded = ReadPriorTables(path_);
+  ASSERT_TRUE(loaded.ok()) << loaded.status().message();
+  std::vector<image_t> firsts;
+  for (const RelativePosePrior& read : loaded->tables.priors) {
+    firsts.push_back(read.image_id1);
+  }
+  EXPECT_EQ(firsts, (std::vector<image_t>{1, 3, 2, 4}));
+}
+
 // As written before there were positions, and again after an import without.
 TEST_F(PriorTablesTest, DatabasesWithoutPositionsAreRead) {
   PriorTables tables = MakeTables(1);
