@@ -6,6 +6,7 @@
 #include "core/median.h"
 #include "core/so3.h"
 #include "global/coarse_pose_estimator.h"
+#include "global/odometry/parts_of_one_unit.h"
 
 namespace adasfm {
 
@@ -68,6 +69,7 @@ void CoarsePoseEstimator::EstimatePositions() {
   // Unit vectors throughout, as the paper has it: shared points must not
   // bring the metres back.
   if (!options_.augmentation.use_metric_lengths) lengths_ = EdgeLengths();
+  const int num_hinges = SplitWhereSizeIsUnknown();
   ViewGraph directed = graph_;
   for (ViewGraphEdge& edge : directed.edges) {
     if (!edge.has_translation) edge.removal = EdgeRemoval::kTranslation;
@@ -90,7 +92,24 @@ void CoarsePoseEstimator::EstimatePositions() {
           (result_.components.size() == 1 ? " component, " : " components, ") +
           std::to_string(num_iterations) + " iterations, " +
           std::to_string(num_removed) + " edges removed, " +
+          std::to_string(num_hinges) + " between parts of unknown size, " +
           std::to_string(num_joins) + " joins at one place only");
+}
+
+// Returns the number of edges removed.
+int CoarsePoseEstimator::SplitWhereSizeIsUnknown() {
+  if (lengths_.units.empty()) return 0;
+  const std::vector<int> part_of = FindPartsOfOneUnit(graph_, lengths_.units);
+  int num_removed = 0;
+  for (ViewGraphEdge& edge : graph_.edges) {
+    if (!edge.IsKept() || part_of[graph_.IndexOf(edge.image_id1)] ==
+                              part_of[graph_.IndexOf(edge.image_id2)]) {
+      continue;
+    }
+    edge.removal = EdgeRemoval::kUnknownSize;
+    ++num_removed;
+  }
+  return num_removed;
 }
 
 // Those that were made all the same, with the component that hangs on them.

@@ -18,8 +18,8 @@ class LengthPropagation {
   LengthPropagation(const EdgeLengthOptions& options, const ViewGraph& graph,
                     const GlobalCorrespondences& correspondences);
 
-  // A length that stays.
-  void Fix(int edge, double log_length, double log_sigma);
+  // A length in metres, which stays.
+  void FixMetres(int edge, double log_length, double log_sigma);
   // A length to start from.
   void Start(int edge, const EdgeLength& length);
   // Fixes a length at which the edge's points have the same median depth as
@@ -38,6 +38,8 @@ class LengthPropagation {
   void Spread(int min_num_shared);
   // Learns all known lengths anew from each other, all at once.
   void Sweep();
+  // By edge, see EdgeLengths::units.
+  std::vector<int> FindUnits() const;
 
  private:
   // What an edge sees of a keypoint: log depth = log length(edge) + offset.
@@ -53,6 +55,7 @@ class LengthPropagation {
     double weight = 0.0;
   };
 
+  void Fix(int edge, double log_length, double log_sigma);
   static double WeightedMedian(std::vector<WeightedValue>* values);
   std::vector<Observation> ObserveEdge(
       const ViewGraphEdge& edge,
@@ -80,6 +83,7 @@ class LengthPropagation {
   std::vector<double> log_sigmas_;
   std::vector<char> is_known_;
   std::vector<char> is_fixed_;
+  std::vector<char> has_metres_;
   std::vector<char> has_known_;  // by image
   // The logarithm of a seed's median depth; found with the first one.
   std::optional<double> seed_log_depth_;

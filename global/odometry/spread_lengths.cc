@@ -1,8 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include <map>
 #include <queue>
+#include <set>
 #include <utility>
 #include <vector>
 
+#include "core/disjoint_sets.h"
 #include "global/odometry/length_propagation.h"
 
 namespace adasfm {
@@ -77,6 +80,45 @@ bool LengthPropagation::LearnFromStart(int edge) {
   log_sigmas_[edge] = learned.log_sigma;
   MarkKnown(edge);
   return true;
+}
+
+// An edge joins a unit through keypoints that both see, as many as it takes to
+// learn a length.
+std::vector<int> LengthPropagation::FindUnits() const {
+  const int num_edges = graph_.edges.size();
+  DisjointSets sets(num_edges);
+  int metric = -1;
+  for (int e = 0; e < num_edges; ++e) {
+    if (!has_metres_[e]) continue;
+    if (metric < 0) metric = e;
+    sets.Join(e, metric);
+  }
+  for (bool has_changed = true; has_changed;) {
+    has_changed = false;
+    for (int e = 0; e < num_edges; ++e) {
+      std::map<int, int> num_shared;  // by unit
+      for (size_t o = edge_begin_[e]; o < edge_begin_[e + 1]; ++o) {
+        const int keypoint = observations_[o].keypoint;
+        std::set<int> units;
+        for (size_t k = link_begin_[keypoint]; k < link_begin_[keypoint + 1];
+             ++k) {
+          units.insert(sets.Find(observations_[links_[k]].edge));
+        }
+        units.erase(sets.Find(e));
+        for (const int unit : units) ++num_shared[unit];
+      }
+      for (const auto& [unit, count] : num_shared) {
+        if (count < options_.min_num_shared) continue;
+        sets.Join(e, unit);
+        has_changed = true;
+      }
+    }
+  }
+  std::vector<int> units(num_edges, -1);
+  for (int e = 0; e < num_edges; ++e) {
+    if (has_metres_[e] || NumMatches(e) > 0) units[e] = sets.Find(e);
+  }
+  return units;
 }
 
 }  // namespace adasfm
