@@ -96,10 +96,28 @@ void CoarsePoseEstimator::EstimatePositions() {
           std::to_string(num_joins) + " joins at one place only");
 }
 
+// Then all is of one size.
+bool CoarsePoseEstimator::HasMetresEverywhere() const {
+  std::vector<bool> has_metres(graph_.images.size(), false);
+  for (const ViewGraphEdge& edge : graph_.edges) {
+    if (!edge.IsKept() || !edge.length_m) continue;
+    has_metres[graph_.IndexOf(edge.image_id1)] = true;
+    has_metres[graph_.IndexOf(edge.image_id2)] = true;
+  }
+  return std::all_of(has_metres.begin(), has_metres.end(),
+                     [](bool has) { return has; });
+}
+
 // Returns the number of edges removed.
 int CoarsePoseEstimator::SplitWhereSizeIsUnknown() {
-  if (lengths_.units.empty()) return 0;
-  const std::vector<int> part_of = FindPartsOfOneUnit(graph_, lengths_.units);
+  // Photos in any order have no parts that could stay apart.
+  if (!result_.loop_closures.joins_were_split || lengths_.lengths.empty() ||
+      HasMetresEverywhere()) {
+    return 0;
+  }
+  const std::vector<int> part_of = FindPartsOfOneUnit(
+      graph_, FindLengthUnits(options_.lengths, graph_, KnownLengths(),
+                              correspondences_, lengths_));
   int num_removed = 0;
   for (ViewGraphEdge& edge : graph_.edges) {
     if (!edge.IsKept() || part_of[graph_.IndexOf(edge.image_id1)] ==

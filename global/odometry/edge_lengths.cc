@@ -60,7 +60,7 @@ EdgeLengths EstimateEdgeLengths(
     const auto it = known_lengths_m.find(graph.edges[e].Pair());
     if (it == known_lengths_m.end() || !(it->second > 0.0)) continue;
     constexpr double kPriorLogSigma = 0.02;
-    propagation.FixMetres(e, std::log(it->second), kPriorLogSigma);
+    propagation.Fix(e, std::log(it->second), kPriorLogSigma);
     result.metric = true;
   }
   if (start.metric == result.metric) {
@@ -85,7 +85,6 @@ EdgeLengths EstimateEdgeLengths(
     result.lengths[e] = propagation.Get(e);
     result.lengths[e]->is_by_depth = is_by_depth[e];
   }
-  result.units = propagation.FindUnits();
   return result;
 }
 

@@ -46,10 +46,6 @@ struct EdgeLength {
 struct EdgeLengths {
   // One per edge of the graph; empty where nothing was learned.
   std::vector<std::optional<EdgeLength>> lengths;
-  // By edge: those of one number have one unit, through keypoints that they
-  // share or through metres; -1 where an edge says nothing of lengths. Lengths
-  // of different units compare by the scene's depth only.
-  std::vector<int> units;
   bool metric = false;
 };
 

@@ -47,7 +47,6 @@ LengthPropagation::LengthPropagation(
   log_sigmas_.assign(num_edges, 0.0);
   is_known_.assign(num_edges, false);
   is_fixed_.assign(num_edges, false);
-  has_metres_.assign(num_edges, false);
   has_known_.assign(graph.images.size(), false);
 }
 
@@ -139,12 +138,6 @@ void LengthPropagation::Fix(int edge, double log_length, double log_sigma) {
   log_sigmas_[edge] = log_sigma;
   is_fixed_[edge] = true;
   MarkKnown(edge);
-}
-
-void LengthPropagation::FixMetres(int edge, double log_length,
-                                  double log_sigma) {
-  Fix(edge, log_length, log_sigma);
-  has_metres_[edge] = true;
 }
 
 void LengthPropagation::Start(int edge, const EdgeLength& length) {

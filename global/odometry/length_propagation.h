@@ -4,6 +4,7 @@
 #include <optional>
 #include <vector>
 
+#include "core/disjoint_sets.h"
 #include "global/odometry/edge_lengths.h"
 #include "global/view_graph/correspondences.h"
 #include "global/view_graph/view_graph.h"
@@ -18,8 +19,8 @@ class LengthPropagation {
   LengthPropagation(const EdgeLengthOptions& options, const ViewGraph& graph,
                     const GlobalCorrespondences& correspondences);
 
-  // A length in metres, which stays.
-  void FixMetres(int edge, double log_length, double log_sigma);
+  // A length that stays.
+  void Fix(int edge, double log_length, double log_sigma);
   // A length to start from.
   void Start(int edge, const EdgeLength& length);
   // Fixes a length at which the edge's points have the same median depth as
@@ -38,7 +39,8 @@ class LengthPropagation {
   void Spread(int min_num_shared);
   // Learns all known lengths anew from each other, all at once.
   void Sweep();
-  // By edge, see EdgeLengths::units.
+  // By edge: lengths of one number have one unit, fixed ones the same. An edge
+  // whose length nothing tells has a unit of its own; -1 without parallax.
   std::vector<int> FindUnits() const;
 
  private:
@@ -55,7 +57,9 @@ class LengthPropagation {
     double weight = 0.0;
   };
 
-  void Fix(int edge, double log_length, double log_sigma);
+  // Of the units that an edge shares enough keypoints with, those whose size
+  // against its own these tell.
+  std::vector<int> FindUnitsOfKnownSize(int edge, DisjointSets* sets) const;
   static double WeightedMedian(std::vector<WeightedValue>* values);
   std::vector<Observation> ObserveEdge(
       const ViewGraphEdge& edge,
@@ -83,7 +87,6 @@ class LengthPropagation {
   std::vector<double> log_sigmas_;
   std::vector<char> is_known_;
   std::vector<char> is_fixed_;
-  std::vector<char> has_metres_;
   std::vector<char> has_known_;  // by image
   // The logarithm of a seed's median depth; found with the first one.
   std::optional<double> seed_log_depth_;

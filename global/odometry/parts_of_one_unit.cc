@@ -2,6 +2,8 @@
 #include "global/odometry/parts_of_one_unit.h"
 
 #include <algorithm>
+#include <cmath>
+#include <limits>
 #include <map>
 #include <queue>
 #include <set>
@@ -9,6 +11,7 @@
 #include <utility>
 
 #include "core/disjoint_sets.h"
+#include "global/odometry/length_propagation.h"
 
 namespace adasfm {
 namespace {
@@ -122,6 +125,27 @@ std::vector<int> NameByFirstImage(const std::vector<int>& part_of) {
 }
 
 }  // namespace
+
+std::vector<int> FindLengthUnits(
+    const EdgeLengthOptions& options, const ViewGraph& graph,
+    const std::map<ImagePair, double>& known_lengths_m,
+    const GlobalCorrespondences& correspondences, const EdgeLengths& lengths) {
+  // All matches: the best of each pair need not be those that pairs share.
+  EdgeLengthOptions unit_options = options;
+  unit_options.max_num_matches = std::numeric_limits<int>::max();
+  LengthPropagation propagation(unit_options, graph, correspondences);
+  for (size_t e = 0; e < lengths.lengths.size(); ++e) {
+    if (!lengths.lengths[e]) continue;
+    const EdgeLength& length = *lengths.lengths[e];
+    if (known_lengths_m.count(graph.edges[e].Pair()) > 0) {
+      propagation.Fix(e, std::log(length.length), length.log_sigma);
+    } else {
+      propagation.Start(e, length);
+    }
+  }
+  propagation.Spread(options.min_num_shared);
+  return propagation.FindUnits();
+}
 
 std::vector<int> FindPartsOfOneUnit(const ViewGraph& graph,
                                     const std::vector<int>& units) {

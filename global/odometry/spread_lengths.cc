@@ -1,11 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <map>
 #include <queue>
-#include <set>
 #include <utility>
 #include <vector>
 
-#include "core/disjoint_sets.h"
 #include "global/odometry/length_propagation.h"
 
 namespace adasfm {
@@ -82,33 +80,56 @@ bool LengthPropagation::LearnFromStart(int edge) {
   return true;
 }
 
-// An edge joins a unit through keypoints that both see, as many as it takes to
-// learn a length.
+std::vector<int> LengthPropagation::FindUnitsOfKnownSize(
+    int edge, DisjointSets* sets) const {
+  // A lane of 10 m then errs by half a metre. A few wrong matches agree by
+  // chance, hence the larger number of keypoints.
+  constexpr double kMaxSizeLogSigma = 0.05;
+  // By unit: how the depths of the keypoints compare with the edge's own.
+  std::map<int, std::vector<WeightedValue>> depths;
+  for (size_t o = edge_begin_[edge]; o < edge_begin_[edge + 1]; ++o) {
+    const Observation& own = observations_[o];
+    std::map<int, std::vector<WeightedValue>> of_keypoint;
+    for (size_t k = link_begin_[own.keypoint];
+         k < link_begin_[own.keypoint + 1]; ++k) {
+      const Observation& link = observations_[links_[k]];
+      if (!is_known_[link.edge] || sets->Find(link.edge) == sets->Find(edge)) {
+        continue;
+      }
+      of_keypoint[sets->Find(link.edge)].push_back(
+          {log_lengths_[link.edge] + link.offset, link.weight});
+    }
+    for (auto& [unit, values] : of_keypoint) {
+      depths[unit].push_back(
+          {WeightedMedian(&values) - log_lengths_[edge] - own.offset,
+           own.weight});
+    }
+  }
+  std::vector<int> units;
+  for (auto& [unit, values] : depths) {
+    EdgeLength ratio;
+    if (static_cast<int>(values.size()) >= options_.num_shared_reliable &&
+        LearnLength(&values, &ratio) && ratio.log_sigma <= kMaxSizeLogSigma) {
+      units.push_back(unit);
+    }
+  }
+  return units;
+}
+
 std::vector<int> LengthPropagation::FindUnits() const {
   const int num_edges = graph_.edges.size();
   DisjointSets sets(num_edges);
-  int metric = -1;
+  int first_fixed = -1;
   for (int e = 0; e < num_edges; ++e) {
-    if (!has_metres_[e]) continue;
-    if (metric < 0) metric = e;
-    sets.Join(e, metric);
+    if (!is_fixed_[e]) continue;
+    if (first_fixed < 0) first_fixed = e;
+    sets.Join(e, first_fixed);
   }
   for (bool has_changed = true; has_changed;) {
     has_changed = false;
     for (int e = 0; e < num_edges; ++e) {
-      std::map<int, int> num_shared;  // by unit
-      for (size_t o = edge_begin_[e]; o < edge_begin_[e + 1]; ++o) {
-        const int keypoint = observations_[o].keypoint;
-        std::set<int> units;
-        for (size_t k = link_begin_[keypoint]; k < link_begin_[keypoint + 1];
-             ++k) {
-          units.insert(sets.Find(observations_[links_[k]].edge));
-        }
-        units.erase(sets.Find(e));
-        for (const int unit : units) ++num_shared[unit];
-      }
-      for (const auto& [unit, count] : num_shared) {
-        if (count < options_.min_num_shared) continue;
+      if (!is_known_[e]) continue;
+      for (const int unit : FindUnitsOfKnownSize(e, &sets)) {
         sets.Join(e, unit);
         has_changed = true;
       }
@@ -116,7 +137,9 @@ std::vector<int> LengthPropagation::FindUnits() const {
   }
   std::vector<int> units(num_edges, -1);
   for (int e = 0; e < num_edges; ++e) {
-    if (has_metres_[e] || NumMatches(e) > 0) units[e] = sets.Find(e);
+    if (is_known_[e] || NumMatches(e) >= options_.min_num_shared) {
+      units[e] = sets.Find(e);
+    }
   }
   return units;
 }

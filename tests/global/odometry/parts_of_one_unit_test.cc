@@ -43,10 +43,12 @@ TestScene BuildHingedScene(bool shares_landmarks) {
 
 std::vector<int> PartsOf(const TestScene& scene,
                          const std::map<ImagePair, double>& known_lengths_m) {
+  const EdgeLengthOptions options;
+  const EdgeLengths lengths = EstimateEdgeLengths(
+      options, scene.graph, known_lengths_m, scene.correspondences);
   return FindPartsOfOneUnit(
-      scene.graph, EstimateEdgeLengths(EdgeLengthOptions(), scene.graph,
-                                       known_lengths_m, scene.correspondences)
-                       .units);
+      scene.graph, FindLengthUnits(options, scene.graph, known_lengths_m,
+                                   scene.correspondences, lengths));
 }
 
 TEST(FindPartsOfOneUnit, SharedLandmarksTieSizes) {
