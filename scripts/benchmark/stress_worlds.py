@@ -106,10 +106,9 @@ def list_models(folder):
   return [os.path.join(folder, name) for name in sorted(names, key=int)]
 
 
-def map_world(folder, logs, args, suffix=None, global_options=(),
-              mapper_options=()):
+def map_world(folder, logs, args):
   """Imports the logs, runs both commands; returns what came out."""
-  suffix = suffix or ('with' if logs else 'without')
+  suffix = 'with' if logs else 'without'
   log_path = os.path.join(folder, suffix + '.log')
   database = os.path.join(folder, suffix + '.db')
   shutil.copy(os.path.join(folder, 'database.db'), database)
@@ -124,11 +123,11 @@ def map_world(folder, logs, args, suffix=None, global_options=(),
   coarse = os.path.join(folder, suffix + '-global')
   final = os.path.join(folder, suffix + '-sparse')
   usage = [run([args.colmap, 'adasfm_global', '--database_path', database,
-                '--output_path', coarse] + list(global_options), log_path)]
+                '--output_path', coarse], log_path)]
   if args.run_mapper:
     usage.append(run([args.colmap, 'adasfm_mapper', '--database_path', database,
-                      '--input_path', coarse, '--output_path', final] +
-                     list(mapper_options), log_path))
+                      '--input_path', coarse, '--output_path', final],
+                     log_path))
   models = [measure(path, folder, args, log_path)
             for path in list_models(final if args.run_mapper else coarse)]
   models = [model for model in models if model]
@@ -162,15 +161,19 @@ def judge(outcome, bar_m, num_images):
   return 'whole' if outcome['images'] == num_images else 'right, incomplete'
 
 
-def describe_failure(error, folder, run_name):
-  """The last error of a run's log: a command that refuses a world says why."""
-  with open(os.path.join(folder, run_name + '.log'), errors='replace') as file:
-    said = [line.strip() for line in file if line.startswith('ERROR: ')]
+def describe_failure(error, folder):
+  """The last error of the logs: a command that refuses a world says why."""
+  said = []
+  for name in ('with.log', 'without.log'):
+    path = os.path.join(folder, name)
+    if os.path.exists(path):
+      with open(path, errors='replace') as file:
+        said += [line.strip() for line in file if line.startswith('ERROR: ')]
   return 'refused: ' + said[-1][len('ERROR: '):] if said else str(error)
 
 
-def make_world(name, row, seed, args):
-  """Its new folder, and a record with its command and world.json, or error."""
+def run_dial(name, seed, args):
+  row = DIALS[name]
   folder = world_folder(name, seed, args)
   shutil.rmtree(folder, ignore_errors=True)
   os.makedirs(folder)
@@ -184,17 +187,9 @@ def make_world(name, row, seed, args):
     run(arguments, os.path.join(folder, 'world.log'))
   except Failed as error:
     record['error'] = str(error)
-    return folder, record
+    return record
   with open(os.path.join(folder, 'world.json')) as file:
     record['world'] = json.load(file)
-  return folder, record
-
-
-def run_dial(name, seed, args):
-  row = DIALS[name]
-  folder, record = make_world(name, row, seed, args)
-  if 'error' in record:
-    return record
   drift_m = row['max_drift'] * record['world']['driven_m']
   for key, logs, bar_m in (('with', row['logs'], row['bar_m']),
                            ('without', (), max(row['bar_m'], drift_m))):
@@ -203,7 +198,7 @@ def run_dial(name, seed, args):
     try:
       record[key] = map_world(folder, logs, args)
     except Failed as error:
-      record[key] = {'error': describe_failure(error, folder, key)}
+      record[key] = {'error': describe_failure(error, folder)}
     record[key]['bar_m'] = bar_m
     record[key]['verdict'] = judge(record[key], bar_m, row['images'])
   if not args.keep:
