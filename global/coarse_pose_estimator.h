@@ -45,6 +45,8 @@ class CoarsePoseEstimator {
   std::vector<std::optional<RotationPrediction>> PredictFromRotations() const;
   void EstimateTranslations();
   void EstimatePositions();
+  bool HasMetresEverywhere() const;
+  int SplitWhereSizeIsUnknown();
   int ReportUnverifiedJoins();
   int EstimateComponent(const std::vector<image_t>& images);
   void MeasureDirectionAgreement(const GlobalPositions& positions,

@@ -6,6 +6,7 @@
 #include "core/median.h"
 #include "core/so3.h"
 #include "global/coarse_pose_estimator.h"
+#include "global/odometry/parts_of_one_unit.h"
 
 namespace adasfm {
 
@@ -68,6 +69,7 @@ void CoarsePoseEstimator::EstimatePositions() {
   // Unit vectors throughout, as the paper has it: shared points must not
   // bring the metres back.
   if (!options_.augmentation.use_metric_lengths) lengths_ = EdgeLengths();
+  const int num_hinges = SplitWhereSizeIsUnknown();
   ViewGraph directed = graph_;
   for (ViewGraphEdge& edge : directed.edges) {
     if (!edge.has_translation) edge.removal = EdgeRemoval::kTranslation;
@@ -90,7 +92,42 @@ void CoarsePoseEstimator::EstimatePositions() {
           (result_.components.size() == 1 ? " component, " : " components, ") +
           std::to_string(num_iterations) + " iterations, " +
           std::to_string(num_removed) + " edges removed, " +
+          std::to_string(num_hinges) + " between parts of unknown size, " +
           std::to_string(num_joins) + " joins at one place only");
+}
+
+// Then all is of one size.
+bool CoarsePoseEstimator::HasMetresEverywhere() const {
+  std::vector<bool> has_metres(graph_.images.size(), false);
+  for (const ViewGraphEdge& edge : graph_.edges) {
+    if (!edge.IsKept() || !edge.length_m) continue;
+    has_metres[graph_.IndexOf(edge.image_id1)] = true;
+    has_metres[graph_.IndexOf(edge.image_id2)] = true;
+  }
+  return std::all_of(has_metres.begin(), has_metres.end(),
+                     [](bool has) { return has; });
+}
+
+// Returns the number of edges removed.
+int CoarsePoseEstimator::SplitWhereSizeIsUnknown() {
+  // Photos in any order have no parts that could stay apart.
+  if (!result_.loop_closures.joins_were_split || lengths_.lengths.empty() ||
+      HasMetresEverywhere()) {
+    return 0;
+  }
+  const std::vector<int> part_of = FindPartsOfOneUnit(
+      graph_, FindLengthUnits(options_.lengths, graph_, KnownLengths(),
+                              correspondences_, lengths_));
+  int num_removed = 0;
+  for (ViewGraphEdge& edge : graph_.edges) {
+    if (!edge.IsKept() || part_of[graph_.IndexOf(edge.image_id1)] ==
+                              part_of[graph_.IndexOf(edge.image_id2)]) {
+      continue;
+    }
+    edge.removal = EdgeRemoval::kUnknownSize;
+    ++num_removed;
+  }
+  return num_removed;
 }
 
 // Those that were made all the same, with the component that hangs on them.

@@ -51,6 +51,7 @@ std::set<ImagePair> FindRefutedPairs(const ViewGraph& graph) {
       case EdgeRemoval::kFewInliers:
       case EdgeRemoval::kRelativePose:
       case EdgeRemoval::kOdometryPose:
+      case EdgeRemoval::kUnknownSize:
       case EdgeRemoval::kDisconnected:
         break;
     }

@@ -4,6 +4,7 @@
 #include <optional>
 #include <vector>
 
+#include "core/disjoint_sets.h"
 #include "global/odometry/edge_lengths.h"
 #include "global/view_graph/correspondences.h"
 #include "global/view_graph/view_graph.h"
@@ -38,6 +39,9 @@ class LengthPropagation {
   void Spread(int min_num_shared);
   // Learns all known lengths anew from each other, all at once.
   void Sweep();
+  // By edge: lengths of one number have one unit, fixed ones the same. An edge
+  // whose length nothing tells has a unit of its own; -1 without parallax.
+  std::vector<int> FindUnits() const;
 
  private:
   // What an edge sees of a keypoint: log depth = log length(edge) + offset.
@@ -53,6 +57,9 @@ class LengthPropagation {
     double weight = 0.0;
   };
 
+  // Of the units that an edge shares enough keypoints with, those whose size
+  // against its own these tell.
+  std::vector<int> FindUnitsOfKnownSize(int edge, DisjointSets* sets) const;
   static double WeightedMedian(std::vector<WeightedValue>* values);
   std::vector<Observation> ObserveEdge(
       const ViewGraphEdge& edge,

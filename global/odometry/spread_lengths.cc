@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include <map>
 #include <queue>
 #include <utility>
 #include <vector>
@@ -77,6 +78,70 @@ bool LengthPropagation::LearnFromStart(int edge) {
   log_sigmas_[edge] = learned.log_sigma;
   MarkKnown(edge);
   return true;
+}
+
+std::vector<int> LengthPropagation::FindUnitsOfKnownSize(
+    int edge, DisjointSets* sets) const {
+  // A lane of 10 m then errs by half a metre. A few wrong matches agree by
+  // chance, hence the larger number of keypoints.
+  constexpr double kMaxSizeLogSigma = 0.05;
+  // By unit: how the depths of the keypoints compare with the edge's own.
+  std::map<int, std::vector<WeightedValue>> depths;
+  for (size_t o = edge_begin_[edge]; o < edge_begin_[edge + 1]; ++o) {
+    const Observation& own = observations_[o];
+    std::map<int, std::vector<WeightedValue>> of_keypoint;
+    for (size_t k = link_begin_[own.keypoint];
+         k < link_begin_[own.keypoint + 1]; ++k) {
+      const Observation& link = observations_[links_[k]];
+      if (!is_known_[link.edge] || sets->Find(link.edge) == sets->Find(edge)) {
+        continue;
+      }
+      of_keypoint[sets->Find(link.edge)].push_back(
+          {log_lengths_[link.edge] + link.offset, link.weight});
+    }
+    for (auto& [unit, values] : of_keypoint) {
+      depths[unit].push_back(
+          {WeightedMedian(&values) - log_lengths_[edge] - own.offset,
+           own.weight});
+    }
+  }
+  std::vector<int> units;
+  for (auto& [unit, values] : depths) {
+    EdgeLength ratio;
+    if (static_cast<int>(values.size()) >= options_.num_shared_reliable &&
+        LearnLength(&values, &ratio) && ratio.log_sigma <= kMaxSizeLogSigma) {
+      units.push_back(unit);
+    }
+  }
+  return units;
+}
+
+std::vector<int> LengthPropagation::FindUnits() const {
+  const int num_edges = graph_.edges.size();
+  DisjointSets sets(num_edges);
+  int first_fixed = -1;
+  for (int e = 0; e < num_edges; ++e) {
+    if (!is_fixed_[e]) continue;
+    if (first_fixed < 0) first_fixed = e;
+    sets.Join(e, first_fixed);
+  }
+  for (bool has_changed = true; has_changed;) {
+    has_changed = false;
+    for (int e = 0; e < num_edges; ++e) {
+      if (!is_known_[e]) continue;
+      for (const int unit : FindUnitsOfKnownSize(e, &sets)) {
+        sets.Join(e, unit);
+        has_changed = true;
+      }
+    }
+  }
+  std::vector<int> units(num_edges, -1);
+  for (int e = 0; e < num_edges; ++e) {
+    if (is_known_[e] || NumMatches(e) >= options_.min_num_shared) {
+      units[e] = sets.Find(e);
+    }
+  }
+  return units;
 }
 
 }  // namespace adasfm

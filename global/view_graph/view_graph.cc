@@ -25,6 +25,8 @@ const char* EdgeRemovalName(EdgeRemoval removal) {
       return "inconsistent with other loops";
     case EdgeRemoval::kUnverifiedJoin:
       return "alone joins two parts";
+    case EdgeRemoval::kUnknownSize:
+      return "joins parts of unknown relative size";
     case EdgeRemoval::kRotation:
       return "off the global rotations";
     case EdgeRemoval::kTranslation:

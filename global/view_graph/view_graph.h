@@ -28,6 +28,7 @@ enum class EdgeRemoval {
   kOdometry,        // contradicts the odometry
   kFalseLoop,       // is inconsistent with other loops
   kUnverifiedJoin,  // alone joins two parts of a drive, and may be wrong
+  kUnknownSize,     // joins parts whose relative size nothing tells
   kRotation,        // off the global rotations
   kTranslation,     // off the global positions
   kDisconnected,    // one of its images has no pose

@@ -16,6 +16,12 @@ namespace {
 // Clock errors looked for, and the smallest one that is named.
 constexpr double kMaxLogShiftS = 10.0;
 constexpr int kMinShiftBins = 2;
+// Logs of one drive fit best at their own clock; those of another drive fit
+// there no better than at any other. One of the 160 clocks that are further off
+// than kFarShiftS is by chance e^5 times likelier than most, and the log's own
+// must be likelier than that one by as much again.
+constexpr double kFarShiftS = 2.0;
+constexpr double kBelongingEvidence = 5.0;
 // Windows overlap: so many bins count as one observation.
 constexpr double kBinsPerObservation = 4.0;
 // Gravity further than this from the wheel frame's z is no tilt of a road or
@@ -27,8 +33,9 @@ constexpr double kMinCorrelation = 0.7;
 constexpr double kMinAcceleration = 0.3;  // m/s^2
 constexpr double kMinYawRate = 0.03;      // rad/s
 constexpr int kMinNumBins = 50;
-// Below it, where much moves, logs do not belong together; without a yaw rate
-// to compare only far below, since engines and rough ground shake.
+// Below it, where much moves, logs may not belong together; without a yaw rate
+// to compare only far below, since engines and rough ground shake. Wheels that
+// slip on loose ground correlate no better: then the clock decides.
 constexpr double kNoCorrelation = 0.5;
 constexpr double kNoForceCorrelation = 0.2;
 // Wheel directions beyond this are more than a mount that was badly measured.
@@ -55,8 +62,16 @@ class WheelChecker {
            std::abs(fit.yaw_correlation) > kMinCorrelation;
   }
   std::string CheckGravity(const WheelCheck& check) const;
-  std::string CheckClock(const WheelFit& fit) const;
-  std::string CheckBelonging(const WheelFit& fit) const;
+  // How well the logs fit at the clocks around the logged one.
+  struct ClockScan {
+    double as_logged = 0.0;  // log likelihoods
+    double best = 0.0;
+    double best_far = 0.0;
+    int best_shift = 0;  // bins
+  };
+  ClockScan ScanClocks(const WheelFit& fit) const;
+  std::string CheckClock(const ClockScan& scan) const;
+  std::string CheckBelonging(const WheelFit& fit, const ClockScan& scan) const;
   std::string CheckAxes(const WheelFit& fit) const;
   std::string CheckDirection(const WheelFit& fit) const;
   std::string CheckUnits(const WheelFit& fit,
@@ -139,37 +154,46 @@ std::string WheelChecker::CheckGravity(const WheelCheck& check) const {
          figures;
 }
 
-std::string WheelChecker::CheckClock(const WheelFit& fit) const {
+WheelChecker::ClockScan WheelChecker::ScanClocks(const WheelFit& fit) const {
   const int max_shift =
       static_cast<int>(std::lround(kMaxLogShiftS / MotionBins::kBinS));
-  const double as_logged = LogLikelihood(fit);
-  double best = as_logged;
-  int shift = 0;
+  ClockScan scan;
+  scan.as_logged = scan.best = LogLikelihood(fit);
   for (int bins = -max_shift; bins <= max_shift; ++bins) {
     const WheelFit shifted =
         FitWheels(bins_, Eigen::Matrix3d::Identity(), bins);
     if (shifted.num_windows < kMinNumBins) continue;
     const double likelihood = LogLikelihood(shifted);
-    if (likelihood > best) {
-      best = likelihood;
-      shift = bins;
+    if (std::abs(bins) * MotionBins::kBinS > kFarShiftS) {
+      scan.best_far = std::max(scan.best_far, likelihood);
+    }
+    if (likelihood > scan.best) {
+      scan.best = likelihood;
+      scan.best_shift = bins;
     }
   }
-  if (std::abs(shift) < kMinShiftBins || best < as_logged + kMinEvidence) {
+  return scan;
+}
+
+std::string WheelChecker::CheckClock(const ClockScan& scan) const {
+  if (std::abs(scan.best_shift) < kMinShiftBins ||
+      scan.best < scan.as_logged + kMinEvidence) {
     return "";
   }
   return FormatFigures(
       "the wheels' clock differs from the IMU's: both fit when %+.1f s are "
       "added to the times of the wheel log (evidence e^%.0f)",
-      shift * MotionBins::kBinS, best - as_logged);
+      scan.best_shift * MotionBins::kBinS, scan.best - scan.as_logged);
 }
 
-std::string WheelChecker::CheckBelonging(const WheelFit& fit) const {
+std::string WheelChecker::CheckBelonging(const WheelFit& fit,
+                                         const ClockScan& scan) const {
   const bool has_turns = has_yaw_ && fit.yaw_rate_rms > kMinYawRate;
   const double bar = has_turns ? kNoCorrelation : kNoForceCorrelation;
   if (fit.acceleration_rms < kMinAcceleration || fit.force_correlation > bar ||
       fit.mirrored_correlation > kMinCorrelation ||
-      (has_turns && std::abs(fit.yaw_correlation) > bar)) {
+      (has_turns && std::abs(fit.yaw_correlation) > bar) ||
+      scan.as_logged > scan.best_far + kBelongingEvidence) {
     return "";
   }
   return FormatFigures(
@@ -259,8 +283,9 @@ WheelCheck WheelChecker::Run() {
   std::string& contradiction = check.contradiction;
   // The one that would look like those after it comes first.
   contradiction = CheckGravity(check);
-  if (contradiction.empty()) contradiction = CheckClock(check.fit);
-  if (contradiction.empty()) contradiction = CheckBelonging(check.fit);
+  const ClockScan scan = ScanClocks(check.fit);
+  if (contradiction.empty()) contradiction = CheckClock(scan);
+  if (contradiction.empty()) contradiction = CheckBelonging(check.fit, scan);
   if (contradiction.empty()) contradiction = CheckAxes(check.fit);
   if (contradiction.empty()) contradiction = CheckDirection(check.fit);
   if (contradiction.empty()) {

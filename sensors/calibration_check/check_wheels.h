@@ -50,8 +50,10 @@ struct WheelCheck {
 // (dv/dt, v w_z) of the speeds v and the gyroscope's w_z, and the wheels' yaw
 // rate w_z. The mean force tells the accelerometer's sign and axes; one complex
 // regression of the horizontal force tells the wheels' unit, sign and
-// direction, correlations over shifts of up to 10 s tell the clock. A cause is
-// named when the figures leave no doubt, units first.
+// direction, correlations over shifts of up to 10 s tell the clock, and whether
+// the logs are of one drive at all: those of another fit no better at their own
+// clock than at others. A cause is named when the figures leave no doubt, units
+// first.
 // On failure: nothing is said when there is too little motion.
 WheelCheck CheckWheels(const std::vector<ImuSample>& imu,
                        const std::vector<WheelSpeed>& speeds, bool has_yaw,

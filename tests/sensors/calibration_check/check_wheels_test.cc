@@ -40,6 +40,26 @@ TEST(CheckWheels, SaysNothingOfHealthyDrives) {
   }
 }
 
+// Wheels that slip by 3 % each, and spin four times, correlate with the IMU by
+// less than a half on some of these drives, but best at their own clock. On one
+// of the ten another clock fits nearly as well, for its streets are alike.
+TEST(CheckWheels, TakesWheelsOnGravel) {
+  int num_refused = 0;
+  int num_taken_though_unlike = 0;
+  for (uint64_t seed = 1; seed <= 10; ++seed) {
+    SyntheticWorldOptions options = SmallWorld(seed, 150);
+    options.wheel_slip_sigma = 0.03;
+    options.num_wheel_slips = 4;
+    const WheelCheck check = Check(ToDataset(BuildSyntheticWorld(options)));
+    const bool is_unlike =
+        check.fit.yaw_correlation < 0.5 && check.fit.force_correlation < 0.5;
+    num_refused += !check.contradiction.empty();
+    num_taken_though_unlike += is_unlike && check.contradiction.empty();
+  }
+  EXPECT_LE(num_refused, 1);
+  EXPECT_GE(num_taken_though_unlike, 1);
+}
+
 TEST(CheckWheels, SaysNothingOfRealDrives) {
   for (const char* name :
        {"kitti01-51", "kitti06-51", "kitti07-160", "comma2k19-ex1",

@@ -1,0 +1,161 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "global/odometry/parts_of_one_unit.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <map>
+#include <queue>
+#include <set>
+#include <tuple>
+#include <utility>
+
+#include "core/disjoint_sets.h"
+#include "global/odometry/length_propagation.h"
+
+namespace adasfm {
+namespace {
+
+// Sets of images, by image: which sets it is in.
+using Memberships = std::vector<std::set<int>>;
+
+// One set per unit, the first one of metres.
+Memberships CollectUnits(const ViewGraph& graph, const std::vector<int>& units,
+                         int* num_sets) {
+  Memberships sets_of(graph.images.size());
+  std::map<int, int> set_of_unit;
+  const auto number = [&set_of_unit](int unit) {
+    const int next = static_cast<int>(set_of_unit.size());
+    return set_of_unit.emplace(unit, next).first->second;
+  };
+  constexpr int kMetres = -1;
+  number(kMetres);
+  const auto add = [&](const ViewGraphEdge& edge, int set) {
+    sets_of[graph.IndexOf(edge.image_id1)].insert(set);
+    sets_of[graph.IndexOf(edge.image_id2)].insert(set);
+  };
+  for (size_t e = 0; e < graph.edges.size(); ++e) {
+    const ViewGraphEdge& edge = graph.edges[e];
+    if (!edge.IsKept()) continue;
+    if (edge.length_m) add(edge, number(kMetres));
+    if (units[e] >= 0) add(edge, number(units[e]));
+  }
+  *num_sets = static_cast<int>(set_of_unit.size());
+  return sets_of;
+}
+
+// Joins sets that share two images. Returns whether there were any.
+bool JoinSetsOfOneSize(Memberships* sets_of, int num_sets) {
+  std::map<std::pair<int, int>, int> num_shared;
+  for (const std::set<int>& sets : *sets_of) {
+    for (auto a = sets.begin(); a != sets.end(); ++a) {
+      for (auto b = std::next(a); b != sets.end(); ++b) {
+        ++num_shared[{*a, *b}];
+      }
+    }
+  }
+  DisjointSets joined(num_sets);
+  bool any = false;
+  for (const auto& [pair, count] : num_shared) {
+    if (count < 2) continue;
+    any = true;
+    joined.Join(pair.second, pair.first);
+  }
+  for (std::set<int>& sets : *sets_of) {
+    std::set<int> roots;
+    for (const int set : sets) roots.insert(joined.Find(set));
+    sets = std::move(roots);
+  }
+  return any;
+}
+
+// The largest of the sets that an image is in; -1 where there is none.
+std::vector<int> ChooseLargest(const Memberships& sets_of, int num_sets) {
+  std::vector<int> sizes(num_sets, 0);
+  for (const std::set<int>& sets : sets_of) {
+    for (const int set : sets) ++sizes[set];
+  }
+  std::vector<int> part_of;
+  for (const std::set<int>& sets : sets_of) {
+    const auto largest = std::max_element(
+        sets.begin(), sets.end(),
+        [&sizes](int a, int b) { return sizes[a] < sizes[b]; });
+    part_of.push_back(largest == sets.end() ? -1 : *largest);
+  }
+  return part_of;
+}
+
+// Strongest edges first.
+void JoinTheRest(const ViewGraph& graph, std::vector<int>* part_of) {
+  std::vector<std::vector<std::pair<int, int>>> neighbors(graph.images.size());
+  for (const ViewGraphEdge& edge : graph.edges) {
+    if (!edge.IsKept()) continue;
+    const int i = graph.IndexOf(edge.image_id1);
+    const int j = graph.IndexOf(edge.image_id2);
+    neighbors[i].emplace_back(edge.num_inliers, j);
+    neighbors[j].emplace_back(edge.num_inliers, i);
+  }
+  std::priority_queue<std::tuple<int, int, int>> queue;  // inliers, image, part
+  const auto announce = [&](int i) {
+    for (const auto& [num_inliers, j] : neighbors[i]) {
+      if ((*part_of)[j] < 0) queue.emplace(num_inliers, j, (*part_of)[i]);
+    }
+  };
+  for (size_t i = 0; i < part_of->size(); ++i) {
+    if ((*part_of)[i] >= 0) announce(i);
+  }
+  while (!queue.empty()) {
+    const auto [num_inliers, i, part] = queue.top();
+    queue.pop();
+    if ((*part_of)[i] >= 0) continue;
+    (*part_of)[i] = part;
+    announce(i);
+  }
+}
+
+// Those of no part, which no edge with a length is near, are one together.
+std::vector<int> NameByFirstImage(const std::vector<int>& part_of) {
+  std::map<int, int> names;
+  std::vector<int> named;
+  for (size_t i = 0; i < part_of.size(); ++i) {
+    named.push_back(
+        names.emplace(part_of[i], static_cast<int>(i)).first->second);
+  }
+  return named;
+}
+
+}  // namespace
+
+std::vector<int> FindLengthUnits(
+    const EdgeLengthOptions& options, const ViewGraph& graph,
+    const std::map<ImagePair, double>& known_lengths_m,
+    const GlobalCorrespondences& correspondences, const EdgeLengths& lengths) {
+  // All matches: the best of each pair need not be those that pairs share.
+  EdgeLengthOptions unit_options = options;
+  unit_options.max_num_matches = std::numeric_limits<int>::max();
+  LengthPropagation propagation(unit_options, graph, correspondences);
+  for (size_t e = 0; e < lengths.lengths.size(); ++e) {
+    if (!lengths.lengths[e]) continue;
+    const EdgeLength& length = *lengths.lengths[e];
+    if (known_lengths_m.count(graph.edges[e].Pair()) > 0) {
+      propagation.Fix(e, std::log(length.length), length.log_sigma);
+    } else {
+      propagation.Start(e, length);
+    }
+  }
+  propagation.Spread(options.min_num_shared);
+  return propagation.FindUnits();
+}
+
+std::vector<int> FindPartsOfOneUnit(const ViewGraph& graph,
+                                    const std::vector<int>& units) {
+  int num_sets = 0;
+  Memberships sets_of = CollectUnits(graph, units, &num_sets);
+  while (JoinSetsOfOneSize(&sets_of, num_sets)) {
+  }
+  std::vector<int> part_of = ChooseLargest(sets_of, num_sets);
+  JoinTheRest(graph, &part_of);
+  return NameByFirstImage(part_of);
+}
+
+}  // namespace adasfm
