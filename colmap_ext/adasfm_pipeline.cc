@@ -225,10 +225,6 @@ StatusOr<CoarseModelReport> EstimateCoarseModel(
 
   CoarseModelReport report;
   report.warnings = scene->warnings;
-  for (const CalibratedFocalLength& calibrated :
-       CalibrateFocalLengths(options.focal_lengths, &*scene)) {
-    report.warnings.push_back(DescribeFocalLength(calibrated));
-  }
   const StatusOr<ModelFrames> frames =
       ReadModelFrames(database_path, *scene, &report.warnings);
   if (!frames.ok()) return frames.status();
@@ -237,7 +233,7 @@ StatusOr<CoarseModelReport> EstimateCoarseModel(
     report.warnings.push_back(kNoPriorsWarning);
   }
   StatusOr<GlobalStageResult> result =
-      RunGlobalStage(options, *scene, progress);
+      RunGlobalStage(options, &*scene, progress);
   if (!result.ok()) return result.status();
   if (CountPoints(*result) == 0) {
     return Status::Error(
@@ -246,6 +242,9 @@ StatusOr<CoarseModelReport> EstimateCoarseModel(
         "wrong, or the matches are those of other images");
   }
   report.result = std::move(result).value();
+  for (const CalibratedFocalLength& found : report.result.focal_lengths) {
+    report.warnings.push_back(DescribeFocalLength(found));
+  }
   report.result.steps.insert(report.result.steps.begin(), reading);
   for (std::string& warning : ListGlobalWarnings(*scene, report.result)) {
     report.warnings.push_back(std::move(warning));

@@ -21,6 +21,8 @@ namespace {
 constexpr int kNumSteps = 6;  // to either side
 constexpr double kCoarseStep = 0.16;
 constexpr double kFineStep = 0.03;
+// Enough to tell the coarse step.
+constexpr size_t kMaxNumCoarsePairs = 50;
 // Pairs with few matches fit many focal lengths.
 constexpr size_t kMinNumMatches = 30;
 constexpr int kMinNumPairs = 5;
@@ -93,9 +95,12 @@ std::vector<PairPoints> SelectPairs(
   return selected;
 }
 
-// The pair's least cost under the camera, in variances of the noise.
+// The pair's least cost under the camera, in variances of the noise, and the
+// pose of it. Searched from the given pose, or from that of the fundamental
+// matrix where none is given.
 double ComputeCost(const FocalLengthCalibrationOptions& options,
-                   const PairPoints& pair, const colmap::Camera& camera) {
+                   const PairPoints& pair, const colmap::Camera& camera,
+                   std::optional<TwoViewPose>* pose) {
   const std::vector<Bearing> bearings1 = ComputeBearings(camera, pair.points1);
   const std::vector<Bearing> bearings2 = ComputeBearings(camera, pair.points2);
   std::vector<FeatureMatch> matches;
@@ -103,10 +108,13 @@ double ComputeCost(const FocalLengthCalibrationOptions& options,
     const point2D_t index = static_cast<point2D_t>(k);
     matches.push_back({index, index});
   }
-  const Eigen::Matrix3d calibration = camera.CalibrationMatrix();
-  const Rigid3d start = DecomposeEssential(
-      calibration.transpose() * pair.fundamental_matrix * calibration,
-      bearings1, bearings2, matches);
+  if (!pose->has_value()) {
+    const Eigen::Matrix3d calibration = camera.CalibrationMatrix();
+    const Rigid3d start = DecomposeEssential(
+        calibration.transpose() * pair.fundamental_matrix * calibration,
+        bearings1, bearings2, matches);
+    *pose = TwoViewPose{start.rotation.toRotationMatrix(), start.translation};
+  }
   EpipolarMinimization minimization;
   minimization.loss_scale_px = options.loss_scale_px;
   minimization.max_num_iterations = 20;
@@ -114,7 +122,8 @@ double ComputeCost(const FocalLengthCalibrationOptions& options,
       minimization,
       SelectEdgeBearings(bearings1, bearings2, matches,
                          static_cast<int>(matches.size())),
-      {start.rotation.toRotationMatrix(), start.translation});
+      **pose);
+  *pose = minimum.pose;
   return minimum.cost / std::pow(options.keypoint_sigma_px, 2);
 }
 
@@ -124,9 +133,19 @@ std::vector<CostCurve> ComputeCurves(
     const std::vector<double>& grid) {
   std::vector<CostCurve> curves(pairs.size());
   ParallelFor(options.num_threads, pairs.size(), [&](size_t i) {
-    for (const double log_factor : grid) {
-      curves[i].push_back(
-          ComputeCost(options, pairs[i], ScaleFocalLength(camera, log_factor)));
+    // From the middle outwards, as neighbours have nearly the same pose.
+    curves[i].resize(grid.size());
+    std::optional<TwoViewPose> middle_pose;
+    const auto compute = [&](int k, std::optional<TwoViewPose>* pose) {
+      curves[i][k] = ComputeCost(options, pairs[i],
+                                 ScaleFocalLength(camera, grid[k]), pose);
+    };
+    compute(kNumSteps, &middle_pose);
+    for (const int direction : {-1, 1}) {
+      std::optional<TwoViewPose> pose = middle_pose;
+      for (int k = 1; k <= kNumSteps; ++k) {
+        compute(kNumSteps + direction * k, &pose);
+      }
     }
     const double least = *std::min_element(curves[i].begin(), curves[i].end());
     for (double& cost : curves[i]) {
@@ -180,8 +199,9 @@ std::optional<Minimum> FindFocalLength(
     const FocalLengthCalibrationOptions& options,
     const std::vector<PairPoints>& pairs, const colmap::Camera& camera) {
   const std::vector<double> coarse = Grid(0.0, kCoarseStep);
-  const int best =
-      FindBest(ComputeCurves(options, pairs, camera, coarse), coarse.size());
+  const int best = FindBest(
+      ComputeCurves(options, Subset(pairs, kMaxNumCoarsePairs), camera, coarse),
+      coarse.size());
   const std::vector<double> fine = Grid(coarse[best], kFineStep);
   return FitMinimum(ComputeCurves(options, pairs, camera, fine), fine);
 }
