@@ -177,9 +177,9 @@ Status WriteGlobalResult(const GlobalStageOptions& options,
 // Raw matches stay in the database until they are needed.
 StatusOr<GlobalStageResult> RunStage(const GlobalStageOptions& options,
                                      const std::string& database_path,
-                                     const SceneData& scene,
+                                     SceneData* scene,
                                      const ProgressCallback& progress) {
-  StatusOr<RawMatchSource> raw_matches = OpenRawMatches(database_path, scene);
+  StatusOr<RawMatchSource> raw_matches = OpenRawMatches(database_path, *scene);
   if (!raw_matches.ok()) return raw_matches.status();
   try {
     return RunGlobalStage(options, scene, progress, std::move(*raw_matches));
@@ -238,10 +238,6 @@ StatusOr<CoarseModelReport> EstimateCoarseModel(
 
   CoarseModelReport report;
   report.warnings = scene->warnings;
-  for (const CalibratedFocalLength& calibrated :
-       CalibrateFocalLengths(options.focal_lengths, &*scene)) {
-    report.warnings.push_back(DescribeFocalLength(calibrated));
-  }
   const StatusOr<ModelFrames> frames =
       ReadModelFrames(database_path, *scene, &report.warnings);
   if (!frames.ok()) return frames.status();
@@ -250,7 +246,7 @@ StatusOr<CoarseModelReport> EstimateCoarseModel(
     report.warnings.push_back(kNoPriorsWarning);
   }
   StatusOr<GlobalStageResult> result =
-      RunStage(options, database_path, *scene, progress);
+      RunStage(options, database_path, &*scene, progress);
   if (!result.ok()) return result.status();
   if (CountPoints(*result) == 0) {
     return Status::Error(
@@ -259,6 +255,9 @@ StatusOr<CoarseModelReport> EstimateCoarseModel(
         "wrong, or the matches are those of other images");
   }
   report.result = std::move(result).value();
+  for (const CalibratedFocalLength& found : report.result.focal_lengths) {
+    report.warnings.push_back(DescribeFocalLength(found));
+  }
   report.result.steps.insert(report.result.steps.begin(), reading);
   for (std::string& warning : ListGlobalWarnings(*scene, report.result)) {
     report.warnings.push_back(std::move(warning));

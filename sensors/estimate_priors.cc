@@ -99,6 +99,7 @@ class PriorEstimator {
   std::vector<TimedRotation> rotations_;
   bool has_visual_bias_ = false;
   Eigen::Vector3d visual_bias_ = Eigen::Vector3d::Zero();
+  double visual_bias_sigma_ = 0.0;
   OdometryTimeline timeline_;
   OdometryFusionProblem problem_;
   OdometryFusionResult fused_;
@@ -176,7 +177,14 @@ Status PriorEstimator::CheckVision() {
     return Status::Ok();
   }
   has_visual_bias_ = options_.use_visual_rotations;
-  visual_bias_ = check.gyroscope_bias;
+  // Before any data the bias is zero, with a sigma of its own.
+  const double visual_variance = std::pow(options_.visual_bias_sigma, 2) +
+                                 std::pow(check.gyroscope_bias_sigma, 2);
+  const double prior_variance =
+      std::pow(options_.fusion.gyroscope_bias_sigma, 2);
+  const double share = prior_variance / (prior_variance + visual_variance);
+  visual_bias_ = share * check.gyroscope_bias;
+  visual_bias_sigma_ = std::sqrt((1.0 - share) * prior_variance);
   if (options_.undo_gyroscope_filter) UndoFilter(check);
   return Status::Ok();
 }
@@ -315,8 +323,7 @@ void PriorEstimator::BuildProblem() {
   // What the links hold already must not count twice.
   if (has_visual_bias_ && estimate_.summary.num_visual_links == 0) {
     problem_.prior_gyroscope_bias = visual_bias_;
-    problem_.prior_gyroscope_bias_sigma = std::min(
-        options_.visual_bias_sigma, options_.fusion.gyroscope_bias_sigma);
+    problem_.prior_gyroscope_bias_sigma = visual_bias_sigma_;
   }
   problem_.initial_states =
       EstimateInitialOdometry(problem_.links, problem_.imu_from_wheel,

@@ -51,8 +51,8 @@ struct PriorEstimationOptions {
   // Whether two-view rotations help to find the gyroscope's bias: its first
   // value when the machine never stands still, and its course on the way.
   bool use_visual_rotations = true;
-  // How well they tell the first value when they are too poor for the rest,
-  // rad/s.
+  // What their scatter does not show when they are too poor for the rest and
+  // tell the first value only, 1 sigma, rad/s.
   double visual_bias_sigma = 0.002;
   // Whether a contradiction between sensors is an error: vision against the
   // gyroscope (sensors/calibration_check/check_against_vision.h), wheels

@@ -28,6 +28,7 @@ class Stopwatch {
 // One number of threads for all steps but the adjustment, whose own option says
 // why.
 GlobalStageOptions WithThreads(GlobalStageOptions options) {
+  options.focal_lengths.num_threads = options.num_threads;
   options.two_view.num_threads = options.num_threads;
   options.poses.num_threads = options.num_threads;
   options.structure.triangulation.num_threads = options.num_threads;
@@ -172,9 +173,9 @@ bool GlobalStageOptions::IsValid(std::string* error) const {
 }
 
 StatusOr<GlobalStageResult> RunGlobalStage(
-    const GlobalStageOptions& requested_options, const SceneData& scene,
+    const GlobalStageOptions& requested_options, SceneData* mutable_scene,
     const StageProgress& progress, RawMatchSource raw_matches) {
-  if (!raw_matches) raw_matches = RawMatchesOfScene(scene);
+  if (!raw_matches) raw_matches = RawMatchesOfScene(*mutable_scene);
   std::string error;
   if (!requested_options.IsValid(&error)) throw std::invalid_argument(error);
   const GlobalStageOptions options = WithThreads(requested_options);
@@ -184,8 +185,18 @@ StatusOr<GlobalStageResult> RunGlobalStage(
   };
   GlobalStageResult result;
 
+  // 2.0 Focal lengths.
+  Stopwatch watch = begin("focal lengths", 0.0);
+  result.focal_lengths =
+      CalibrateFocalLengths(options.focal_lengths, mutable_scene);
+  const SceneData& scene = *mutable_scene;
+  result.steps.push_back({"focal lengths", watch.Seconds(),
+                          std::to_string(result.focal_lengths.size()) +
+                              " found of " +
+                              std::to_string(scene.cameras.size())});
+
   // 2.1 View graph.
-  Stopwatch watch = begin("view graph", 0.0);
+  watch = begin("view graph", 0.0);
   GlobalCorrespondences correspondences =
       FindCorrespondences(scene, options.num_threads);
   const InitialViewGraph initial =
@@ -195,8 +206,10 @@ StatusOr<GlobalStageResult> RunGlobalStage(
 
   // 2.1-2.6 Coarse poses.
   begin("coarse poses", 0.1);
+  CoarsePoseOptions pose_options = options.poses;
+  pose_options.chain.gyro_bias_covariance = scene.gyroscope_bias_covariance;
   result.poses =
-      EstimateCoarsePoses(options.poses, initial.graph, correspondences,
+      EstimateCoarsePoses(pose_options, initial.graph, correspondences,
                           scene.priors, scene.frame_priors);
   AppendSteps(result.poses.steps, &result.steps);
   if (result.poses.components.empty()) return NothingHoldsTogether();

@@ -19,7 +19,6 @@ namespace adasfm {
 
 // Nested by step, in order of their use (design 7.2).
 struct GlobalStageOptions {
-  // Before step 1, by the caller, in the scene that the steps get.
   FocalLengthCalibrationOptions focal_lengths;
   TwoViewPoseOptions two_view;
   CoarsePoseOptions poses;
@@ -45,6 +44,8 @@ struct StepReport {
 };
 
 struct GlobalStageResult {
+  // Those that were changed in the scene.
+  std::vector<CalibratedFocalLength> focal_lengths;
   // One per component of the view graph, largest first.
   std::vector<CoarseModel> models;
   // What EstimateCoarsePoses says of each component, in the same order, and its
@@ -64,6 +65,7 @@ struct GlobalStageResult {
 using StageProgress = std::function<void(const std::string&, double)>;
 
 // The coarse global stage in memory (design 7.2):
+//   2.0      unknown focal lengths       CalibrateFocalLengths, in the scene
 //   2.1      view graph                  BuildInitialViewGraph
 //   2.1-2.6  coarse poses                EstimateCoarsePoses
 //   2.7      tracks, points, adjustment  BuildCoarseModel, per component
@@ -73,7 +75,7 @@ using StageProgress = std::function<void(const std::string&, double)>;
 // An error when the scene has no two images that hold together. Throws
 // std::invalid_argument for invalid options.
 StatusOr<GlobalStageResult> RunGlobalStage(const GlobalStageOptions& options,
-                                           const SceneData& scene,
+                                           SceneData* scene,
                                            const StageProgress& progress = {},
                                            RawMatchSource raw_matches = {});
 

@@ -88,14 +88,18 @@ void AddOptions(PriorImportOptions* options, CommandOptions* command) {
       "two-view rotations help to find the gyroscope's bias: its first value "
       "when the machine never stands still, and its course (0 or 1)");
   add("visual_bias_sigma", &estimation->visual_bias_sigma,
-      "how well they give the first value when too poor for the rest, 1 sigma "
-      "[rad/s]");
+      "what their scatter does not show when they are too poor for the rest "
+      "and "
+      "give the first value only, 1 sigma [rad/s]");
   add("estimate_time_shift", &estimation->estimate_time_shift,
       "add the time shift that vision and gyroscope agree on to the "
       "calibration's: 0, 1, or -1: when it is clear and at most 0.15 s");
   add("undo_gyroscope_filter", &estimation->undo_gyroscope_filter,
       "undo a low-pass filter in the gyroscope's log when vision clearly shows "
       "one (0 or 1)");
+  add("calibrate_focal_lengths", &options->focal_lengths.enabled,
+      "two-view rotations are those under focal lengths found from the "
+      "verified pairs where the database does not mark them as known (0 or 1)");
   add("max_visual_gap", &options->max_visual_gap,
       "two-view rotations are taken from images at most this many apart");
   AddFusionOptions(&estimation->fusion, command);

@@ -73,7 +73,8 @@ void GlobalOptionAdder::AddLoops() {
   Add("wheel_scale_sigma", &stage_->poses.chain.scale_sigma,
       "1 sigma of the wheels' common scale error, as a ratio");
   Add("gyro_bias_sigma_rad_s", &stage_->poses.chain.gyro_bias_sigma_rad_s,
-      "1 sigma of the gyroscope bias that is left, per axis [rad/s]");
+      "1 sigma of the gyroscope bias that is left, per axis, where the import "
+      "does not state it [rad/s]");
   Add("visual_step_length_error",
       &stage_->poses.visual_steps.length_error_ratio,
       "1 sigma of the drift of lengths where vision completes the odometry, as "

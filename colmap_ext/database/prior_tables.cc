@@ -33,7 +33,10 @@ void CreateTables(SqliteConnection* database) {
       "image_id1 INTEGER NOT NULL, image_id2 INTEGER NOT NULL, "
       "name1 TEXT NOT NULL, name2 TEXT NOT NULL, share REAL NOT NULL, "
       "position BLOB NOT NULL, covariance BLOB NOT NULL, "
-      "antenna_in_cam BLOB NOT NULL);");
+      "antenna_in_cam BLOB NOT NULL);"
+      "CREATE TABLE IF NOT EXISTS adasfm_gyroscope_bias ("
+      "image_id INTEGER PRIMARY KEY NOT NULL, name TEXT NOT NULL, "
+      "covariance BLOB NOT NULL);");
 }
 
 using Names = std::map<image_t, std::string>;
@@ -112,6 +115,19 @@ void WritePositions(const Names& names, const std::vector<PositionPrior>& rows,
   }
 }
 
+// Of the import that began with the first prior.
+void WriteGyroscopeBias(const Names& names, const PriorTables& tables,
+                        SqliteConnection* database) {
+  if (!tables.gyroscope_bias_covariance || tables.priors.empty()) return;
+  const image_t image_id = tables.priors.front().image_id1;
+  SqliteStatement statement(
+      database, "INSERT INTO adasfm_gyroscope_bias VALUES (?, ?, ?)");
+  statement.BindInt(1, image_id);
+  statement.BindText(2, NameOf(names, image_id));
+  BindDoubles(&statement, 3, tables.gyroscope_bias_covariance->data(), 9);
+  statement.Step();
+}
+
 void WritePositionOrigin(const std::optional<GeodeticPosition>& origin,
                          SqliteConnection* database) {
   database->Execute("DELETE FROM adasfm_meta WHERE key = 'position_origin'");
@@ -162,11 +178,13 @@ Status WritePriorTables(const std::string& database_path,
         "DELETE FROM adasfm_image_times;"
         "DELETE FROM adasfm_relative_pose_priors;"
         "DELETE FROM adasfm_gravity;"
-        "DELETE FROM adasfm_position_priors;");
+        "DELETE FROM adasfm_position_priors;"
+        "DELETE FROM adasfm_gyroscope_bias;");
     WriteImageTimes(names, tables.image_times, &database);
     WritePriors(names, tables.priors, &database);
     WriteGravity(names, tables.gravity, &database);
     WritePositions(names, tables.positions, &database);
+    WriteGyroscopeBias(names, tables, &database);
     WritePositionOrigin(tables.position_origin, &database);
     WriteRigCameras(tables.rig_cameras, &database);
     RemovePriorCorrections(&database);

@@ -17,9 +17,9 @@
 namespace adasfm {
 
 // The tables adasfm_image_times, adasfm_relative_pose_priors, adasfm_gravity,
-// adasfm_position_priors and adasfm_rig_cameras inside a COLMAP database
-// (docs/reference/formats.md). Databases of before the last two are read as
-// having no positions and no rig.
+// adasfm_position_priors, adasfm_gyroscope_bias and adasfm_rig_cameras inside a
+// COLMAP database (docs/reference/formats.md). Databases of before the last
+// three are read as having no positions, no stated bias and no rig.
 
 struct ImageTimeRow {
   image_t image_id = kInvalidImageId;
@@ -40,6 +40,9 @@ struct PriorTables {
   std::vector<PositionPrior> positions;
   // Of the positions' ENU frame; none for positions in a frame of their own.
   std::optional<GeodeticPosition> position_origin;
+  // Of what the import left of the gyroscope's bias, in the camera frame,
+  // rad^2/s^2; none without a gyroscope, and in databases of before it.
+  std::optional<Eigen::Matrix3d> gyroscope_bias_covariance;
   // Of one rig of several cameras; all known. Written here, and read by
   // ReadCameraRigs.
   std::map<camera_t, RigCamera> rig_cameras;

@@ -202,6 +202,25 @@ void ReadPositions(const IdResolver& ids, SqliteConnection* database,
   }
 }
 
+// Of merged imports, the one that knows its gyroscope's bias worst.
+void ReadGyroscopeBias(SqliteConnection* database, PriorTables* tables) {
+  if (!database->HasTable("adasfm_gyroscope_bias")) return;
+  SqliteStatement statement(
+      database, "SELECT name, covariance FROM adasfm_gyroscope_bias");
+  while (statement.Step()) {
+    const std::string row =
+        "table adasfm_gyroscope_bias, image " + statement.Text(0);
+    Eigen::Matrix3d covariance;
+    DoublesFromBlob(statement, 1, row, 9, covariance.data());
+    if (!covariance.allFinite() ||
+        Eigen::LLT<Eigen::Matrix3d>(covariance).info() != Eigen::Success) {
+      throw SqliteError(row + ": values that are not a covariance");
+    }
+    auto& worst = tables->gyroscope_bias_covariance;
+    if (!worst || covariance.trace() > worst->trace()) worst = covariance;
+  }
+}
+
 void ReadPositionOrigin(SqliteConnection* database, PriorTables* tables) {
   if (!database->HasTable("adasfm_meta")) return;
   SqliteStatement statement(
@@ -239,6 +258,7 @@ LoadedPriorTables ReadPriorTables(SqliteConnection* database) {
   ReadPriors(ids, database, &loaded);
   ReadGravity(ids, database, &loaded);
   ReadPositions(ids, database, &loaded);
+  ReadGyroscopeBias(database, &loaded.tables);
   ReadPositionOrigin(database, &loaded.tables);
   return loaded;
 }

@@ -89,7 +89,9 @@ StatusOr<OverlapPredictor> OverlapPredictor::Read(
   const StatusOr<LoadedPriorTables> tables = ReadPriorTables(database_path);
   if (!tables.ok()) return tables.status();
   predictor.options_ = options;
-  predictor.chain_ = OdometryChain(tables->tables.priors, options.chain);
+  OdometryChainOptions chain = options.chain;
+  chain.gyro_bias_covariance = tables->tables.gyroscope_bias_covariance;
+  predictor.chain_ = OdometryChain(tables->tables.priors, chain);
   try {
     SqliteConnection database(database_path, SqliteConnection::Mode::kRead);
     for (const auto& [camera_id, camera] : ReadCameras(&database)) {

@@ -13,8 +13,10 @@ StatusOr<MotionPredictor> ReadMotionPredictor(
   const StatusOr<LoadedPriorTables> tables = ReadPriorTables(database_path);
   if (!tables.ok()) return tables.status();
   if (tables->tables.priors.empty()) return MotionPredictor();
-  const auto chain = std::make_shared<const OdometryChain>(
-      tables->tables.priors, OdometryChainOptions());
+  OdometryChainOptions options;
+  options.gyro_bias_covariance = tables->tables.gyroscope_bias_covariance;
+  const auto chain =
+      std::make_shared<const OdometryChain>(tables->tables.priors, options);
   return MotionPredictor(
       [chain](const ImagePair& pair) -> std::optional<PredictedMotion> {
         if (!chain->IsConnected(pair.image_id1, pair.image_id2)) {

@@ -19,7 +19,6 @@
 #include "colmap_ext/priors/read_sensor_logs.h"
 #include "colmap_ext/priors/rig_frames.h"
 #include "colmap_ext/priors/stamp_images.h"
-#include "colmap_ext/scene/calibrate_focal_lengths.h"
 #include "colmap_ext/scene/scene_data.h"
 #include "colmap_ext/scene/two_view_poses.h"
 #include "global/two_view/refine_relative_poses.h"
@@ -192,6 +191,17 @@ Status CheckEstimate(const PriorEstimate& estimate,
                        kRemedy);
 }
 
+// None without a gyroscope.
+std::optional<Eigen::Matrix3d> BiasCovarianceInCam(
+    const SensorSummary& summary, const SensorCalibration& calibration) {
+  if (summary.gyroscope_bias_covariance.isZero(0.0)) return std::nullopt;
+  const Eigen::Matrix3d rotation =
+      calibration.cam_from_imu.rotation.toRotationMatrix();
+  const Eigen::Matrix3d covariance =
+      rotation * summary.gyroscope_bias_covariance * rotation.transpose();
+  return 0.5 * (covariance + covariance.transpose());
+}
+
 // The poses of the images by a trajectory's times or a model's names.
 StatusOr<std::map<image_t, Rigid3d>> ReadTrajectoryPoses(
     const PriorImportPaths& paths, const SensorCalibration& calibration,
@@ -311,8 +321,9 @@ bool PriorImportOptions::IsValid(std::string* error) const {
              std::to_string(max_visual_gap) + "; it must be positive";
     return false;
   }
-  return rig.IsValid(error) && estimation.IsValid(error) &&
-         trajectory.IsValid(error) && positions.IsValid(error);
+  return focal_lengths.IsValid(error) && rig.IsValid(error) &&
+         estimation.IsValid(error) && trajectory.IsValid(error) &&
+         positions.IsValid(error);
 }
 
 StatusOr<PriorImport> ComputePriorImport(const PriorImportPaths& given_paths,
@@ -362,7 +373,7 @@ StatusOr<PriorImport> ComputePriorImport(const PriorImportPaths& given_paths,
   std::map<image_t, std::string> names;
   for (const ImageStamp& stamp : *stamps) names[stamp.image_id] = stamp.name;
   for (const CalibratedFocalLength& calibrated :
-       CalibrateFocalLengths(FocalLengthCalibrationOptions(), &*scene)) {
+       CalibrateFocalLengths(options.focal_lengths, &*scene)) {
     import.warnings.push_back(DescribeFocalLength(calibrated));
   }
   KeepNearPairs(*stamps, options.max_visual_gap, &scene->pairs);
@@ -379,6 +390,8 @@ StatusOr<PriorImport> ComputePriorImport(const PriorImportPaths& given_paths,
   for (const auto& [image_id, gravity_in_cam] : estimate->gravity_in_cam) {
     import.tables.gravity.push_back({image_id, gravity_in_cam});
   }
+  import.tables.gyroscope_bias_covariance =
+      BiasCovarianceInCam(estimate->summary, *calibration);
   import.summary = std::move(estimate->summary);
   import.warnings.insert(import.warnings.end(), import.summary.warnings.begin(),
                          import.summary.warnings.end());

@@ -7,6 +7,7 @@
 
 #include "colmap_ext/database/prior_tables.h"
 #include "colmap_ext/priors/rig_frames.h"
+#include "colmap_ext/scene/calibrate_focal_lengths.h"
 #include "core/status.h"
 #include "sensors/estimate_priors.h"
 #include "sensors/io/bag_topics.h"
@@ -35,6 +36,7 @@ struct PriorImportPaths {
 };
 
 struct PriorImportOptions {
+  FocalLengthCalibrationOptions focal_lengths;
   PriorEstimationOptions estimation;
   TrajectoryPriorOptions trajectory;
   PositionPriorOptions positions;

@@ -55,6 +55,8 @@ struct SceneData {
   // Consecutive images, sorted by time; of a rig's frames, their leaders. Empty
   // without sensors.
   std::vector<RelativePosePrior> priors;
+  // As in PriorTables; the priors share this error.
+  std::optional<Eigen::Matrix3d> gyroscope_bias_covariance;
   // Cameras that are mounted together, and ComputeFramePriors of them.
   CameraRigs rigs;
   std::vector<RelativePosePrior> frame_priors;

@@ -63,7 +63,8 @@ Status ResetPriors(const std::string& database_path) {
                  {"DROP TABLE IF EXISTS adasfm_image_times",
                   "DROP TABLE IF EXISTS adasfm_relative_pose_priors",
                   "DROP TABLE IF EXISTS adasfm_gravity",
-                  "DROP TABLE IF EXISTS adasfm_position_priors"},
+                  "DROP TABLE IF EXISTS adasfm_position_priors",
+                  "DROP TABLE IF EXISTS adasfm_gyroscope_bias"},
                  RemovePriorCorrections);
 }
 

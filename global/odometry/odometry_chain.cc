@@ -242,15 +242,18 @@ ChainMotion OdometryChain::MotionOfLeaders(image_t image_id1,
   // In the start's frame the errors of the steps add up; the error's sign does
   // not matter to a covariance, so both directions of travel are one formula.
   Eigen::Matrix<double, 13, 1> sigmas;
-  sigmas << options_.scale_sigma,
-      Eigen::Vector3d::Constant(options_.gyro_bias_sigma_rad_s),
+  sigmas << options_.scale_sigma, Eigen::Vector3d::Zero(),
       Eigen::Vector3d::Constant(options_.extrinsic_rotation_sigma_rad),
       Eigen::Vector3d::Constant(options_.driving_direction_sigma_rad),
       Eigen::Vector3d::Constant(options_.persistent_translation_ratio);
+  Eigen::Matrix<double, 13, 13> shared = sigmas.cwiseAbs2().asDiagonal();
+  shared.block<3, 3>(kGyro, kGyro) = options_.gyro_bias_covariance.value_or(
+      std::pow(options_.gyro_bias_sigma_rad_s, 2) *
+      Eigen::Matrix3d::Identity());
   const Systematic systematic = later.systematic - earlier.systematic;
   const Matrix6d covariance_in_start =
       later.covariance - earlier.covariance +
-      systematic * sigmas.cwiseAbs2().asDiagonal() * systematic.transpose() +
+      systematic * shared * systematic.transpose() +
       std::pow(options_.gyro_bias_walk_rad_s_sqrt_s, 2) *
           SumOfWalks(earlier, later);
   const Matrix6d error_from_start =

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -17,7 +18,10 @@ namespace adasfm {
 struct OdometryChainOptions {
   // 1 sigma of the wheels' common scale error.
   double scale_sigma = 0.01;
-  // 1 sigma of the gyro bias that is left, rad/s, per axis, and of its random
+  // Of the gyro bias that is left, in the camera frame, rad^2/s^2, as the
+  // import states it.
+  std::optional<Eigen::Matrix3d> gyro_bias_covariance;
+  // 1 sigma of it where that is not stated, rad/s, per axis, and of its random
   // walk, rad/s/sqrt(s).
   double gyro_bias_sigma_rad_s = 2e-4;
   double gyro_bias_walk_rad_s_sqrt_s = 2e-5;

@@ -9,6 +9,7 @@
 #include "sensors/calibration_check/rotation_comparison.h"
 #include "sensors/calibration_check/shift_search.h"
 #include "sensors/calibration_check/unexplained_rotation.h"
+#include "sensors/calibration_check/visual_bias.h"
 #include "sensors/io/format_figures.h"
 
 namespace adasfm {
@@ -103,9 +104,11 @@ void VisionComparer::CompareAsIs(VisionCheck* check) {
     check->total_correlation = ComputeRotationCorrelation(
         unshifted, cam_from_imu_, &check->correlation);
   }
-  // The offset is that of the cameras' rotation, which turns against the body.
-  check->gyroscope_bias =
-      cam_from_imu_.transpose() * calibrated().fit.rate_offset;
+  // The rate is that of the cameras' rotation, which turns against the body.
+  const VisualBias bias =
+      EstimateVisualBias(search_.Compare(calibrated().shift_s), cam_from_imu_);
+  check->gyroscope_bias = cam_from_imu_.transpose() * bias.rate;
+  check->gyroscope_bias_sigma = bias.sigma;
 }
 
 const Explanation* VisionComparer::FindBetter() const {

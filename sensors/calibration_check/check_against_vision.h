@@ -84,7 +84,9 @@ struct VisionCheck {
   // calibrated one; identity when the calibration is right.
   Eigen::Matrix3d best_axes = Eigen::Matrix3d::Identity();
   bool is_inverted = false;  // imu_from_cam in place of cam_from_imu
+  // rad/s, IMU frame, with its mean 1 sigma of an axis (visual_bias.h).
   Eigen::Vector3d gyroscope_bias = Eigen::Vector3d::Zero();
+  double gyroscope_bias_sigma = 0.0;
   // On the IMU's clock as shifted by the correction above; without a lag unless
   // vision is clearly better explained with one.
   GyroscopeFilter filter;

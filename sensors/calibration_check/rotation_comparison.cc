@@ -73,6 +73,7 @@ Eigen::Vector3d RateIntegral::MeanRate(timestamp_t time_ns) const {
 void RotationComparison::Append(const RotationComparison& other) {
   visual.insert(visual.end(), other.visual.begin(), other.visual.end());
   gyro.insert(gyro.end(), other.gyro.begin(), other.gyro.end());
+  start_s.insert(start_s.end(), other.start_s.begin(), other.start_s.end());
   dt_s.insert(dt_s.end(), other.dt_s.begin(), other.dt_s.end());
 }
 

@@ -40,6 +40,7 @@ class RateIntegral {
 struct RotationComparison {
   std::vector<Eigen::Vector3d> visual;  // in the camera frame
   std::vector<Eigen::Vector3d> gyro;    // in the IMU frame
+  std::vector<double> start_s;          // on the IMU's clock
   std::vector<double> dt_s;
 
   void Append(const RotationComparison& other);

@@ -116,6 +116,7 @@ RotationComparison ShiftSearch::Compare(
     data.visual.push_back(LogSo3(rotation.cam2_from_cam1));
     // cam2_from_cam1 turns against the body's motion.
     data.gyro.push_back(-turn(start, end));
+    data.start_s.push_back(SecondsFromNs(start));
     data.dt_s.push_back(SecondsFromNs(end - start));
   }
   return data;

@@ -12,6 +12,8 @@ namespace {
 // No receiver is more exact, and no position with a larger error helps.
 constexpr double kMinSigmaM = 1e-3;
 constexpr double kMaxSigmaM = 1e3;
+// Above it no camera drives or flies; receivers log mm or garbage then.
+constexpr double kMaxHeightM = 1e5;
 constexpr char kNotANumber[] = "not a number";
 constexpr char kNoFix[] = "no fix (0, 0)";
 constexpr char kPoorFix[] = "sigma beyond 1 km";
@@ -77,6 +79,10 @@ Status FixCollector::Add(const RawFix& raw, size_t number) {
   if (std::abs(raw.longitude_deg) > 360.0) {
     value << "a longitude of " << raw.longitude_deg
           << " deg; degrees are expected, not metres";
+    return error(value.str());
+  }
+  if (std::abs(raw.height_m) > kMaxHeightM) {
+    value << "an altitude of " << raw.height_m << " m; metres are expected";
     return error(value.str());
   }
   GnssFix fix;

@@ -57,6 +57,9 @@ class PriorTablesTest : public testing::Test {
     }
     tables.position_origin = GeodeticPosition{
         random.Uniform(-90.0, 90.0), random.Uniform(-180.0, 180.0), 512.3};
+    const Eigen::Matrix3d root = Eigen::Matrix3d::NullaryExpr(
+        [&random]() { return random.Gaussian(1e-3); });
+    tables.gyroscope_bias_covariance = root * root.transpose();
     // The last one has seen no translation.
     RelativePosePrior& last = tables.priors.back();
     last.flags = kPriorRotation;
@@ -110,6 +113,7 @@ void ExpectEqual(const PriorTables& a, const PriorTables& b) {
     EXPECT_EQ(a.positions[i].covariance, b.positions[i].covariance);
     EXPECT_EQ(a.positions[i].antenna_in_cam, b.positions[i].antenna_in_cam);
   }
+  EXPECT_EQ(a.gyroscope_bias_covariance, b.gyroscope_bias_covariance);
   ASSERT_EQ(a.position_origin.has_value(), b.position_origin.has_value());
   if (!a.position_origin) return;
   EXPECT_EQ(a.position_origin->latitude_deg, b.position_origin->latitude_deg);
@@ -139,6 +143,23 @@ TEST_F(PriorTablesTest, ReadsWhatWasWrittenLast) {
   EXPECT_EQ(scene->priors.size(), 5);
   EXPECT_EQ(scene->images.at(2).timestamp_ns, world_.images[1].timestamp_ns);
   EXPECT_TRUE(scene->images.at(2).gravity_in_cam.has_value());
+  EXPECT_TRUE(scene->gyroscope_bias_covariance.has_value());
+}
+
+// As written before imports stated it, and again by one without a gyroscope.
+TEST_F(PriorTablesTest, DatabasesWithoutABiasCovarianceAreRead) {
+  PriorTables tables = MakeTables(1);
+  ASSERT_TRUE(WritePriorTables(path_, tables).ok());
+  Execute("DROP TABLE adasfm_gyroscope_bias;");
+  tables.gyroscope_bias_covariance.reset();
+  StatusOr<LoadedPriorTables> loaded = ReadPriorTables(path_);
+  ASSERT_TRUE(loaded.ok()) << loaded.status().message();
+  ExpectEqual(loaded->tables, tables);
+  ASSERT_TRUE(WritePriorTables(path_, MakeTables(2)).ok());
+  ASSERT_TRUE(WritePriorTables(path_, tables).ok());
+  loaded = ReadPriorTables(path_);
+  ASSERT_TRUE(loaded.ok());
+  ExpectEqual(loaded->tables, tables);
 }
 
 // Two robots that drive at the same time: what consecutive motions share is
@@ -232,6 +253,8 @@ TEST_F(PriorTablesTest, RefusesRowsItCouldNotHaveWritten) {
       "UPDATE adasfm_position_priors SET covariance = zeroblob(72);",
       "UPDATE adasfm_position_priors SET position = zeroblob(23);",
       "UPDATE adasfm_meta SET value = 'here' WHERE key = 'position_origin';",
+      "UPDATE adasfm_gyroscope_bias SET covariance = zeroblob(72);",
+      "UPDATE adasfm_gyroscope_bias SET covariance = zeroblob(71);",
   };
   ASSERT_TRUE(WritePriorTables(path_, MakeTables(1)).ok());
   const std::string original = ReadBytes(path_);

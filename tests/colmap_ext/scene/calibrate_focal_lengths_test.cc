@@ -22,6 +22,7 @@ SceneData SceneWithFocalLength(const SyntheticWorld& world, double factor) {
   priors.enabled = false;
   SceneData scene = BuildSyntheticScene(world, priors);
   colmap::Camera& camera = scene.cameras.at(1);
+  camera.SetPriorFocalLength(false);
   for (const size_t index : camera.FocalLengthIdxs()) {
     camera.Params(index) *= factor;
   }

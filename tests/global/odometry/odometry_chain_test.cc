@@ -163,6 +163,31 @@ TEST(OdometryChain, CovarianceAgreesWithMonteCarlo) {
   }
 }
 
+// An axis that the import knows badly is the one that errs, by its rate times
+// the time.
+TEST(OdometryChain, StatedBiasReplacesTheAssumedOne) {
+  Random random(7);
+  std::vector<RelativePosePrior> priors;
+  for (int k = 1; k <= 50; ++k) {
+    Rigid3d step;
+    step.translation = Eigen::Vector3d(0.0, 0.0, -1.0);
+    priors.push_back(BuildPrior(k, k + 1, step, 0, 0, &random));
+    priors.back().covariance = 1e-12 * Matrix6d::Identity();
+  }
+  OdometryChainOptions options;
+  options.gyro_bias_walk_rad_s_sqrt_s = 0.0;
+  const double assumed =
+      OdometryChain(priors, options).Motion(1, 51).covariance(1, 1);
+  options.gyro_bias_covariance =
+      Eigen::Vector3d(1e-8, 4e-6, 1e-10).asDiagonal();
+  const Matrix6d stated =
+      OdometryChain(priors, options).Motion(1, 51).covariance;
+  const double seconds = 50 * SecondsFromNs(priors[0].dt_ns);
+  EXPECT_NEAR(assumed, 4e-8 * seconds * seconds, 1e-9);
+  EXPECT_NEAR(stated(1, 1), 4e-6 * seconds * seconds, 1e-9);
+  EXPECT_NEAR(stated(0, 0), 1e-8 * seconds * seconds, 1e-9);
+}
+
 // The scale changes at each step, and nothing brings it back: a drive round a
 // block does not close then.
 TEST(OdometryChain, ScaleDriftAgreesWithMonteCarlo) {

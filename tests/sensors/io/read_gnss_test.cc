@@ -104,6 +104,8 @@ TEST_F(ReadGnssTest, ErrorsSayWhatIsWrong) {
   ExpectError(header + "1,0,0,0\n2,0,0,0\n", "2 with no fix (0, 0)");
   ExpectError(header + "1,139.7,35.7,5\n", "swapped");
   ExpectError(header + "1,5400000,690000,5\n", "not metres");
+  ExpectError(header + "1,48,11,545400\n", "an altitude of 545400 m");
+  ExpectError(header + "1,48,11,-1e300\n", "metres are expected");
   ExpectError(header + "1.5,48,11,5\n", "whole nanoseconds");
   ExpectError(header + "1,48,11\n", "3 columns where 4");
   ExpectError(header + "1,48,eleven,5\n", "'eleven', not a number");

@@ -39,6 +39,7 @@ inline SceneData BuildSyntheticScene(const SyntheticWorld& world,
     camera.SetModelIdFromName("PINHOLE");
   }
   camera.SetParams(params);
+  camera.SetPriorFocalLength(true);
   scene.cameras[1] = camera;
   for (const SyntheticImage& image : world.images) {
     SceneImage& target = scene.images[image.image_id];
