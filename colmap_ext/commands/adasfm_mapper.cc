@@ -5,6 +5,7 @@
 #include "colmap_ext/adasfm_pipeline.h"
 #include "colmap_ext/commands/progress_display.h"
 #include "colmap_ext/commands/registry.h"
+#include "colmap_ext/mapper_stage/verdict_report.h"
 
 namespace adasfm {
 namespace {
