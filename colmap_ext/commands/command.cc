@@ -228,6 +228,22 @@ Status CommandOptions::Parse(int argc, const char* const* argv) {
   return Status::Ok();
 }
 
+Status CommandOptions::Check(const std::function<Status()>& check) {
+  const Status status = check();
+  if (status.ok()) return status;
+  for (const Default& option : defaults_) {
+    option.exchange();
+    const Status with_default = check();
+    option.exchange();
+    if (!with_default.ok() && with_default.message() == status.message()) {
+      continue;
+    }
+    if (status.message().find(option.name) != std::string::npos) break;
+    return Status::Error("--" + option.name + ": " + status.message());
+  }
+  return status;
+}
+
 int RunCommand(const Command& command, int argc, char** argv) {
   SetUpLogging(command.name);
   std::atexit(&ReportExitOfLibrary);

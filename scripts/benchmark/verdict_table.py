@@ -24,8 +24,11 @@ from benchmarking.spoil import cut_logs, scale_focal_length
 from global_worlds import PLAIN, WORLDS, world
 
 MAX_GOOD_RATIO = 3.0
-# So that 100 images have room for it.
-BASE = dict(PLAIN, num_blackouts=1, blackout_images=8)
+# So that few images have room for it: streets are driven once.
+BASE = dict(PLAIN, alias_ratio=0, num_blackouts=1, blackout_images=6)
+# Of worlds that ask for look-alikes or longer blackouts.
+MIN_IMAGES_OF_LARGE = 200
+LARGE = {'alias_ratio', 'blackout_images'}
 # What a figure of a few decimetres of drive is worth at best [m].
 LEAST_LIMIT_M = 0.01
 
@@ -152,6 +155,8 @@ def run_world(colmap, folder, options, images, seed):
   shutil.rmtree(folder, ignore_errors=True)
   chain = Chain(colmap, folder)
   arguments = dict(BASE, **options['synthesizer'])
+  if LARGE & set(options['synthesizer']):
+    images = max(images, MIN_IMAGES_OF_LARGE)
   made = chain.call('synthesizer', '--output_path', folder, '--num_images',
                     str(images), '--seed', str(seed),
                     *(word for name, value in arguments.items()

@@ -158,7 +158,10 @@ def odd_cell(old, generator):
 def damage(path, generator):
   """One fault of the file's own kind, or of its bytes; says what it did."""
   if path.endswith('.db') and generator.random() < 0.75:
-    return damage_cell(path, generator)
+    try:
+      return damage_cell(path, generator)
+    except (sqlite3.Error, OverflowError):
+      pass  # SQLite refuses that value there
   if (path.endswith(('.csv', '.yaml', '.txt', '.json', '.ini')) and
       os.path.getsize(path) and generator.random() < 0.75):
     return damage_text(path, generator)

@@ -228,6 +228,14 @@ class World:
     return Process(self.colmap, self.folder, command,
                    arguments or CASES[command][1], environment, limits)
 
+  def check_model(self, command, folder):
+    """Wrong unless this model is the undisturbed one."""
+    found = digests(os.path.join(self.folder, folder))
+    for name, value in self.expected[command].items():
+      if (os.path.dirname(name) == folder and
+          found.get(os.path.basename(name)) != value):
+        raise Wrong('%s: %s is not as undisturbed' % (command, name))
+
   def check(self, command):
     """Wrong unless the trial's folder is as after the undisturbed command."""
     found = digests(self.folder)
