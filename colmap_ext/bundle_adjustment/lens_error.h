@@ -18,8 +18,9 @@ struct LensError {
 };
 
 // How far the lens models of an adjusted model bend images otherwise than the
-// lenses did. Poses and points cannot take up a wrong camera model or
-// distortion as a whole: what is left moves keypoints towards the principal
+// lenses did. Where cameras turn, poses and points cannot take up a wrong
+// camera model or distortion as a whole (straight along the view they can, and
+// it does not show): what is left moves keypoints towards the principal
 // point or away from it, by an amount that depends on the distance. Right
 // models leave a ratio below 0.05, calibrations of real cameras 0.02 to 0.2,
 // pinhole and fisheye exchanged 0.3 to 0.7. A focal length that is wrong by

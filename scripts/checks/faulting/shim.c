@@ -25,7 +25,7 @@ static const char* const kNames[kNumKinds] = {"write", "fsync",  "rename",
 static const size_t kLarge = 65536;
 
 static long counts[kNumKinds];
-static int armed = 0;  // not before the program's own code
+static int armed = 0;  // not before main()
 static int kind = -1;
 static int error = 0;
 static int keep = 0;
@@ -74,11 +74,26 @@ __attribute__((constructor)) static void Begin(void) {
   }
   // Programs that this one starts are not meant, but their counts would be.
   unsetenv("ADASFM_FAULT");
-  atexit(WriteCounts);
-  armed = 1;
 }
 
 #define REAL(name) ((__typeof__(&name))dlsym(RTLD_NEXT, #name))
+
+typedef int (*Main)(int, char**, char**);
+static Main real_main;
+
+static int ArmedMain(int argc, char** argv, char** environment) {
+  atexit(WriteCounts);
+  armed = 1;
+  return real_main(argc, argv, environment);
+}
+
+int __libc_start_main(Main main, int argc, char** argv, Main init,
+                      void (*fini)(void), void (*rtld_fini)(void),
+                      void* stack_end) {
+  real_main = main;
+  return REAL(__libc_start_main)(ArmedMain, argc, argv, init, fini, rtld_fini,
+                                 stack_end);
+}
 
 ssize_t write(int fd, const void* data, size_t size) {
   return WriteFails(fd) ? -1 : REAL(write)(fd, data, size);

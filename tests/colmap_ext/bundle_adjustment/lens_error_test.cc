@@ -30,6 +30,8 @@ BundleWorldOptions World(const std::string& camera_model) {
   options.num_images = 40;
   options.num_keypoints_per_image = 300;
   options.pixel_noise_px = 0.5;
+  // Looking along the drive, points farther off or nearer explain any lens.
+  options.weave_rad = 0.8;
   options.camera_model = camera_model;
   if (camera_model != "PINHOLE") {
     options.camera_params = {480, 485, 400, 250, 0, 0, 0, 0};
