@@ -169,7 +169,11 @@ void JudgePriors(const Verdict& verdict, Judge* judge) {
         FormatShare(priors.share_contradicting) + " of " +
         std::to_string(priors.num_priors) + ", typical squared error " +
         Number(priors.chi2_ratio, 1) + " times what their noise allows)";
-    if (priors.share_contradicting > kMaxShareContradicting) {
+    // Wrong lengths alone, as of wheels that slip all the time, leave the shape
+    // that vision sees, unless keypoints were let go for them.
+    const bool bends_model = priors.kind == "rotation" ||
+                             verdict.keypoint_sigma_factor >= kGoodSigmaFactor;
+    if (bends_model && priors.share_contradicting > kMaxShareContradicting) {
       judge->Fail(reason);
     } else if (priors.share_contradicting > kGoodShareContradicting ||
                priors.chi2_ratio > kGoodChi2Ratio) {

@@ -34,7 +34,8 @@ static long call = 0;
 // Whether this call shall fail; errno is set then.
 static int Fails(int this_kind, size_t size) {
   if (!armed) return 0;
-  const long count = __atomic_add_fetch(&counts[this_kind], 1, __ATOMIC_RELAXED);
+  const long count =
+      __atomic_add_fetch(&counts[this_kind], 1, __ATOMIC_RELAXED);
   if (this_kind != kind || count < call) return 0;
   if (count > call && !(keep && (kind != kMemory || size >= kLarge))) return 0;
   errno = error;
@@ -44,8 +45,8 @@ static int Fails(int this_kind, size_t size) {
 static int WriteFails(int fd) {
   struct stat status;
   const int before = errno;
-  const int is_file = fd > 2 && fstat(fd, &status) == 0 &&
-                      S_ISREG(status.st_mode);
+  const int is_file =
+      fd > 2 && fstat(fd, &status) == 0 && S_ISREG(status.st_mode);
   errno = before;
   return is_file && Fails(kWrite, 0);
 }

@@ -134,6 +134,16 @@ TEST_F(VerdictTest, SensorsThatContradictVision) {
   ExpectResult(Assess(), VerdictResult::kGood, "");
 }
 
+// Vision's shape is there, its unit is not.
+TEST_F(VerdictTest, WrongLengthsAreDoubtfulUnlessKeypointsWereLetGo) {
+  for (RelativePosePrior& prior : world_.data.priors) {
+    prior.cam2_from_cam1.translation *= 2.0;
+  }
+  ExpectResult(Assess(), VerdictResult::kDoubtful, "translations contradict");
+  summary_.refine.keypoint_sigma_factor = 8.0;
+  ExpectResult(Assess(), VerdictResult::kFailed, "translations contradict");
+}
+
 TEST_F(VerdictTest, LensesOfAnotherKind) {
   const Verdict honest = Assess();
   ASSERT_EQ(honest.lens_errors.size(), 1);
