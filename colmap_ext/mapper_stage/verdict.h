@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "colmap_ext/bundle_adjustment/lens_error.h"
+#include "colmap_ext/mapper/lens_error.h"
 #include "colmap_ext/mapper_stage/lost_images.h"
 #include "colmap_ext/mapper_stage/mapper_stage.h"
 #include "colmap_ext/mapper_stage/prior_agreement.h"

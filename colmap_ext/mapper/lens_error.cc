@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "colmap_ext/bundle_adjustment/lens_error.h"
+#include "colmap_ext/mapper/lens_error.h"
 
 #include <algorithm>
 #include <cmath>

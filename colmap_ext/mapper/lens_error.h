@@ -23,7 +23,7 @@ struct LensError {
 // it does not show): what is left moves keypoints towards the principal
 // point or away from it, by an amount that depends on the distance. Right
 // models leave a ratio below 0.05, calibrations of real cameras 0.02 to 0.2,
-// pinhole and fisheye exchanged 0.3 to 0.7. A focal length that is wrong by
+// pinhole and fisheye exchanged 0.15 to 0.7. A focal length that is wrong by
 // itself does not show. The sigma is that of the residuals across the radius,
 // which no lens changes.
 //
