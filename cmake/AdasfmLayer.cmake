@@ -12,7 +12,10 @@ function(adasfm_target_options target)
     # The fuzzer follows what the layers execute.
     target_compile_options(${target} PUBLIC -fsanitize=fuzzer-no-link)
   endif()
-  if(ADASFM_SANITIZE)
+  if(ADASFM_SANITIZE STREQUAL thread)
+    target_compile_options(${target} PUBLIC -fsanitize=thread)
+    target_link_options(${target} PUBLIC -fsanitize=thread)
+  elseif(ADASFM_SANITIZE)
     target_compile_options(${target} PUBLIC -fsanitize=address,undefined
                            -fno-sanitize-recover=undefined
                            -fno-omit-frame-pointer)

@@ -130,7 +130,8 @@ Status RunAdasfmAutomaticReconstructor(int argc, char** argv) {
                      "-1: all of the machine's");
   const Status parsed = command.Parse(argc, argv);
   if (!parsed.ok() || command.HelpShown()) return parsed;
-  const Status valid = CheckOptions(options);
+  const Status valid =
+      command.Check([&options] { return CheckOptions(options); });
   if (!valid.ok()) return valid;
 
   ProgressDisplay display;

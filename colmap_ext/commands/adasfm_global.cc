@@ -7,6 +7,7 @@
 #include "colmap_ext/commands/global_options.h"
 #include "colmap_ext/commands/progress_display.h"
 #include "colmap_ext/commands/registry.h"
+#include "core/check_options.h"
 
 namespace adasfm {
 namespace {
@@ -35,8 +36,10 @@ Status RunAdasfmGlobal(int argc, char** argv) {
       "coarse model and cleans the database's two-view geometries "
       "(adasfm_restorer undoes that).");
   AddOptions(&options, &command);
-  const Status status = command.Parse(argc, argv);
+  Status status = command.Parse(argc, argv);
   if (!status.ok() || command.HelpShown()) return status;
+  status = command.Check([&options] { return CheckOptions(options.stage); });
+  if (!status.ok()) return status;
 
   ProgressDisplay display;
   const StatusOr<CoarseModelReport> report = EstimateCoarseModel(

@@ -5,6 +5,8 @@
 #include "colmap_ext/adasfm_pipeline.h"
 #include "colmap_ext/commands/progress_display.h"
 #include "colmap_ext/commands/registry.h"
+#include "colmap_ext/mapper_stage/verdict_report.h"
+#include "core/check_options.h"
 
 namespace adasfm {
 namespace {
@@ -136,8 +138,10 @@ Status RunAdasfmMapper(int argc, char** argv) {
   AddMapperOptions(&options, &command);
   AddPartitionOptions(&options.map.stage, &command);
   AddAlignOptions(&options.map.stage.align, &command);
-  const Status parsed = command.Parse(argc, argv);
-  if (!parsed.ok() || command.HelpShown()) return parsed;
+  Status status = command.Parse(argc, argv);
+  if (!status.ok() || command.HelpShown()) return status;
+  status = command.Check([&options] { return CheckOptions(options.map); });
+  if (!status.ok()) return status;
   const StatusOr<MapperSteps> steps = StepsFromName(options.stage);
   if (!steps.ok()) return steps.status();
   options.request.steps = *steps;

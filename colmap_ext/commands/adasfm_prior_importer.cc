@@ -152,7 +152,8 @@ Status RunAdasfmPriorImporter(int argc, char** argv) {
   AddOptions(&options, &command);
   const Status parsed = command.Parse(argc, argv);
   if (!parsed.ok() || command.HelpShown()) return parsed;
-  const Status valid = CheckOptions(options);
+  const Status valid =
+      command.Check([&options] { return CheckOptions(options); });
   if (!valid.ok()) return valid;
   options.estimation.check_against_vision = !force;
   if (summary_path.empty()) summary_path = paths.database_path + ".priors.json";

@@ -219,7 +219,7 @@ Status RunAdasfmSynthesizer(int argc, char** argv) {
   AddOptions(&options, &command);
   Status status = command.Parse(argc, argv);
   if (!status.ok() || command.HelpShown()) return status;
-  status = Translate(&options);
+  status = command.Check([&options] { return Translate(&options); });
   if (status.ok()) status = PrepareOutputFolder(options.output_path);
   if (status.ok()) status = CheckWorldFolder(options.output_path);
   if (!status.ok()) return status;

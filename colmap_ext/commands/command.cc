@@ -2,12 +2,14 @@
 #include "colmap_ext/commands/command.h"
 
 #include <glog/logging.h>
+#include <sys/resource.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <csignal>
 #include <cstdio>
 #include <cstdlib>
+#include <cstring>
 #include <exception>
 #include <filesystem>
 #include <fstream>
@@ -23,6 +25,9 @@ namespace adasfm {
 namespace {
 
 namespace po = boost::program_options;
+
+constexpr char kOutOfMemory[] =
+    "out of memory; use fewer threads, or fewer images at a time";
 
 // Messages of other libraries may have several lines; an error has one.
 std::string OneLine(std::string message) {
@@ -45,7 +50,44 @@ void PrintError(const std::string& message) {
   _exit(EXIT_FAILURE);
 }
 
+bool has_command_ended = false;
+
+// COLMAP's database class and OpenMP end the process when something fails.
+void ReportExitOfLibrary() {
+  if (has_command_ended) return;
+  PrintError(
+      "a library stopped at the error above; mend its cause (space, memory or "
+      "threads that are short), then give the same command again");
+}
+
+void WriteToStderr(const char* text) {
+  const ssize_t ignored = write(STDERR_FILENO, text, std::strlen(text));
+  static_cast<void>(ignored);
+}
+
+// An exception that nobody could catch: in a thread of a library, or where
+// memory ran out in a function that must not throw. Takes no memory itself.
+[[noreturn]] void ReportUncaughtException() {
+  WriteToStderr("ERROR: ");
+  try {
+    const std::exception_ptr exception = std::current_exception();
+    if (exception) std::rethrow_exception(exception);
+    WriteToStderr(
+        "the system gives too few threads; use a smaller "
+        "--num_threads");
+  } catch (const std::bad_alloc&) {
+    WriteToStderr(kOutOfMemory);
+  } catch (const std::exception& error) {
+    WriteToStderr(error.what());
+  } catch (...) {
+    WriteToStderr("unknown exception");
+  }
+  WriteToStderr("\n");
+  _exit(EXIT_FAILURE);
+}
+
 void SetUpLogging(const char* name) {
+  std::set_terminate(&ReportUncaughtException);
   google::InitGoogleLogging(name);
   google::InstallFailureFunction(
       reinterpret_cast<google::logging_fail_func_t>(&ExitOnFailedCheck));
@@ -53,6 +95,51 @@ void SetUpLogging(const char* name) {
   FLAGS_logtostderr = true;
   // A write beyond a limit fails like one to a full disk, and is reported.
   std::signal(SIGXFSZ, SIG_IGN);
+}
+
+// OpenBLAS waits for ever for the buffers that a limit denies it: below this
+// beside the program itself adasfm_global did.
+constexpr uint64_t kMinAddressSpace = 256 << 20;
+
+Status CheckAddressSpace() {
+  rlimit limit;
+  if (getrlimit(RLIMIT_AS, &limit) != 0 || limit.rlim_cur == RLIM_INFINITY) {
+    return Status::Ok();
+  }
+  uint64_t num_pages = 0;
+  std::ifstream("/proc/self/statm") >> num_pages;
+  const uint64_t needed = num_pages * sysconf(_SC_PAGESIZE) + kMinAddressSpace;
+  if (limit.rlim_cur >= needed) return Status::Ok();
+  return Status::Error("the limit of address space (ulimit -v) is " +
+                       std::to_string(limit.rlim_cur >> 10) +
+                       " kB, but this program needs at least " +
+                       std::to_string(needed >> 10) + "; raise the limit");
+}
+
+// The exit code of the command.
+int CatchAndRun(const Command& command, int argc, char** argv) {
+  try {
+    Status status = CheckAddressSpace();
+    if (status.ok()) status = command.run(argc, argv);
+    if (status.ok()) return EXIT_SUCCESS;
+    PrintError(status.message());
+  } catch (const Interruption&) {
+    PrintError(
+        "interrupted; what is finished is kept, and the same command continues "
+        "from there");
+    return 128 + InterruptingSignal();
+  } catch (const std::bad_alloc&) {
+    PrintError(std::string(command.name) + ": " + kOutOfMemory);
+  } catch (const std::system_error& error) {
+    PrintError(std::string(command.name) +
+               ": the system refuses: " + error.what() +
+               "; if it is short of threads, use a smaller --num_threads");
+  } catch (const std::exception& error) {
+    PrintError(std::string(command.name) + ": " + error.what());
+  } catch (...) {
+    PrintError(std::string(command.name) + ": unknown exception");
+  }
+  return EXIT_FAILURE;
 }
 
 }  // namespace
@@ -141,30 +228,28 @@ Status CommandOptions::Parse(int argc, const char* const* argv) {
   return Status::Ok();
 }
 
+Status CommandOptions::Check(const std::function<Status()>& check) {
+  const Status status = check();
+  if (status.ok()) return status;
+  for (const Default& option : defaults_) {
+    option.exchange();
+    const Status with_default = check();
+    option.exchange();
+    if (!with_default.ok() && with_default.message() == status.message()) {
+      continue;
+    }
+    if (status.message().find(option.name) != std::string::npos) break;
+    return Status::Error("--" + option.name + ": " + status.message());
+  }
+  return status;
+}
+
 int RunCommand(const Command& command, int argc, char** argv) {
   SetUpLogging(command.name);
-  try {
-    const Status status = command.run(argc, argv);
-    if (status.ok()) return EXIT_SUCCESS;
-    PrintError(status.message());
-  } catch (const Interruption&) {
-    PrintError(
-        "interrupted; what is finished is kept, and the same command continues "
-        "from there");
-    return 128 + InterruptingSignal();
-  } catch (const std::bad_alloc&) {
-    PrintError(std::string(command.name) +
-               ": out of memory; use fewer threads, or fewer images at a time");
-  } catch (const std::system_error& error) {
-    PrintError(std::string(command.name) +
-               ": the system refuses: " + error.what() +
-               "; if it is short of threads, use a smaller --num_threads");
-  } catch (const std::exception& error) {
-    PrintError(std::string(command.name) + ": " + error.what());
-  } catch (...) {
-    PrintError(std::string(command.name) + ": unknown exception");
-  }
-  return EXIT_FAILURE;
+  std::atexit(&ReportExitOfLibrary);
+  const int code = CatchAndRun(command, argc, argv);
+  has_command_ended = true;
+  return code;
 }
 
 }  // namespace adasfm

@@ -2,9 +2,12 @@
 #pragma once
 
 #include <boost/program_options.hpp>
+#include <functional>
 #include <sstream>
 #include <string>
 #include <type_traits>
+#include <utility>
+#include <vector>
 
 #include "core/status.h"
 
@@ -43,6 +46,10 @@ class CommandOptions {
   Status Parse(int argc, const char* const* argv);
   bool HelpShown() const { return help_shown_; }
 
+  // The outcome of a check of the options' values; an error names the option as
+  // the user types it, found by checking with each option's default in turn.
+  Status Check(const std::function<Status()>& check);
+
  private:
   void PrintHelp() const;
   Status ReadProject(const std::string& path,
@@ -55,6 +62,12 @@ class CommandOptions {
   bool log_to_stderr_ = false;
   int log_level_ = 0;
   bool help_shown_ = false;
+  struct Default {
+    std::string name;
+    // Exchanges the value and the default.
+    std::function<void()> exchange;
+  };
+  std::vector<Default> defaults_;
 };
 
 // argv[0] is the command's name. An error's message is one line: what, which
@@ -107,6 +120,8 @@ void CommandOptions::AddDefault(const std::string& name, T* value,
                          boost::program_options::value<T>(value)->default_value(
                              *value, OptionText(*value)),
                          OptionHelp<T>(help).c_str());
+  defaults_.push_back(
+      {name, [value, other = *value]() mutable { std::swap(*value, other); }});
 }
 
 }  // namespace adasfm

@@ -100,6 +100,8 @@ bool HasAllRows(const SyntheticWorld& world, const std::string& path) {
       {"keypoints", world.images.size()},
       {"matches", world.pairs.size()},
       {"two_view_geometries", world.pairs.size()}};
+  // What COLMAP's class could not move from there on closing would be lost.
+  if (fs::exists(path + "-wal")) return false;
   try {
     SqliteConnection database(path, SqliteConnection::Mode::kRead);
     SqliteStatement check(&database, "PRAGMA quick_check");
@@ -290,10 +292,12 @@ Status WriteSyntheticDatabase(const SyntheticWorld& world,
 Status WriteSyntheticLogs(const SyntheticWorld& world,
                           const std::string& folder) {
   using Writer = void (*)(const SyntheticWorld&, std::ostream*);
+  // landmarks.txt first: it tells a world of ours, which may be replaced when
+  // this run is interrupted.
   std::vector<std::pair<const char*, Writer>> files = {
-      {"imu.csv", WriteImu},        {"wheel.csv", WriteWheels},
-      {"times.csv", WriteTimes},    {"sensors.yaml", WriteSensors},
-      {"gt.txt", WriteGroundTruth}, {"landmarks.txt", WriteLandmarks},
+      {"landmarks.txt", WriteLandmarks}, {"imu.csv", WriteImu},
+      {"wheel.csv", WriteWheels},        {"times.csv", WriteTimes},
+      {"sensors.yaml", WriteSensors},    {"gt.txt", WriteGroundTruth},
       {"world.json", WriteSummary}};
   if (!world.gnss_fixes.empty()) files.emplace_back("gnss.csv", WriteGnss);
   for (const auto& [name, write] : files) {

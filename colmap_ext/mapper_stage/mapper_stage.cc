@@ -5,8 +5,10 @@
 #include <atomic>
 #include <filesystem>
 #include <iomanip>
+#include <new>
 #include <sstream>
 #include <stdexcept>
+#include <system_error>
 
 #include "colmap_ext/io/capture_output.h"
 #include "colmap_ext/io/output_files.h"
@@ -165,6 +167,11 @@ PartReport MapperStage::MapPart(int part_index, int num_threads,
     try {
       *result = part_mapper_(options, data_, coarse_, images);
       break;
+    } catch (const std::bad_alloc&) {
+      // Not the part's fault: with more memory the same command makes it.
+      throw;
+    } catch (const std::system_error&) {
+      throw;
     } catch (const std::exception& exception) {
       report.failure = exception.what();
       if (attempt == 0) report.retry_reason = exception.what();

@@ -4,6 +4,7 @@
 #include <sstream>
 
 #include "colmap_ext/mapper_stage/mapping_summary.h"
+#include "colmap_ext/mapper_stage/verdict_report.h"
 
 namespace adasfm {
 namespace {

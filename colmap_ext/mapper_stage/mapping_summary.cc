@@ -3,6 +3,8 @@
 
 #include <nlohmann/json.hpp>
 
+#include "colmap_ext/mapper_stage/verdict_report.h"
+
 namespace adasfm {
 namespace {
 

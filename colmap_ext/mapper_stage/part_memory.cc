@@ -1,11 +1,13 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "colmap_ext/mapper_stage/part_memory.h"
 
+#include <sys/resource.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <fstream>
 #include <functional>
+#include <limits>
 #include <set>
 #include <string>
 
@@ -19,6 +21,16 @@ namespace {
 constexpr double kBytesPerPart = 10e6;
 constexpr double kBytesPerKeypoint = 600.0;
 constexpr double kBytesPerMatch = 60.0;
+
+double SystemMemoryBytes() {
+  std::ifstream file("/proc/meminfo");
+  std::string line;
+  while (std::getline(file, line)) {
+    if (line.rfind("MemAvailable:", 0) != 0) continue;
+    return 1024.0 * std::stod(line.substr(std::string("MemAvailable:").size()));
+  }
+  return 1.0 * sysconf(_SC_AVPHYS_PAGES) * sysconf(_SC_PAGESIZE);
+}
 
 }  // namespace
 
@@ -37,14 +49,40 @@ double EstimatePartMemoryBytes(const SceneData& data,
   return bytes;
 }
 
-double AvailableMemoryBytes() {
-  std::ifstream file("/proc/meminfo");
-  std::string line;
-  while (std::getline(file, line)) {
-    if (line.rfind("MemAvailable:", 0) != 0) continue;
-    return 1024.0 * std::stod(line.substr(std::string("MemAvailable:").size()));
+double MemoryLeftInGroup(const std::string& folder) {
+  double limit = std::numeric_limits<double>::infinity();
+  double used = 0.0;
+  // Of version 2 and of version 1; "max" is no number.
+  for (const char* name : {"/memory.max", "/memory.limit_in_bytes"}) {
+    std::ifstream(folder + name) >> limit;
+    if (limit == 0.0) limit = std::numeric_limits<double>::infinity();
   }
-  return 1.0 * sysconf(_SC_AVPHYS_PAGES) * sysconf(_SC_PAGESIZE);
+  for (const char* name : {"/memory.current", "/memory.usage_in_bytes"}) {
+    double value = 0.0;
+    if (std::ifstream(folder + name) >> value) used = value;
+  }
+  std::ifstream statistics(folder + "/memory.stat");
+  std::string key;
+  double value = 0.0;
+  while (statistics >> key >> value) {
+    if (key == "inactive_file") used -= value;
+  }
+  return std::max(0.0, limit - std::max(0.0, used));
+}
+
+double AvailableMemoryBytes() {
+  double available = SystemMemoryBytes();
+  for (const char* folder : {"/sys/fs/cgroup", "/sys/fs/cgroup/memory"}) {
+    available = std::min(available, MemoryLeftInGroup(folder));
+  }
+  rlimit limit;
+  if (getrlimit(RLIMIT_AS, &limit) == 0 && limit.rlim_cur != RLIM_INFINITY) {
+    double num_pages = 0.0;
+    std::ifstream("/proc/self/statm") >> num_pages;
+    const double left = limit.rlim_cur - num_pages * sysconf(_SC_PAGESIZE);
+    available = std::min(available, std::max(0.0, left));
+  }
+  return available;
 }
 
 int CountPartsThatFit(const std::vector<double>& part_memory_bytes,

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <string>
 #include <vector>
 
 #include "colmap_ext/scene/scene_data.h"
@@ -14,8 +15,13 @@ namespace adasfm {
 double EstimatePartMemoryBytes(const SceneData& data,
                                const std::vector<image_t>& part);
 
-// What the system can give without swapping.
+// What the system can give without swapping, and limits (those of the control
+// group as it stands below /sys/fs/cgroup, and of the address space) allow.
 double AvailableMemoryBytes();
+
+// What the limit of the control group of that folder leaves, without the cache
+// of files; infinite without a limit.
+double MemoryLeftInGroup(const std::string& folder);
 
 // How many of the parts may run at the same time so that the biggest ones fit
 // into `memory_bytes` together; at least one.

@@ -1,12 +1,14 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <nlohmann/json_fwd.hpp>
+#include <map>
 #include <string>
 #include <vector>
 
+#include "colmap_ext/mapper/lens_error.h"
 #include "colmap_ext/mapper_stage/lost_images.h"
 #include "colmap_ext/mapper_stage/mapper_stage.h"
+#include "colmap_ext/mapper_stage/prior_agreement.h"
 #include "colmap_ext/scene/scene_data.h"
 
 namespace adasfm {
@@ -19,19 +21,6 @@ namespace adasfm {
 // limit (docs/reference/mapper.md tells what they catch on worlds with truth).
 
 enum class VerdictResult { kGood, kDoubtful, kFailed };
-
-// How far vision and one kind of prior agree: priors between images that points
-// hold too, after the adjustment.
-struct PriorAgreement {
-  std::string kind;  // "rotation" or "translation"
-  int num_priors = 0;
-  // Median over the priors of the squared whitened residual, divided by that of
-  // honest ones: 1 or less when the covariances are right, since the adjustment
-  // has drawn the poses to the priors.
-  double chi2_ratio = 0.0;
-  // The share of priors beyond what one honest prior in 1,000 has.
-  double share_contradicting = 0.0;
-};
 
 struct Verdict {
   VerdictResult result = VerdictResult::kGood;
@@ -48,6 +37,8 @@ struct Verdict {
   // Where metres come from; empty without.
   std::string metric_source;
   std::vector<PriorAgreement> priors;
+  // Of each camera, in the model where it is largest.
+  std::map<camera_t, LensError> lens_errors;
   double keypoint_sigma_px = 0.0;
   double keypoint_sigma_factor = 1.0;
   double mean_reproj_error_px = 0.0;
@@ -77,13 +68,5 @@ Verdict AssessModels(const std::vector<AssessedModel>& models,
 Verdict AssessModel(const SceneData& data, const MapperStageSummary& summary,
                     const std::vector<std::string>& warnings,
                     const colmap::Reconstruction& model);
-
-// "good", "doubtful" or "failed".
-const char* VerdictName(VerdictResult result);
-
-// One line for the screen.
-std::string FormatVerdict(const Verdict& verdict);
-
-nlohmann::json VerdictToJson(const Verdict& verdict);
 
 }  // namespace adasfm

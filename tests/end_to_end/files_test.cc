@@ -204,6 +204,43 @@ TEST_F(FilesTest, StrayWordsAndMisplacedOptions) {
               "--AdaSfmMapper.stage part only");
 }
 
+// Below it libraries wait for ever for memory that they cannot have.
+TEST_F(FilesTest, TooLittleAddressSpace) {
+  const int status =
+      std::system(("ulimit -v 450000; " + LauncherPath() + " " + Global("g") +
+                   " > " + folder_.File("out") + " 2> " + folder_.File("err"))
+                      .c_str());
+  EXPECT_NE(status, 0);
+  EXPECT_THAT(ReadBytes(folder_.File("err")),
+              HasSubstr("ERROR: the limit of address space (ulimit -v) is "
+                        "450000 kB"));
+}
+
+// The keypoints of a pinhole camera, said to be those of a fisheye.
+TEST_F(FilesTest, WrongLensModelIsNamed) {
+  std::vector<double> params(8, 0.0);
+  {
+    SqliteConnection database(database_, SqliteConnection::Mode::kWrite);
+    SqliteStatement read(&database, "SELECT params FROM cameras");
+    ASSERT_TRUE(read.Step());
+    ASSERT_EQ(read.NumBytes(0), 4 * sizeof(double));
+    std::memcpy(params.data(), read.Blob(0), 4 * sizeof(double));
+  }
+  {
+    SqliteConnection database(database_, SqliteConnection::Mode::kWrite);
+    SqliteStatement write(&database,
+                          "UPDATE cameras SET model = 5, params = ?");
+    write.BindBlob(1, params.data(), params.size() * sizeof(double));
+    write.Step();
+  }
+  ASSERT_EQ(Call(importer_ + " --force 1").ExitCode(), 0);
+  ASSERT_EQ(Call(Global("g")).ExitCode(), 0);
+  const Run run = Call(Mapper("m"));
+  EXPECT_THAT(run.out + run.err,
+              HasSubstr("Verdict: doubtful: camera 1 does not bend images as "
+                        "its lens model says"));
+}
+
 TEST_F(FilesTest, WorldOnAFullDisk) {
   // Each size fails elsewhere: at a log, at the database.
   for (const char* blocks : {"8", "400", "1500"}) {

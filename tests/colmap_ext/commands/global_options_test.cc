@@ -7,6 +7,8 @@
 #include <string>
 #include <vector>
 
+#include "core/check_options.h"
+
 namespace adasfm {
 namespace {
 
@@ -127,6 +129,26 @@ TEST(GlobalOptionsTest, EachSetsItsOwnField) {
           << option.name << " changes " << other.name;
     }
   }
+}
+
+TEST(GlobalOptionsTest, WrongValuesAreNamedAsTheyAreTyped) {
+  int num_refused = 0;
+  for (const OptionCase& option : Cases()) {
+    GlobalStageOptions stage;
+    CommandOptions command("test", "A test.");
+    AddGlobalOptions(&stage, &command);
+    const std::string name = "AdaSfmGlobal." + option.name;
+    const std::string word = "--" + name;
+    const char* argv[] = {"test", word.c_str(), "-7"};
+    if (!command.Parse(3, argv).ok()) continue;  // a switch
+    const Status status =
+        command.Check([&stage] { return CheckOptions(stage); });
+    if (status.ok()) continue;
+    ++num_refused;
+    EXPECT_NE(status.message().find(name), std::string::npos)
+        << name << ": " << status.message();
+  }
+  EXPECT_GT(num_refused, 25);
 }
 
 TEST(GlobalOptionsTest, TheHelpNamesAll) {

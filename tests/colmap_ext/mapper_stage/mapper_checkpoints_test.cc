@@ -183,6 +183,29 @@ TEST_F(MapperCheckpointsTest, ContinuesInsideTheRefinement) {
   EXPECT_FALSE(changed.Merge(true).ok());
 }
 
+// A short machine is no fault of the part: nothing is remembered of it.
+TEST_F(MapperCheckpointsTest, PartWithoutMemoryIsMadeLater) {
+  MapperWorldOptions options;
+  options.world.num_images = 80;
+  const MapperWorld world = BuildMapperWorld(options);
+  options_.num_threads = 1;
+  const auto undisturbed = Run(world);
+  fs::remove_all(folder_);
+  MapperStage starved(
+      options_, world.data, world.coarse_poses, folder_, {},
+      [](const LocalMapperOptions&, const SceneData&, const CoarsePoseMap&,
+         const std::set<image_t>&) -> LocalMapResult {
+        throw std::bad_alloc();
+      });
+  ASSERT_TRUE(starved.Plan().ok());
+  EXPECT_THROW(starved.RunAllParts(), std::bad_alloc);
+  const auto later = Run(world);
+  ASSERT_EQ(undisturbed.size(), later.size());
+  for (const auto& [image_id, pose] : undisturbed) {
+    EXPECT_TRUE(PosesNear(pose, later.at(image_id), 1e-12, 1e-12));
+  }
+}
+
 TEST_F(MapperCheckpointsTest, PartThatThrowsIsTriedOnceMoreMoreStrictly) {
   MapperWorldOptions options;
   options.world.num_images = 80;

@@ -8,6 +8,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "colmap_ext/mapper_stage/verdict_report.h"
 #include "tests/testing/colmap_ext/mapper_stage_fixture.h"
 
 namespace adasfm {
@@ -131,6 +132,35 @@ TEST_F(VerdictTest, SensorsThatContradictVision) {
   ExpectResult(Assess(), VerdictResult::kDoubtful, "rotations contradict");
   turn_every(39, 10.0);
   ExpectResult(Assess(), VerdictResult::kGood, "");
+}
+
+// Vision's shape is there, its unit is not.
+TEST_F(VerdictTest, WrongLengthsAreDoubtfulUnlessKeypointsWereLetGo) {
+  for (RelativePosePrior& prior : world_.data.priors) {
+    prior.cam2_from_cam1.translation *= 2.0;
+  }
+  ExpectResult(Assess(), VerdictResult::kDoubtful, "translations contradict");
+  summary_.refine.keypoint_sigma_factor = 8.0;
+  ExpectResult(Assess(), VerdictResult::kFailed, "translations contradict");
+}
+
+TEST_F(VerdictTest, LensesOfAnotherKind) {
+  const Verdict honest = Assess();
+  ASSERT_EQ(honest.lens_errors.size(), 1);
+  EXPECT_LT(honest.lens_errors.begin()->second.ratio, 0.1);
+  for (const auto& [camera_id, camera] : model_.Cameras()) {
+    colmap::Camera& fisheye = model_.Camera(camera_id);
+    std::vector<double> params = camera.Params();
+    params.resize(8, 0.0);
+    fisheye.SetModelIdFromName("OPENCV_FISHEYE");
+    fisheye.SetParams(params);
+  }
+  const Verdict verdict = Assess();
+  ExpectResult(verdict, VerdictResult::kDoubtful,
+               "does not bend images as its lens model says");
+  const nlohmann::json json = VerdictToJson(verdict);
+  ASSERT_EQ(json["lenses"].size(), 1);
+  EXPECT_GT(json["lenses"][0]["ratio"], 0.25);
 }
 
 TEST_F(VerdictTest, WhatTheStagesSaid) {

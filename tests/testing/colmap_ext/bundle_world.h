@@ -26,12 +26,14 @@ struct BundleWorldOptions {
   // COLMAP's name and parameters of the camera.
   std::string camera_model = "PINHOLE";
   std::vector<double> camera_params = {480, 485, 400, 250};
+  // How far the camera looks to the left and to the right of the street.
+  double weave_rad = 0.15;
   uint64_t seed = 1;
 };
 
 inline Rigid3d BundleWorldPose(const BundleWorldOptions& options, int index) {
   const double x = options.spacing_m * index;
-  const double yaw = 0.15 * std::sin(0.08 * x);
+  const double yaw = options.weave_rad * std::sin(0.08 * x);
   Eigen::Matrix3d cam_from_body;  // body: x forward, y left, z up
   cam_from_body << 0, -1, 0, 0, 0, -1, 1, 0, 0;
   const Eigen::Quaterniond body_from_world(

@@ -1,0 +1,87 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "colmap_ext/mapper_stage/prior_agreement.h"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <utility>
+
+#include "core/median.h"
+#include "core/so3.h"
+
+namespace adasfm {
+namespace {
+
+// Fewer do not fix six degrees of freedom against a few wrong ones.
+constexpr int kMinPointsOfImage = 15;
+// Quantiles of chi-square with three degrees of freedom: 50 % and 99.9 %.
+constexpr double kMedianChi2 = 2.366;
+constexpr double kLargeChi2 = 16.27;
+
+// Of the residual by its covariance; negative when that is not one.
+double Chi2(const Eigen::Vector3d& residual,
+            const Eigen::Matrix3d& covariance) {
+  const Eigen::LLT<Eigen::Matrix3d> llt(covariance);
+  if (!covariance.allFinite() || llt.info() != Eigen::Success) return -1.0;
+  return residual.dot(llt.solve(residual));
+}
+
+PriorAgreement Summarize(const std::string& kind, std::vector<double> chi2) {
+  PriorAgreement agreement;
+  agreement.kind = kind;
+  agreement.num_priors = static_cast<int>(chi2.size());
+  if (chi2.empty()) return agreement;
+  agreement.share_contradicting =
+      1.0 *
+      std::count_if(chi2.begin(), chi2.end(),
+                    [](double value) { return value > kLargeChi2; }) /
+      chi2.size();
+  agreement.chi2_ratio = UpperMedian(&chi2) / kMedianChi2;
+  return agreement;
+}
+
+}  // namespace
+
+bool IsHeldByPoints(const colmap::Reconstruction& model, image_t image_id) {
+  return model.ExistsImage(image_id) && model.IsImageRegistered(image_id) &&
+         static_cast<int>(model.Image(image_id).NumPoints3D()) >=
+             kMinPointsOfImage;
+}
+
+void AddPriorResiduals(const SceneData& data,
+                       const colmap::Reconstruction& model,
+                       PriorResiduals* residuals) {
+  for (const RelativePosePrior& prior : data.priors) {
+    if (!IsHeldByPoints(model, prior.image_id1) ||
+        !IsHeldByPoints(model, prior.image_id2)) {
+      continue;
+    }
+    const Rigid3d motion = CamFromWorld(model.Image(prior.image_id2)) *
+                           CamFromWorld(model.Image(prior.image_id1)).Inverse();
+    if (prior.HasRotation()) {
+      const double chi2 = Chi2(
+          LogSo3(motion.rotation * prior.cam2_from_cam1.rotation.conjugate()),
+          prior.covariance.topLeftCorner<3, 3>());
+      if (chi2 >= 0.0) residuals->rotations.push_back(chi2);
+    }
+    if (prior.HasDirection() && prior.HasLength()) {
+      const double chi2 =
+          Chi2(motion.translation - prior.cam2_from_cam1.translation,
+               prior.covariance.bottomRightCorner<3, 3>());
+      if (chi2 >= 0.0) residuals->translations.push_back(chi2);
+    }
+  }
+}
+
+std::vector<PriorAgreement> SummarizeAgreement(PriorResiduals residuals) {
+  std::vector<PriorAgreement> agreements;
+  if (!residuals.rotations.empty()) {
+    agreements.push_back(Summarize("rotation", std::move(residuals.rotations)));
+  }
+  if (!residuals.translations.empty()) {
+    agreements.push_back(
+        Summarize("translation", std::move(residuals.translations)));
+  }
+  return agreements;
+}
+
+}  // namespace adasfm

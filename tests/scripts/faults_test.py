@@ -1,0 +1,85 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: BSD-3-Clause
+"""Some faults of each campaign of scripts/checks/faults.sh, and such as went
+wrong once."""
+
+import errno
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+import unittest
+
+CHECKS = os.path.join(os.path.dirname(os.path.abspath(__file__)), '..', '..',
+                      'scripts', 'checks')
+sys.path.insert(0, CHECKS)
+
+from faulting.shim import build_shim
+from faulting.trials import count_calls, inject
+from faulting.world import World
+
+COMMANDS = ['adasfm_synthesizer', 'adasfm_prior_importer', 'adasfm_global',
+            'adasfm_mapper']
+
+
+class FaultsTest(unittest.TestCase):
+
+  @classmethod
+  def setUpClass(cls):
+    cls.folder = tempfile.mkdtemp(prefix='adasfm-faults-test-')
+    cls.world = World(os.environ['ADASFM_LAUNCHER'], cls.folder, COMMANDS)
+    cls.shim = build_shim(cls.folder)
+    cls.counts = {command: count_calls(cls.world, cls.shim, command)
+                  for command in COMMANDS}
+
+  @classmethod
+  def tearDownClass(cls):
+    shutil.rmtree(cls.folder)
+
+  def inject(self, command, kind, shares, error, keep=''):
+    """At these shares of the command's calls of that kind; whether any of them
+    made it fail."""
+    failed = False
+    for share in shares:
+      call = 1 + int(share * self.counts[command][kind])
+      outcome = inject(self.world, self.shim, command, '%s:%d:%d%s' %
+                       (kind, call, error, keep))
+      failed = failed or outcome.code != 0
+    return failed
+
+  def test_synthesizer_notices_what_its_database_has_not(self):
+    # Those near the end move COLMAP's log of the database into it.
+    self.assertTrue(self.inject('adasfm_synthesizer', 'write',
+                                (0.3, 0.86, 0.9, 0.98), errno.ENOSPC))
+
+  def test_synthesizer_replaces_what_it_left(self):
+    self.assertTrue(self.inject('adasfm_synthesizer', 'rename',
+                                (0.0, 0.25, 0.45, 0.65), errno.EACCES))
+
+  def test_disk_stays_full(self):
+    for command in COMMANDS[1:]:
+      self.assertTrue(self.inject(command, 'write', (0.5,), errno.ENOSPC,
+                                  ':keep'))
+
+  def test_short_of_memory(self):
+    # A part of the mapper is not given up for it.
+    self.assertTrue(self.inject('adasfm_mapper', 'memory',
+                                (0.2, 0.35, 0.5, 0.65), errno.ENOMEM))
+
+  def test_no_threads(self):
+    for command in COMMANDS[2:]:
+      inject(self.world, self.shim, command, 'thread:1:%d:keep' % errno.EAGAIN)
+
+  def test_short_campaign(self):
+    done = subprocess.run(
+        [sys.executable, os.path.join(CHECKS, 'faults.py'),
+         os.environ['ADASFM_LAUNCHER'], '--seconds', '15', '--seed', '7'],
+        capture_output=True, text=True)
+    self.assertEqual(done.returncode, 0, done.stdout + done.stderr)
+    for campaign in ('kills', 'injections', 'limits', 'twice', 'files'):
+      self.assertIn(campaign + ': ', done.stdout)
+
+
+if __name__ == '__main__':
+  unittest.main()
