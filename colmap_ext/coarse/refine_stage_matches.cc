@@ -146,9 +146,8 @@ void RefineStageMatches(const GlobalStageOptions& options,
       refined = ComputeModelBearings(model, options.num_threads);
     }
     RefineRawMatches(FitToNoise(options.refinement, model), source,
-                     CamsFromWorld(model),
-                     refined.empty() ? bearings : refined, pairs[i],
-                     &result->refinement);
+                     CamsFromWorld(model), refined.empty() ? bearings : refined,
+                     pairs[i], &result->refinement);
   }
   CollectGeometries(result);
 }

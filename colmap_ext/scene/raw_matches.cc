@@ -13,7 +13,7 @@ namespace {
 
 // Keypoints that are not numbers are zeros in a scene, where no detector finds
 // any.
-bool IsUsable(const SceneImage& image, point2D_t index) {
+bool IsInScene(const SceneImage& image, point2D_t index) {
   return !image.keypoints[index].isZero(0.0);
 }
 
@@ -35,13 +35,13 @@ RawMatches ReadPairs(const std::string& database_path, const SceneData& scene,
                         image2.name +
                         " name keypoints that these images do not have");
     }
-    matches.erase(std::remove_if(matches.begin(), matches.end(),
-                                 [&](const FeatureMatch& match) {
-                                   return !IsUsable(image1,
-                                                    match.point2D_idx1) ||
-                                          !IsUsable(image2, match.point2D_idx2);
-                                 }),
-                  matches.end());
+    matches.erase(
+        std::remove_if(matches.begin(), matches.end(),
+                       [&](const FeatureMatch& match) {
+                         return !IsInScene(image1, match.point2D_idx1) ||
+                                !IsInScene(image2, match.point2D_idx2);
+                       }),
+        matches.end());
     if (!matches.empty()) raw_matches.emplace(pair, std::move(matches));
   }
   return raw_matches;
