@@ -110,9 +110,10 @@ bool CoarsePoseEstimator::HasMetresEverywhere() const {
 
 // Returns the number of edges removed.
 int CoarsePoseEstimator::SplitWhereSizeIsUnknown() {
-  // Photos in any order have no parts that could stay apart.
+  // Photos in any order have no parts that could stay apart, and rotations of
+  // an IMU confirm joins that vision alone leaves open.
   if (!result_.loop_closures.joins_were_split || lengths_.lengths.empty() ||
-      HasMetresEverywhere()) {
+      !priors_.empty() || HasMetresEverywhere()) {
     return 0;
   }
   const std::vector<int> part_of = FindPartsOfOneUnit(

@@ -74,13 +74,11 @@ class Reducer {
 
   ReducedSystem Run() {
     ReducedSystem system;
-    std::vector<ceres::ResidualBlockId> ids;
-    problem_.GetResidualBlocks(&ids);
     const std::vector<BundleProblem::PriorBlock>& priors =
         bundle_.PriorBlocks();
     size_t num_priors = 0;
     bundle_.UpdatePoses();
-    for (const ceres::ResidualBlockId id : ids) {
+    for (const ceres::ResidualBlockId id : ids_) {
       const bool is_prior =
           num_priors < priors.size() && priors[num_priors].residual == id;
       Evaluate(id, !is_prior);
@@ -98,16 +96,22 @@ class Reducer {
   }
 
  private:
+  // In order of the residuals; Ceres lists parameters by their addresses, which
+  // are others in every run.
   int NumberColumns() {
+    problem_.GetResidualBlocks(&ids_);
     std::vector<double*> blocks;
-    problem_.GetParameterBlocks(&blocks);
     int size = 0;
-    for (double* block : blocks) {
-      if (bundle_.IsPoint(block) || problem_.IsParameterBlockConstant(block)) {
-        continue;
+    for (const ceres::ResidualBlockId id : ids_) {
+      problem_.GetParameterBlocksForResidualBlock(id, &blocks);
+      for (double* block : blocks) {
+        if (bundle_.IsPoint(block) ||
+            problem_.IsParameterBlockConstant(block) ||
+            !columns_.emplace(block, size).second) {
+          continue;
+        }
+        size += problem_.ParameterBlockTangentSize(block);
       }
-      columns_[block] = size;
-      size += problem_.ParameterBlockTangentSize(block);
     }
     return size;
   }
@@ -215,6 +219,7 @@ class Reducer {
 
   BundleProblem& bundle_;
   ceres::Problem& problem_;
+  std::vector<ceres::ResidualBlockId> ids_;
   std::unordered_map<const double*, int> columns_;
   const int size_;
   BlockMatrix rest_;

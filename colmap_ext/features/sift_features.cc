@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 #include <opencv2/features2d.hpp>
 #include <opencv2/imgproc.hpp>
 #include <stdexcept>
@@ -43,18 +44,21 @@ Eigen::Vector2f LimitSize(int max_image_size, cv::Mat* image) {
   return scale;
 }
 
-// The largest ones first; equal sizes in an order that does not depend on the
-// detector's threads.
-void KeepLargest(size_t max_count, std::vector<cv::KeyPoint>* keypoints) {
-  const auto key = [](const cv::KeyPoint& keypoint) {
+// Indices of the largest ones, the largest first; equal sizes in an order that
+// does not depend on the detector's threads.
+std::vector<size_t> FindLargest(const std::vector<cv::KeyPoint>& keypoints,
+                                size_t max_count) {
+  const auto key = [&keypoints](size_t i) {
+    const cv::KeyPoint& keypoint = keypoints[i];
     return std::make_tuple(-keypoint.size, keypoint.pt.y, keypoint.pt.x,
                            keypoint.angle);
   };
-  std::sort(keypoints->begin(), keypoints->end(),
-            [&key](const cv::KeyPoint& a, const cv::KeyPoint& b) {
-              return key(a) < key(b);
-            });
-  if (keypoints->size() > max_count) keypoints->resize(max_count);
+  std::vector<size_t> indices(keypoints.size());
+  std::iota(indices.begin(), indices.end(), 0);
+  std::sort(indices.begin(), indices.end(),
+            [&key](size_t a, size_t b) { return key(a) < key(b); });
+  if (indices.size() > max_count) indices.resize(max_count);
+  return indices;
 }
 
 void WriteKeypoint(
@@ -94,18 +98,18 @@ SiftFeatures ExtractSiftFeatures(const SiftFeatureOptions& options,
       /*nfeatures=*/0, kScalesPerOctave, kContrastThreshold, kEdgeThreshold,
       kFirstSigma);
   std::vector<cv::KeyPoint> keypoints;
-  sift->detect(limited, keypoints);
-  KeepLargest(options.max_num_features, &keypoints);
   cv::Mat numbers;
-  if (!keypoints.empty()) sift->compute(limited, keypoints, numbers);
+  sift->detectAndCompute(limited, cv::noArray(), keypoints, numbers);
+  const std::vector<size_t> largest =
+      FindLargest(keypoints, options.max_num_features);
 
   SiftFeatures features;
-  features.keypoints.resize(keypoints.size(), Eigen::NoChange);
-  features.descriptors.resize(keypoints.size(), Eigen::NoChange);
-  for (size_t i = 0; i < keypoints.size(); ++i) {
-    WriteKeypoint(keypoints[i], scale, features.keypoints.row(i));
+  features.keypoints.resize(largest.size(), Eigen::NoChange);
+  features.descriptors.resize(largest.size(), Eigen::NoChange);
+  for (size_t i = 0; i < largest.size(); ++i) {
+    WriteKeypoint(keypoints[largest[i]], scale, features.keypoints.row(i));
     const Eigen::Map<const Eigen::Matrix<float, 1, 128>> descriptor(
-        numbers.ptr<float>(i));
+        numbers.ptr<float>(largest[i]));
     const float sum = std::max(descriptor.sum(), 1.0F);
     features.descriptors.row(i) =
         (descriptor / sum)

@@ -151,7 +151,8 @@ Status MapperStage::RunPart(int part_index) {
                             EffectiveNumThreads(options_.num_threads));
 }
 
-// Never throws: a part that fails has a report that says so.
+// A part that fails has a report that says so. Throws where memory or threads
+// are short.
 PartReport MapperStage::MapPart(int part_index, int num_threads,
                                 LocalMapResult* result) const {
   const std::vector<image_t>& part = summary_.plan.parts[part_index];
