@@ -4,6 +4,8 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Dense>
+#include <algorithm>
+#include <vector>
 
 #include "colmap_ext/bundle_adjustment/bundle_problem.h"
 #include "tests/testing/colmap_ext/bundle_world_problem.h"
@@ -11,8 +13,30 @@
 namespace adasfm {
 namespace {
 
+// The parameters that are not constant as the residuals name them first, then
+// the points.
+std::vector<double*> ListParameters(BundleProblem* bundle) {
+  ceres::Problem& problem = *bundle->CeresProblem();
+  std::vector<ceres::ResidualBlockId> ids;
+  problem.GetResidualBlocks(&ids);
+  std::vector<double*> listed, points;
+  for (const ceres::ResidualBlockId id : ids) {
+    std::vector<double*> blocks;
+    problem.GetParameterBlocksForResidualBlock(id, &blocks);
+    for (double* block : blocks) {
+      std::vector<double*>& list = bundle->IsPoint(block) ? points : listed;
+      if (!problem.IsParameterBlockConstant(block) &&
+          std::find(list.begin(), list.end(), block) == list.end()) {
+        list.push_back(block);
+      }
+    }
+  }
+  listed.insert(listed.end(), points.begin(), points.end());
+  return listed;
+}
+
 // The step and the covariance of all parameters but the points, from the whole
-// Jacobian, points last.
+// Jacobian.
 struct DenseSolution {
   Eigen::VectorXd step;
   Eigen::MatrixXd covariance;
@@ -20,17 +44,9 @@ struct DenseSolution {
 
 DenseSolution SolveDensely(BundleProblem* bundle, int size) {
   ceres::Problem& problem = *bundle->CeresProblem();
-  std::vector<double*> blocks, points;
   ceres::Problem::EvaluateOptions options;
   options.apply_loss_function = false;
-  problem.GetParameterBlocks(&blocks);
-  for (double* block : blocks) {
-    if (problem.IsParameterBlockConstant(block)) continue;
-    (bundle->IsPoint(block) ? points : options.parameter_blocks)
-        .push_back(block);
-  }
-  options.parameter_blocks.insert(options.parameter_blocks.end(),
-                                  points.begin(), points.end());
+  options.parameter_blocks = ListParameters(bundle);
   std::vector<double> residuals;
   ceres::CRSMatrix jacobian;
   problem.Evaluate(options, nullptr, &residuals, nullptr, &jacobian);
