@@ -32,7 +32,7 @@ struct FeatureOptions {
   // with it; poses need few hundred (docs/results/matching.md).
   int max_num_features = 2048;
   // "colmap": the host's SIFT; "opencv": OpenCV's on the CPU, with the host's
-  // settings in less than half of its time (features/sift_features.h).
+  // settings in a third of its time (features/sift_features.h).
   std::string extractor = "colmap";
   // -1: SIFT begins with the photo at twice its size, as COLMAP does; 0: as it
   // is, which takes a quarter of the time and finds fewer and larger features.
