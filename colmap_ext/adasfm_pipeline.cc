@@ -174,11 +174,15 @@ Status WriteGlobalResult(const GlobalStageOptions& options,
   return status;
 }
 
-// Raw matches stay in the database until they are needed.
+// Raw matches, which only their refinement reads, stay in the database until
+// then.
 StatusOr<GlobalStageResult> RunStage(const GlobalStageOptions& options,
                                      const std::string& database_path,
                                      SceneData* scene,
                                      const ProgressCallback& progress) {
+  if (!options.refinement.enabled) {
+    return RunGlobalStage(options, scene, progress);
+  }
   StatusOr<RawMatchSource> raw_matches = OpenRawMatches(database_path, *scene);
   if (!raw_matches.ok()) return raw_matches.status();
   try {

@@ -110,8 +110,8 @@ bool CoarsePoseEstimator::HasMetresEverywhere() const {
 
 // Returns the number of edges removed.
 int CoarsePoseEstimator::SplitWhereSizeIsUnknown() {
-  // Photos in any order have no parts that could stay apart, and rotations of
-  // an IMU confirm joins that vision alone leaves open.
+  // Photos in any order have no parts that could stay apart. With logs of any
+  // sensor parts stay together: of a phone's walk with an IMU most would go.
   if (!result_.loop_closures.joins_were_split || lengths_.lengths.empty() ||
       !priors_.empty() || HasMetresEverywhere()) {
     return 0;

@@ -117,7 +117,7 @@ class BalancedAdjustment {
     summary_.num_iterations += num_iterations;
   }
 
-  // Beyond, not even the adjustment factorises its equations.
+  // The linear system's factorisation has been timed on less than that only.
   bool IsSmallEnough() const {
     return static_cast<int>(problem_.images.size()) <=
            options_.max_num_images_sparse;

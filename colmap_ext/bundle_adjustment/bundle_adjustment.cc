@@ -82,8 +82,9 @@ std::vector<std::vector<int>> FindNeighbors(
     const std::set<image_t>& images,
     const colmap::Reconstruction& reconstruction) {
   std::unordered_map<image_t, int> index_of;
-  for (const image_t image_id : images)
+  for (const image_t image_id : images) {
     index_of.emplace(image_id, index_of.size());
+  }
   std::vector<std::vector<int>> neighbors(images.size());
   std::vector<int> last_seen_from(images.size(), -1);
   for (const image_t image_id : images) {
@@ -182,7 +183,7 @@ PosePriorEdge PosePriorEdgeFromPrior(const RelativePosePrior& prior) {
   // A motion that drowns in its own noise has no direction.
   if (edge.direction_sigma_rad > kMaxDirectionSigmaRad) {
     edge.direction_sigma_rad = std::numeric_limits<double>::infinity();
-    if (prior.HasDirection() && prior.HasLength()) {
+    if (prior.HasTranslation()) {
       edge.translation_sigma_m = sigma_or_infinity(covariance.trace() / 3.0);
       edge.length_sigma_m = std::numeric_limits<double>::infinity();
     }

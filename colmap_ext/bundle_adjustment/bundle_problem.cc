@@ -12,6 +12,7 @@
 #include "colmap_ext/host/pose_conversion.h"
 
 namespace adasfm {
+
 BundleProblem::BundleProblem(const PriorBundleAdjustmentOptions& options,
                              const PriorBundleAdjustmentProblem& problem,
                              const colmap::Reconstruction& reconstruction)

@@ -89,8 +89,7 @@ void AddOptions(PriorImportOptions* options, CommandOptions* command) {
       "when the machine never stands still, and its course (0 or 1)");
   add("visual_bias_sigma", &estimation->visual_bias_sigma,
       "what their scatter does not show when they are too poor for the rest "
-      "and "
-      "give the first value only, 1 sigma [rad/s]");
+      "and give the first value only, 1 sigma [rad/s]");
   add("estimate_time_shift", &estimation->estimate_time_shift,
       "add the time shift that vision and gyroscope agree on to the "
       "calibration's: 0, 1, or -1: when it is clear and at most 0.15 s");

@@ -63,7 +63,7 @@ void AddPriorResiduals(const SceneData& data,
           prior.covariance.topLeftCorner<3, 3>());
       if (chi2 >= 0.0) residuals->rotations.push_back(chi2);
     }
-    if (prior.HasDirection() && prior.HasLength()) {
+    if (prior.HasTranslation()) {
       const double chi2 =
           Chi2(motion.translation - prior.cam2_from_cam1.translation,
                prior.covariance.bottomRightCorner<3, 3>());

@@ -83,7 +83,7 @@ bool IsKnownMotion(const AugmentationOptions& options,
   }
   const double max_sigma_m = std::max(
       kMaxSigmaM, kMaxSigmaRatio * prior.cam2_from_cam1.translation.norm());
-  return !(prior.HasDirection() && prior.HasLength()) ||
+  return !prior.HasTranslation() ||
          std::sqrt(variances.tail<3>().maxCoeff()) <= max_sigma_m;
 }
 

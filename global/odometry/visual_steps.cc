@@ -232,7 +232,7 @@ VisualSteps AddVisualSteps(const VisualStepOptions& options,
   std::vector<RelativePosePrior*> standstills;
   std::map<ImagePair, double> known_lengths = known_lengths_m;
   for (RelativePosePrior& prior : steps.priors) {
-    if (prior.HasRotation() && prior.HasTranslation()) continue;
+    if (prior.HasMotion()) continue;
     const ImagePair pair(prior.image_id1, prior.image_id2);
     const int e = FindVisualEdge(graph, pair);
     if (e < 0) continue;

@@ -2,7 +2,9 @@
 #include "sensors/calibration_check/visual_bias.h"
 
 #include <Eigen/LU>
+#include <algorithm>
 #include <cmath>
+#include <limits>
 #include <vector>
 
 #include "core/median.h"
