@@ -49,8 +49,6 @@ class CoarsePoseEstimator {
   int SplitWhereSizeIsUnknown();
   int ReportUnverifiedJoins();
   int EstimateComponent(const std::vector<image_t>& images);
-  void MeasureDirectionAgreement(const GlobalPositions& positions,
-                                 CoarseComponent* component) const;
   int RemoveEdgesOffPositions();
   EdgeLengths EstimateLengths() const;
   std::map<ImagePair, double> KnownLengths() const;

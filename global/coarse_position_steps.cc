@@ -3,51 +3,10 @@
 #include <cmath>
 #include <utility>
 
-#include "core/median.h"
-#include "core/so3.h"
 #include "global/coarse_pose_estimator.h"
 #include "global/odometry/parts_of_one_unit.h"
 
 namespace adasfm {
-
-namespace {
-
-// An edge that vision gave a clear direction, and what the positions say of it:
-// C_1 - C_2.
-struct DirectedBaseline {
-  const ViewGraphEdge* edge;
-  Eigen::Vector3d baseline;
-};
-
-// Kept ones, and those off the rotations.
-std::vector<DirectedBaseline> FindBaselines(const ViewGraph& graph,
-                                            const GlobalPositions& positions,
-                                            double max_direction_sigma_rad) {
-  std::vector<DirectedBaseline> baselines;
-  for (const ViewGraphEdge& edge : graph.edges) {
-    const auto center1 = positions.centers.find(edge.image_id1);
-    const auto center2 = positions.centers.find(edge.image_id2);
-    if (center1 == positions.centers.end() ||
-        center2 == positions.centers.end() || !edge.has_translation ||
-        edge.source == EdgeSource::kSensor ||
-        edge.direction_sigma_rad > max_direction_sigma_rad ||
-        (!edge.IsKept() && edge.removal != EdgeRemoval::kRotation)) {
-      continue;
-    }
-    baselines.push_back({&edge, center1->second - center2->second});
-  }
-  return baselines;
-}
-
-double MedianLength(const std::vector<DirectedBaseline>& baselines) {
-  std::vector<double> lengths;
-  for (const DirectedBaseline& directed : baselines) {
-    lengths.push_back(directed.baseline.norm());
-  }
-  return UpperMedian(&lengths);
-}
-
-}  // namespace
 
 void CoarsePoseEstimator::EstimateTranslations() {
   RelativeTranslationReport report;
@@ -165,54 +124,9 @@ int CoarsePoseEstimator::EstimateComponent(const std::vector<image_t>& images) {
     component.cams_from_world[image_id] = CamFromWorldWithCenter(
         rotations_.at(image_id), positions.centers.at(image_id));
   }
-  MeasureDirectionAgreement(positions, &component);
-  component.positions_converged =
-      positions.converged &&
-      component.direction_agreement >= options_.min_direction_agreement &&
-      component.least_direction_agreement >=
-          options_.min_image_direction_agreement;
+  component.positions_converged = positions.converged;
   result_.components.push_back(std::move(component));
   return positions.num_iterations;
-}
-
-void CoarsePoseEstimator::MeasureDirectionAgreement(
-    const GlobalPositions& positions, CoarseComponent* component) const {
-  // Images with fewer edges say nothing of their surroundings.
-  constexpr int kMinNumEdges = 5;
-  // Beside the others' errors, an edge of a twentieth of the usual length (a
-  // car that creeps up to a red light) has any direction.
-  constexpr double kMinBaselineRatio = 0.05;
-  const double max_angle_rad = DegToRad(options_.max_agreeing_direction_deg);
-  const std::vector<DirectedBaseline> baselines =
-      FindBaselines(graph_, positions, max_angle_rad / 3.0);
-  const double min_length = kMinBaselineRatio * MedianLength(baselines);
-  std::map<image_t, std::pair<int, int>> by_image;
-  int num_edges = 0;
-  int num_agreeing = 0;
-  for (const auto& [edge, baseline] : baselines) {
-    if (baseline.norm() < min_length) continue;
-    ++num_edges;
-    const bool agrees =
-        edge->IsKept() &&
-        AngleBetweenRad(baseline, rotations_.at(edge->image_id2).conjugate() *
-                                      edge->cam2_from_cam1.translation) <=
-            max_angle_rad;
-    num_agreeing += agrees;
-    for (const image_t image_id : {edge->image_id1, edge->image_id2}) {
-      ++by_image[image_id].first;
-      by_image[image_id].second += agrees;
-    }
-  }
-  // Where vision has no direction, sensors alone decide.
-  component->direction_agreement =
-      num_edges == 0 ? 1.0 : static_cast<double>(num_agreeing) / num_edges;
-  component->least_direction_agreement = 1.0;
-  for (const auto& [image_id, counts] : by_image) {
-    if (counts.first < kMinNumEdges) continue;
-    component->least_direction_agreement =
-        std::min(component->least_direction_agreement,
-                 static_cast<double>(counts.second) / counts.first);
-  }
 }
 
 int CoarsePoseEstimator::RemoveEdgesOffPositions() {

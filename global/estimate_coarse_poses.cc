@@ -36,20 +36,6 @@ bool CoarsePoseOptions::IsValid(std::string* error) const {
              std::to_string(max_rotation_discrepancy_deg) + " must be > 0";
     return false;
   }
-  if (!(min_image_direction_agreement >= 0.0 &&
-        min_image_direction_agreement <= 1.0)) {
-    *error = "min_image_direction_agreement = " +
-             std::to_string(min_image_direction_agreement) +
-             " must be in [0, 1]";
-    return false;
-  }
-  if (!(min_direction_agreement >= 0.0 && min_direction_agreement <= 1.0) ||
-      !(max_agreeing_direction_deg > 0.0)) {
-    *error =
-        "min_direction_agreement = " + std::to_string(min_direction_agreement) +
-        " must be in [0, 1] and max_agreeing_direction_deg > 0";
-    return false;
-  }
   if (min_num_inliers < 0) {
     *error = "min_num_inliers = " + std::to_string(min_num_inliers) +
              " must be >= 0";

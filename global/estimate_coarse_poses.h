@@ -42,12 +42,6 @@ struct CoarsePoseOptions {
   AugmentationOptions augmentation;
   TranslationAveragingOptions positions;
   PositionFilterOptions position_filter;
-  // What positions must reach to count as converged, and the angle within
-  // which a direction agrees with them.
-  double min_direction_agreement = 0.8;
-  // An image beside a bend loses its edges to one side: half of them.
-  double min_image_direction_agreement = 0.7;
-  double max_agreeing_direction_deg = 3.0;
   // Least error granted to the odometry's rotation between two cameras (their
   // calibration, rolling shutter), added to its covariance.
   double min_predicted_rotation_sigma_deg = 0.05;
@@ -72,14 +66,7 @@ struct CoarseComponent {
   // In metres.
   bool metric = false;
   bool rotations_converged = false;
-  // The solver came to rest, and directions agree as the options demand.
   bool positions_converged = false;
-  // Share of the visual edges with a clear direction that fit the positions
-  // within max_agreeing_direction_deg; edges off the rotations do not.
-  double direction_agreement = 0.0;
-  // The same of the edges of one image, where it is least: a world bent by
-  // look-alike places fits nearly everywhere, but not where it is bent.
-  double least_direction_agreement = 0.0;
   double sdp_optimality = 0.0;
   // Where nothing tells look-alike places apart; none with odometry throughout.
   std::vector<UnverifiedJoin> unverified_joins;

@@ -109,8 +109,9 @@ Json ModelJson(const SceneData& scene, const CoarseComponent& component,
           {"gravity_aligned", model.gravity_aligned},
           {"rotations_converged", component.rotations_converged},
           {"positions_converged", component.positions_converged},
-          {"direction_agreement", component.direction_agreement},
-          {"least_direction_agreement", component.least_direction_agreement},
+          {"pairs_agree", model.pair_agreement.IsSound()},
+          {"pair_agreement", model.pair_agreement.share},
+          {"least_pair_agreement", model.pair_agreement.least_image_share},
           {"rotation_optimality", component.sdp_optimality},
           {"unverified_joins", JoinsJson(scene, component.unverified_joins)},
           {"adjustments", rounds}};
@@ -260,14 +261,14 @@ std::string FormatGlobalReportText(const GlobalStageResult& result,
     }
     const CoarseComponent& component = result.poses.components[i];
     if (!component.rotations_converged) text << ", rotations not converged";
-    if (!component.positions_converged) text << ", positions not converged";
+    if (!model.pair_agreement.IsSound()) text << ", contradicts vision";
     if (model.num_points == 0) {
       text << "; nothing but the sensors holds it\n";
       continue;
     }
-    text << "; directions agree to " << 100.0 * component.direction_agreement
+    text << "; pairs agree to " << 100.0 * model.pair_agreement.share
          << " %, at the worst image "
-         << 100.0 * component.least_direction_agreement << " %\n";
+         << 100.0 * model.pair_agreement.least_image_share << " %\n";
   }
   text << "Total: " << total_seconds << " s\n";
   return text.str();
@@ -285,6 +286,18 @@ std::vector<std::string> ListGlobalWarnings(const SceneData& scene,
         "a model of " + std::to_string(model.reconstruction.NumRegImages()) +
         " images is not georeferenced: " + model.positions.failure);
   }
+  for (const CoarseModel& model : result.models) {
+    if (model.pair_agreement.IsSound()) continue;
+    std::ostringstream text;
+    text << std::fixed << std::setprecision(0)
+         << "the coarse model contradicts vision: "
+         << 100.0 * model.pair_agreement.share
+         << " % of the pairs agree with it, at the worst image "
+         << 100.0 * model.pair_agreement.least_image_share
+         << " %; wrong pairs outvote right ones, or the overlap is small: "
+            "look at the report, add sensors or match more pairs";
+    warnings.push_back(text.str());
+  }
   const LoopClosureReport& loops = result.poses.loop_closures;
   for (const UnverifiedJoin& join : loops.unverified_joins) {
     if (loops.joins_were_split && join.num_pairs >= kMinNumReportedPairs) {
@@ -292,17 +305,6 @@ std::vector<std::string> ListGlobalWarnings(const SceneData& scene,
     }
   }
   for (const CoarseComponent& component : result.poses.components) {
-    if (!component.positions_converged) {
-      std::ostringstream text;
-      text << std::fixed << std::setprecision(0)
-           << "coarse positions did not converge: "
-           << 100.0 * component.direction_agreement
-           << " % of the directions agree with them, at the worst image "
-           << 100.0 * component.least_direction_agreement
-           << " %; wrong pairs outvote right ones, or the overlap is small: "
-              "look at the report, add sensors or match more pairs";
-      warnings.push_back(text.str());
-    }
     for (const UnverifiedJoin& join : component.unverified_joins) {
       std::ostringstream text;
       text << "a part of " << join.num_images

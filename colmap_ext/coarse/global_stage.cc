@@ -229,6 +229,7 @@ StatusOr<GlobalStageResult> RunGlobalStage(
   }
 
   // 2.8 Match refinement.
+  MeasurePairAgreements(options, scene, correspondences.bearings, &result);
   correspondences.matches.clear();
   ReleaseFreedMemory();
   if (options.refinement.enabled) {

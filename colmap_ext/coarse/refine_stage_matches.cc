@@ -133,6 +133,20 @@ void RefineRawMatches(const MatchRefinementOptions& options,
   }
 }
 
+void MeasurePairAgreements(
+    const GlobalStageOptions& options, const SceneData& scene,
+    const std::map<image_t, std::vector<Bearing>>& bearings,
+    GlobalStageResult* result) {
+  for (CoarseModel& model : result->models) {
+    model.pair_agreement = MeasurePairAgreement(
+        FitToNoise(options.refinement, model.reconstruction), scene,
+        result->poses.graph, CamsFromWorld(model.reconstruction),
+        model.cameras_refined
+            ? ComputeModelBearings(model.reconstruction, options.num_threads)
+            : bearings);
+  }
+}
+
 void RefineStageMatches(const GlobalStageOptions& options,
                         const SceneData& scene, const RawMatchSource& source,
                         const std::map<image_t, std::vector<Bearing>>& bearings,

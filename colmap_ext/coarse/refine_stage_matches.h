@@ -22,6 +22,13 @@ void RefineRawMatches(const MatchRefinementOptions& options,
                       const std::vector<const ScenePair*>& pairs,
                       MatchRefinementReport* total);
 
+// Measures how far the verified pairs agree with every model of the result, by
+// the noise of its keypoints.
+void MeasurePairAgreements(
+    const GlobalStageOptions& options, const SceneData& scene,
+    const std::map<image_t, std::vector<Bearing>>& bearings,
+    GlobalStageResult* result);
+
 // Step 8 of the coarse global stage: RefineRawMatches of the pairs within every
 // model of the result, under the model's poses and, where its adjustment has
 // refined them, its cameras (else the bearings of the scene). Fills the

@@ -105,13 +105,6 @@ void GlobalOptionAdder::AddPositions() {
   Add("max_num_position_iterations",
       &stage_->poses.positions.max_num_iterations,
       "iterations of the translation averaging");
-  Add("min_direction_agreement", &stage_->poses.min_direction_agreement,
-      "least share of directions that fit converged positions");
-  Add("min_image_direction_agreement",
-      &stage_->poses.min_image_direction_agreement,
-      "the same at the worst image");
-  Add("max_agreeing_direction_deg", &stage_->poses.max_agreeing_direction_deg,
-      "a direction fits within this angle [deg]");
 }
 
 void GlobalOptionAdder::AddStructure() {

@@ -42,6 +42,29 @@ double EpipolarError(const Bearing& bearing1, const Bearing& bearing2,
   return sum;
 }
 
+// With their errors [px]; none without a baseline, since there are no epipolar
+// lines. The errors do not depend on its length.
+std::vector<std::pair<double, FeatureMatch>> FindFittingMatches(
+    double max_epipolar_error_px, const Rigid3d& cam2_from_cam1,
+    const std::vector<Bearing>& bearings1,
+    const std::vector<Bearing>& bearings2,
+    const std::vector<FeatureMatch>& matches) {
+  std::vector<std::pair<double, FeatureMatch>> fitting;
+  const double baseline = cam2_from_cam1.translation.norm();
+  if (!(baseline > 0.0)) return fitting;
+  const Eigen::Matrix3d rotation = cam2_from_cam1.rotation.toRotationMatrix();
+  const Eigen::Vector3d translation = cam2_from_cam1.translation / baseline;
+  for (const FeatureMatch& match : matches) {
+    const double error_px =
+        EpipolarError(bearings1.at(match.point2D_idx1),
+                      bearings2.at(match.point2D_idx2), rotation, translation);
+    if (error_px <= max_epipolar_error_px) {
+      fitting.emplace_back(error_px, match);
+    }
+  }
+  return fitting;
+}
+
 // Each keypoint's best match; ties by index.
 std::vector<FeatureMatch> KeepBestPerKeypoint(
     std::vector<std::pair<double, FeatureMatch>> scored) {
@@ -72,25 +95,9 @@ void RefinePair(const MatchRefinementOptions& options,
     std::sort(pair->matches.begin(), pair->matches.end());
     return;
   }
-  const Eigen::Matrix3d rotation =
-      pair->cam2_from_cam1.rotation.toRotationMatrix();
-  // The distances do not depend on the baseline's length; without a baseline
-  // there are no epipolar lines.
-  const double baseline = pair->cam2_from_cam1.translation.norm();
-  std::vector<std::pair<double, FeatureMatch>> scored;
-  if (baseline > 0.0) {
-    const Eigen::Vector3d translation =
-        pair->cam2_from_cam1.translation / baseline;
-    for (const FeatureMatch& match : candidates) {
-      const double error_px = EpipolarError(bearings1.at(match.point2D_idx1),
-                                            bearings2.at(match.point2D_idx2),
-                                            rotation, translation);
-      if (error_px <= options.max_epipolar_error_px) {
-        scored.emplace_back(error_px, match);
-      }
-    }
-  }
-  pair->matches = KeepBestPerKeypoint(std::move(scored));
+  pair->matches = KeepBestPerKeypoint(
+      FindFittingMatches(options.max_epipolar_error_px, pair->cam2_from_cam1,
+                         bearings1, bearings2, candidates));
   pair->removed = pair->matches.size() < options.min_num_matches;
 }
 
@@ -101,6 +108,17 @@ bool MatchRefinementOptions::IsValid(std::string* error) const {
       .Positive("max_epipolar_error_px", max_epipolar_error_px)
       .AtLeast(0, "min_num_matches", min_num_matches)
       .AllHold();
+}
+
+int CountFittingMatches(double max_epipolar_error_px,
+                        const Rigid3d& cam2_from_cam1,
+                        const std::vector<Bearing>& bearings1,
+                        const std::vector<Bearing>& bearings2,
+                        const std::vector<FeatureMatch>& matches) {
+  return static_cast<int>(FindFittingMatches(max_epipolar_error_px,
+                                             cam2_from_cam1, bearings1,
+                                             bearings2, matches)
+                              .size());
 }
 
 MatchRefinementReport RefineMatches(

@@ -50,4 +50,11 @@ MatchRefinementReport RefineMatches(
     const std::map<image_t, std::vector<Bearing>>& bearings,
     const std::map<ImagePair, std::vector<FeatureMatch>>& candidates);
 
+// How many of the matches agree with one relative pose, as above.
+int CountFittingMatches(double max_epipolar_error_px,
+                        const Rigid3d& cam2_from_cam1,
+                        const std::vector<Bearing>& bearings1,
+                        const std::vector<Bearing>& bearings2,
+                        const std::vector<FeatureMatch>& matches);
+
 }  // namespace adasfm

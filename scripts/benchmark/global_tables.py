@@ -119,7 +119,7 @@ def run_variant(variant, folder, args):
                                         log_path))
     with open(os.path.join(coarse, 'summary.json')) as file:
       model = json.load(file)['models'][0]
-    record['unsuspected'] = (model['positions_converged'] and
+    record['unsuspected'] = (model['pairs_agree'] and
                              not model['unverified_joins'])
     if variant == 'as it is' and args.compare_pairs:
       record['pairs'] = evaluate_pairs(database, os.path.join(coarse, '0'),

@@ -43,7 +43,7 @@ def run_ours(folder, args, record):
     models = json.load(file)['models']
   record['coarse'] = [measure(os.path.join(coarse, str(k)), folder, args,
                               log_path) for k in range(len(models))]
-  record['suspected'] = [not model['positions_converged'] or
+  record['suspected'] = [not model['pairs_agree'] or
                          bool(model['unverified_joins']) for model in models]
   output = os.path.join(folder, 'model')
   run([args.colmap, 'adasfm_mapper', '--database_path', database,

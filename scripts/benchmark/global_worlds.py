@@ -144,7 +144,7 @@ def run_commands(row, folder, args, record):
     summary = json.load(file)
   model = summary['models'][0]
   record['joins_not_made'] = len(summary['joins']['not_made'])
-  record['converged'] = model['positions_converged']
+  record['converged'] = model['pairs_agree']
   record['unverified_joins'] = len(model['unverified_joins'])
   record['coarse'] = measure(os.path.join(coarse, '0'), folder, args, log_path)
   if args.run_mapper:
@@ -184,7 +184,7 @@ def describe(record):
   if 'error' in record:
     said.append(record['error'])
   if not record.get('converged', True):
-    said.append('not converged')
+    said.append('contradicts vision')
   if record.get('unverified_joins'):
     said.append('unverified joins')
   if record.get('joins_not_made'):

@@ -371,18 +371,18 @@ TEST(RunGlobalStageTest, ReportsEveryStep) {
   for (const StepReport& step : result.steps) {
     EXPECT_NE(json.find("\"" + step.name + "\""), std::string::npos);
   }
-  for (const char* figure : {"direction_agreement", "least_direction_agreement",
+  for (const char* figure : {"pairs_agree", "pair_agreement", "least_pair_agreement",
                              "rotation_optimality", "max_track_bytes"}) {
     EXPECT_NE(json.find("\"" + std::string(figure) + "\""), std::string::npos)
         << figure;
   }
   const std::string text = FormatGlobalReportText(result, 1.0);
   EXPECT_NE(text.find("60 images"), std::string::npos);
-  EXPECT_NE(text.find("directions agree to"), std::string::npos);
-  result.poses.components[0].positions_converged = false;
+  EXPECT_NE(text.find("pairs agree to"), std::string::npos);
+  result.models[0].pair_agreement.least_image_share = 0.5;
   const std::vector<std::string> warnings = ListGlobalWarnings(scene, result);
   ASSERT_EQ(warnings.size(), 1);
-  EXPECT_NE(warnings[0].find("did not converge"), std::string::npos);
+  EXPECT_NE(warnings[0].find("contradicts vision"), std::string::npos);
   EXPECT_NE(FormatGlobalReportJson(scene, result, 1.0).find(warnings[0]),
             std::string::npos);
 }
