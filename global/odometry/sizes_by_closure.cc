@@ -107,8 +107,8 @@ class ClosureProblem {
       return std::pow(sets_[ring_sets_[joint.set]].shape_sigma, 2) *
              joint.arm.squaredNorm();
     };
-    const double weight = 1.0 / (variance(a) + variance(b) +
-                                 std::pow(kPlaceSigma * extent_, 2));
+    const double weight =
+        1.0 / (variance(a) + variance(b) + std::pow(kPlaceSigma * extent_, 2));
     for (int axis = 0; axis < 3; ++axis) {
       const std::pair<int, double> row[] = {
           {kUnknowns * a.set, a.arm[axis]},

@@ -110,8 +110,8 @@ std::vector<int> LengthPropagation::FindUnitsOfKnownSize(
   std::vector<int> units;
   for (auto& [unit, values] : depths) {
     EdgeLength ratio;
-    if (values.size() >= kMinNumShared &&
-        LearnLength(&values, &ratio) && ratio.log_sigma <= kMaxSizeLogSigma) {
+    if (values.size() >= kMinNumShared && LearnLength(&values, &ratio) &&
+        ratio.log_sigma <= kMaxSizeLogSigma) {
       units.push_back(unit);
     }
   }

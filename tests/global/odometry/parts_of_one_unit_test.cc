@@ -48,8 +48,9 @@ std::vector<int> PartsOf(const TestScene& scene,
   const EdgeLengths lengths = EstimateEdgeLengths(
       options, scene.graph, known_lengths_m, scene.correspondences);
   return FindPartsOfOneUnit(
-      scene.graph, FindLengthUnits(options, scene.graph, known_lengths_m,
-                                   scene.correspondences, lengths),
+      scene.graph,
+      FindLengthUnits(options, scene.graph, known_lengths_m,
+                      scene.correspondences, lengths),
       {});
 }
 
@@ -129,9 +130,8 @@ TEST(FindPartsOfOneUnit, TwoImagesTieSizesAndOneDoesNot) {
 }
 
 // Units {1, 2, 3} and {4, 5, 6}, and bars of units of their own between them.
-Units BuildUnitsWithBars(
-    const std::vector<std::pair<image_t, image_t>>& bars,
-    const std::map<image_t, Eigen::Vector3d>& centers) {
+Units BuildUnitsWithBars(const std::vector<std::pair<image_t, image_t>>& bars,
+                         const std::map<image_t, Eigen::Vector3d>& centers) {
   Units world;
   for (const auto& [id1, id2, unit] :
        {std::make_tuple(1, 2, 0), std::make_tuple(2, 3, 0),
