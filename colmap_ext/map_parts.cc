@@ -21,7 +21,6 @@
 #include "colmap_ext/read_coarse_models.h"
 #include "colmap_ext/scene/georeference.h"
 #include "core/check_options.h"
-#include "core/prior_lengths.h"
 #include "core/sqlite.h"
 
 namespace adasfm {
@@ -158,9 +157,8 @@ void AlignCoarseModel(ComponentToMap* component,
   SceneData& data = component->data;
   if (data.positions.empty()) return;
   const CoarsePoseMap& coarse = component->coarse;
-  const bool is_metric = HasLengthsBetween(coarse, data.priors);
   const PositionAlignment alignment =
-      AlignSceneToPositions(data, coarse, is_metric);
+      AlignSceneToPositions(data, coarse, HasMetricPriors(data, coarse));
   component->initial_position_loss_scale = PositionLossScale(
       alignment, PriorBundleAdjustmentOptions().position_loss_scale, 0, 2);
   if (alignment.success) {

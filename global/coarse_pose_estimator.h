@@ -45,6 +45,8 @@ class CoarsePoseEstimator {
   std::vector<std::optional<RotationPrediction>> PredictFromRotations() const;
   void EstimateTranslations();
   void EstimatePositions();
+  std::vector<std::vector<image_t>> FindDirectedComponents() const;
+  GlobalPositions EstimatePositionsOf(const std::vector<image_t>& images) const;
   bool HasMetresEverywhere() const;
   int SplitWhereSizeIsUnknown();
   int ReportUnverifiedJoins();

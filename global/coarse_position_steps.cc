@@ -29,14 +29,9 @@ void CoarsePoseEstimator::EstimatePositions() {
   // bring the metres back.
   if (!options_.augmentation.use_metric_lengths) lengths_ = EdgeLengths();
   const int num_hinges = SplitWhereSizeIsUnknown();
-  ViewGraph directed = graph_;
-  for (ViewGraphEdge& edge : directed.edges) {
-    if (!edge.has_translation) edge.removal = EdgeRemoval::kTranslation;
-  }
   int num_images = 0;
   int num_iterations = 0;
-  for (const std::vector<image_t>& images : FindConnectedComponents(directed)) {
-    if (images.size() < 2) break;
+  for (const std::vector<image_t>& images : FindDirectedComponents()) {
     num_iterations += EstimateComponent(images);
   }
   for (const CoarseComponent& component : result_.components) {
@@ -55,6 +50,29 @@ void CoarsePoseEstimator::EstimatePositions() {
           std::to_string(num_joins) + " joins at one place only");
 }
 
+// Of the edges that have a direction; at least two images each.
+std::vector<std::vector<image_t>> CoarsePoseEstimator::FindDirectedComponents()
+    const {
+  ViewGraph directed = graph_;
+  for (ViewGraphEdge& edge : directed.edges) {
+    if (!edge.has_translation) edge.removal = EdgeRemoval::kTranslation;
+  }
+  std::vector<std::vector<image_t>> components =
+      FindConnectedComponents(directed);
+  while (!components.empty() && components.back().size() < 2) {
+    components.pop_back();
+  }
+  return components;
+}
+
+GlobalPositions CoarsePoseEstimator::EstimatePositionsOf(
+    const std::vector<image_t>& images) const {
+  const ViewGraph subgraph = ExtractSubgraph(graph_, images);
+  return EstimateGlobalPositions(options_.positions, subgraph, rotations_,
+                                 SelectLengths(subgraph),
+                                 StartFromChain(images));
+}
+
 // Then all is of one size.
 bool CoarsePoseEstimator::HasMetresEverywhere() const {
   std::vector<bool> has_metres(graph_.images.size(), false);
@@ -69,15 +87,21 @@ bool CoarsePoseEstimator::HasMetresEverywhere() const {
 
 // Returns the number of edges removed.
 int CoarsePoseEstimator::SplitWhereSizeIsUnknown() {
-  // Photos in any order have no parts that could stay apart. With logs of any
-  // sensor parts stay together: of a phone's walk with an IMU most would go.
+  // Photos in any order have no parts that could stay apart.
   if (!result_.loop_closures.joins_were_split || lengths_.lengths.empty() ||
-      !priors_.empty() || HasMetresEverywhere()) {
+      HasMetresEverywhere()) {
     return 0;
   }
+  std::map<image_t, Eigen::Vector3d> centers;
+  for (const std::vector<image_t>& images : FindDirectedComponents()) {
+    const GlobalPositions positions = EstimatePositionsOf(images);
+    centers.insert(positions.centers.begin(), positions.centers.end());
+  }
   const std::vector<int> part_of = FindPartsOfOneUnit(
-      graph_, FindLengthUnits(options_.lengths, graph_, KnownLengths(),
-                              correspondences_, lengths_));
+      graph_,
+      FindLengthUnits(options_.lengths, graph_, KnownLengths(),
+                      correspondences_, lengths_),
+      centers);
   int num_removed = 0;
   for (ViewGraphEdge& edge : graph_.edges) {
     if (!edge.IsKept() || part_of[graph_.IndexOf(edge.image_id1)] ==
@@ -111,10 +135,7 @@ int CoarsePoseEstimator::ReportUnverifiedJoins() {
 
 // Returns the number of iterations.
 int CoarsePoseEstimator::EstimateComponent(const std::vector<image_t>& images) {
-  const ViewGraph subgraph = ExtractSubgraph(graph_, images);
-  const GlobalPositions positions =
-      EstimateGlobalPositions(options_.positions, subgraph, rotations_,
-                              SelectLengths(subgraph), StartFromChain(images));
+  const GlobalPositions positions = EstimatePositionsOf(images);
   if (!positions.success) return positions.num_iterations;
   CoarseComponent component;
   component.metric = positions.metric;

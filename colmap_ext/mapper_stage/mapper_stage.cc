@@ -16,9 +16,9 @@
 #include "colmap_ext/mapper_stage/mapper_steps.h"
 #include "colmap_ext/mapper_stage/model_checkpoint.h"
 #include "colmap_ext/mapper_stage/part_memory.h"
+#include "colmap_ext/scene/georeference.h"
 #include "core/option_checker.h"
 #include "core/parallel.h"
-#include "core/prior_lengths.h"
 #include "core/release_memory.h"
 
 namespace adasfm {
@@ -82,8 +82,7 @@ MapperStage::MapperStage(const MapperStageOptions& options,
       part_mapper_(std::move(part_mapper)) {
   std::string error;
   if (!options.IsValid(&error)) throw std::invalid_argument(error);
-  summary_.has_metric_sensors = HasLengthsBetween(coarse, data.priors) ||
-                                HasLengthsBetween(coarse, data.frame_priors);
+  summary_.has_metric_sensors = HasMetricPriors(data, coarse);
   summary_.is_georeferenced = !data.positions.empty();
   summary_.is_metric = summary_.has_metric_sensors || summary_.is_georeferenced;
 }

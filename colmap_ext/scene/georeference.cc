@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "colmap_ext/scene/align_to_gravity.h"
+#include "core/prior_lengths.h"
 #include "core/so3.h"
 
 namespace adasfm {
@@ -18,6 +19,12 @@ constexpr double kDriveUprightSigmaRad = DegToRad(10.0);
 constexpr double kNarrowLossSigmas = 4.0;
 
 }  // namespace
+
+bool HasMetricPriors(const SceneData& scene,
+                     const std::map<image_t, Rigid3d>& cams_from_world) {
+  return HasLengthsBetween(cams_from_world, scene.priors) ||
+         HasLengthsBetween(cams_from_world, scene.frame_priors);
+}
 
 PositionAlignment AlignSceneToPositions(
     const SceneData& scene, const std::map<image_t, Rigid3d>& cams_from_world,

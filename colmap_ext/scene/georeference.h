@@ -9,6 +9,11 @@
 
 namespace adasfm {
 
+// Whether priors between images of the poses tell the metre: those of sensors,
+// or those within the frames of a rig.
+bool HasMetricPriors(const SceneData& scene,
+                     const std::map<image_t, Rigid3d>& cams_from_world);
+
 // AlignToPositions for poses of the scene's images with the scene's positions
 // and gravity. The cameras are turned by camera_mount against the scene's
 // gravity directions (CameraMountReport).

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 #include <map>
+#include <optional>
 #include <queue>
 #include <set>
 #include <tuple>
@@ -12,6 +13,7 @@
 
 #include "core/disjoint_sets.h"
 #include "global/odometry/length_propagation.h"
+#include "global/odometry/sizes_by_closure.h"
 
 namespace adasfm {
 namespace {
@@ -19,9 +21,10 @@ namespace {
 // Sets of images, by image: which sets it is in.
 using Memberships = std::vector<std::set<int>>;
 
-// One set per unit, the first one of metres.
+// One set per unit, the first one of metres. shape_sigmas: by set, how well the
+// best of its directions is known.
 Memberships CollectUnits(const ViewGraph& graph, const std::vector<int>& units,
-                         int* num_sets) {
+                         std::vector<double>* shape_sigmas) {
   Memberships sets_of(graph.images.size());
   std::map<int, int> set_of_unit;
   const auto number = [&set_of_unit](int unit) {
@@ -30,7 +33,10 @@ Memberships CollectUnits(const ViewGraph& graph, const std::vector<int>& units,
   };
   constexpr int kMetres = -1;
   number(kMetres);
+  shape_sigmas->assign(graph.edges.size() + 1, 1.0);
   const auto add = [&](const ViewGraphEdge& edge, int set) {
+    double& sigma = (*shape_sigmas)[set];
+    sigma = std::min(sigma, edge.direction_sigma_rad);
     sets_of[graph.IndexOf(edge.image_id1)].insert(set);
     sets_of[graph.IndexOf(edge.image_id2)].insert(set);
   };
@@ -40,8 +46,17 @@ Memberships CollectUnits(const ViewGraph& graph, const std::vector<int>& units,
     if (edge.length_m) add(edge, number(kMetres));
     if (units[e] >= 0) add(edge, number(units[e]));
   }
-  *num_sets = static_cast<int>(set_of_unit.size());
+  shape_sigmas->resize(set_of_unit.size());
   return sets_of;
+}
+
+// Images of joined sets are those of the first of them.
+void TakeRoots(DisjointSets* joined, Memberships* sets_of) {
+  for (std::set<int>& sets : *sets_of) {
+    std::set<int> roots;
+    for (const int set : sets) roots.insert(joined->Find(set));
+    sets = std::move(roots);
+  }
 }
 
 // Joins sets that share two images. Returns whether there were any.
@@ -61,12 +76,31 @@ bool JoinSetsOfOneSize(Memberships* sets_of, int num_sets) {
     any = true;
     joined.Join(pair.second, pair.first);
   }
-  for (std::set<int>& sets : *sets_of) {
-    std::set<int> roots;
-    for (const int set : sets) roots.insert(joined.Find(set));
-    sets = std::move(roots);
-  }
+  TakeRoots(&joined, sets_of);
   return any;
+}
+
+// The least error of a shape, as a share of its extent: that of a direction
+// known to 0.3 deg.
+constexpr double kMinShapeSigma = 0.005;
+
+// Joins sets whose sizes rings of sets tell. Returns whether there were any.
+bool JoinSetsByClosure(
+    const std::vector<double>& shape_sigmas,
+    const std::vector<std::optional<Eigen::Vector3d>>& centers,
+    Memberships* sets_of) {
+  std::vector<SizedSet> sets(shape_sigmas.size());
+  for (size_t i = 0; i < sets_of->size(); ++i) {
+    for (const int set : (*sets_of)[i]) sets[set].images.push_back(i);
+  }
+  for (size_t k = 0; k < sets.size(); ++k) {
+    sets[k].shape_sigma = std::max(kMinShapeSigma, shape_sigmas[k]);
+  }
+  DisjointSets joined(static_cast<int>(sets.size()));
+  const auto pairs = FindSizesByClosure(sets, centers);
+  for (const auto& [a, b] : pairs) joined.Join(b, a);
+  TakeRoots(&joined, sets_of);
+  return !pairs.empty();
 }
 
 // The largest of the sets that an image is in; -1 where there is none.
@@ -147,11 +181,20 @@ std::vector<int> FindLengthUnits(
   return propagation.FindUnits();
 }
 
-std::vector<int> FindPartsOfOneUnit(const ViewGraph& graph,
-                                    const std::vector<int>& units) {
-  int num_sets = 0;
-  Memberships sets_of = CollectUnits(graph, units, &num_sets);
-  while (JoinSetsOfOneSize(&sets_of, num_sets)) {
+std::vector<int> FindPartsOfOneUnit(
+    const ViewGraph& graph, const std::vector<int>& units,
+    const std::map<image_t, Eigen::Vector3d>& centers) {
+  std::vector<std::optional<Eigen::Vector3d>> center_of;
+  for (const image_t image : graph.images) {
+    const auto center = centers.find(image);
+    center_of.emplace_back();
+    if (center != centers.end()) center_of.back() = center->second;
+  }
+  std::vector<double> shape_sigmas;
+  Memberships sets_of = CollectUnits(graph, units, &shape_sigmas);
+  const int num_sets = static_cast<int>(shape_sigmas.size());
+  while (JoinSetsOfOneSize(&sets_of, num_sets) ||
+         JoinSetsByClosure(shape_sigmas, center_of, &sets_of)) {
   }
   std::vector<int> part_of = ChooseLargest(sets_of, num_sets);
   JoinTheRest(graph, &part_of);

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <Eigen/Core>
 #include <map>
 #include <vector>
 
@@ -23,15 +24,18 @@ std::vector<int> FindLengthUnits(
 // camera turns on the spot and no keypoint is seen both before and behind, or
 // an image hangs on one pair, directions and rotations tie two parts together
 // while nothing tells how large one is against the other.
-// Inputs: the graph; units: by edge, of FindLengthUnits.
+// Inputs: the graph; units: by edge, of FindLengthUnits; centers: of images,
+// as they come out when all is taken for one part.
 // Method. The images of the edges of one unit are rigid but for their size.
-// Two of these sets that share two images are of one size. Edges with metres
+// Two of these sets that share two images are of one size, as are those that
+// closed rings of sets tell (sizes_by_closure.h). Edges with metres
 // (ViewGraphEdge::length_m) are one set. Sets that share one image only are
 // hinged there: the image goes to the larger one. Images that no such edge
 // reaches join the part that they share the most inliers with.
 // Returns a part for each image of the graph, named by the smallest index of
 // its images. On failure: nothing to fail.
-std::vector<int> FindPartsOfOneUnit(const ViewGraph& graph,
-                                    const std::vector<int>& units);
+std::vector<int> FindPartsOfOneUnit(
+    const ViewGraph& graph, const std::vector<int>& units,
+    const std::map<image_t, Eigen::Vector3d>& centers);
 
 }  // namespace adasfm

@@ -82,9 +82,11 @@ bool LengthPropagation::LearnFromStart(int edge) {
 
 std::vector<int> LengthPropagation::FindUnitsOfKnownSize(
     int edge, DisjointSets* sets) const {
-  // A lane of 10 m then errs by half a metre. A few wrong matches agree by
-  // chance, hence the larger number of keypoints.
+  // A lane of 10 m then errs by half a metre.
   constexpr double kMaxSizeLogSigma = 0.05;
+  // A few wrong matches agree by chance; the spread of so many keypoints tells
+  // the sigma to a third.
+  constexpr size_t kMinNumShared = 12;
   // By unit: how the depths of the keypoints compare with the edge's own.
   std::map<int, std::vector<WeightedValue>> depths;
   for (size_t o = edge_begin_[edge]; o < edge_begin_[edge + 1]; ++o) {
@@ -108,8 +110,8 @@ std::vector<int> LengthPropagation::FindUnitsOfKnownSize(
   std::vector<int> units;
   for (auto& [unit, values] : depths) {
     EdgeLength ratio;
-    if (static_cast<int>(values.size()) >= options_.num_shared_reliable &&
-        LearnLength(&values, &ratio) && ratio.log_sigma <= kMaxSizeLogSigma) {
+    if (values.size() >= kMinNumShared && LearnLength(&values, &ratio) &&
+        ratio.log_sigma <= kMaxSizeLogSigma) {
       units.push_back(unit);
     }
   }

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 
+#include "global/estimate_coarse_poses.h"
 #include "global/odometry/edge_lengths.h"
 #include "tests/testing/global/test_scene.h"
 
@@ -47,8 +48,10 @@ std::vector<int> PartsOf(const TestScene& scene,
   const EdgeLengths lengths = EstimateEdgeLengths(
       options, scene.graph, known_lengths_m, scene.correspondences);
   return FindPartsOfOneUnit(
-      scene.graph, FindLengthUnits(options, scene.graph, known_lengths_m,
-                                   scene.correspondences, lengths));
+      scene.graph,
+      FindLengthUnits(options, scene.graph, known_lengths_m,
+                      scene.correspondences, lengths),
+      {});
 }
 
 TEST(FindPartsOfOneUnit, SharedLandmarksTieSizes) {
@@ -70,6 +73,24 @@ TEST(FindPartsOfOneUnit, MetresOnBothSidesTieSizes) {
             std::vector<int>({0, 0, 0, 0, 0, 5, 5, 5, 5}));
 }
 
+// The rotations of an IMU tie the two sides of the hinge no better.
+TEST(FindPartsOfOneUnit, CoarsePosesSplitAtAHingeWithAnImuToo) {
+  Random random(1);
+  for (const bool shares_landmarks : {true, false}) {
+    const TestScene scene = BuildHingedScene(shares_landmarks);
+    std::vector<RelativePosePrior> priors;
+    for (image_t id = 1; id < kNumImages; ++id) {
+      const Rigid3d motion = scene.cams_from_world.at(id + 1) *
+                             scene.cams_from_world.at(id).Inverse();
+      priors.push_back(BuildPrior(id, id + 1, motion, 1e-3, 0.1, &random));
+      priors.back().flags = kPriorRotation;
+    }
+    const CoarsePoses poses = EstimateCoarsePoses(
+        CoarsePoseOptions(), scene.graph, scene.correspondences, priors);
+    EXPECT_EQ(poses.components.size(), shares_landmarks ? 1 : 2);
+  }
+}
+
 // By hand: units {1, 2, 3}, {3, 4, 5}, and an image that no length reaches.
 class Units {
  public:
@@ -83,10 +104,13 @@ class Units {
     graph.images.erase(std::unique(graph.images.begin(), graph.images.end()),
                        graph.images.end());
   }
-  std::vector<int> Parts() const { return FindPartsOfOneUnit(graph, units); }
+  std::vector<int> Parts() const {
+    return FindPartsOfOneUnit(graph, units, centers);
+  }
 
   ViewGraph graph;
   std::vector<int> units;
+  std::map<image_t, Eigen::Vector3d> centers;
 };
 
 TEST(FindPartsOfOneUnit, TwoImagesTieSizesAndOneDoesNot) {
@@ -103,6 +127,68 @@ TEST(FindPartsOfOneUnit, TwoImagesTieSizesAndOneDoesNot) {
   EXPECT_EQ(world.Parts(), std::vector<int>({0, 0, 0, 3, 3}));
   world.Add(2, 4, 2);
   EXPECT_EQ(world.Parts(), std::vector<int>(5, 0));
+}
+
+// Units {1, 2, 3} and {4, 5, 6}, and bars of units of their own between them.
+Units BuildUnitsWithBars(const std::vector<std::pair<image_t, image_t>>& bars,
+                         const std::map<image_t, Eigen::Vector3d>& centers) {
+  Units world;
+  for (const auto& [id1, id2, unit] :
+       {std::make_tuple(1, 2, 0), std::make_tuple(2, 3, 0),
+        std::make_tuple(4, 5, 1), std::make_tuple(5, 6, 1)}) {
+    world.Add(id1, id2, unit);
+  }
+  for (const auto& [id1, id2] : bars) {
+    world.Add(id1, id2, 2 + static_cast<int>(world.units.size()));
+  }
+  for (ViewGraphEdge& edge : world.graph.edges) {
+    edge.direction_sigma_rad = 0.005;
+  }
+  world.centers = centers;
+  return world;
+}
+
+//   3 ---- 6
+//   2     / 5    with 3 - 4 a diagonal: the triangle 3, 4, 6 is closed.
+//   1     4
+TEST(FindPartsOfOneUnit, AClosedTriangleOfUnitsTiesTheirSizes) {
+  std::map<image_t, Eigen::Vector3d> centers;
+  for (int i = 0; i < 3; ++i) {
+    centers[1 + i] = Eigen::Vector3d(0.0, i, 0.0);
+    centers[4 + i] = Eigen::Vector3d(3.0 + 0.5 * i, i, 0.0);
+  }
+  EXPECT_EQ(BuildUnitsWithBars({{3, 6}}, centers).Parts(),
+            std::vector<int>({0, 0, 0, 3, 3, 3}));
+  // The bars are of the second unit's size, the first is hinged at image 3.
+  EXPECT_EQ(BuildUnitsWithBars({{3, 6}, {3, 4}}, centers).Parts(),
+            std::vector<int>({0, 0, 2, 2, 2, 2}));
+  // A third bar, which meets the first unit elsewhere, closes one more.
+  EXPECT_EQ(BuildUnitsWithBars({{3, 6}, {3, 4}, {1, 4}}, centers).Parts(),
+            std::vector<int>(6, 0));
+}
+
+// Four bars of four directions in a plane change their sizes freely, out of it
+// they do not.
+TEST(FindPartsOfOneUnit, ARingOfFourTiesSizesOutOfItsPlaneOnly) {
+  std::map<image_t, Eigen::Vector3d> centers;
+  for (int i = 0; i < 3; ++i) {
+    centers[1 + i] = Eigen::Vector3d(0.0, i, 0.0);
+    centers[4 + i] = Eigen::Vector3d(3.0 + 0.5 * i, 0.5 + i, 0.0);
+  }
+  EXPECT_EQ(BuildUnitsWithBars({{1, 4}, {3, 6}}, centers).Parts(),
+            std::vector<int>({0, 0, 0, 3, 3, 3}));
+  centers[6].z() = 3.0;
+  centers[4].z() = -1.0;
+  EXPECT_EQ(BuildUnitsWithBars({{1, 4}, {3, 6}}, centers).Parts(),
+            std::vector<int>(6, 0));
+}
+
+// A triangle of one line has sizes in every proportion.
+TEST(FindPartsOfOneUnit, ARingInOneLineTiesNothing) {
+  std::map<image_t, Eigen::Vector3d> centers;
+  for (int i = 1; i <= 6; ++i) centers[i] = Eigen::Vector3d(i, 0.0, 0.0);
+  EXPECT_EQ(BuildUnitsWithBars({{1, 4}, {3, 6}}, centers).Parts(),
+            std::vector<int>({0, 0, 0, 3, 3, 3}));
 }
 
 TEST(FindPartsOfOneUnit, ImagesWithoutALengthJoinTheirStrongestNeighbour) {
