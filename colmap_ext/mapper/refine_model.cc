@@ -12,6 +12,7 @@
 #include "colmap_ext/mapper/prior_support.h"
 #include "colmap_ext/mapper/register_image.h"
 #include "colmap_ext/scene/georeference.h"
+#include "core/release_memory.h"
 
 namespace adasfm {
 namespace {
@@ -58,6 +59,8 @@ class ModelRefiner {
 
   void AdjustFinely() {
     scene_.mapper.CompleteAndMergeTracks(local_.filter_max_reproj_error_px);
+    scene_.mapper.ReleaseMatches();
+    ReleaseFreedMemory();
     summary_.keypoint_sigma_factor = 1.0;
     Adjust(25, 1e-6, FindPriors(), &summary_.keypoint_sigma_factor);
     Filter(local_.filter_max_reproj_error_px);

@@ -75,6 +75,8 @@ using PartMapper = std::function<LocalMapResult(
     const LocalMapperOptions&, const SceneData&, const CoarsePoseMap&,
     const std::set<image_t>&)>;
 
+struct MergeCheckpoint;
+
 // The mapper stage on a folder (design 7.3 to 7.5, 10). Every step leaves its
 // result in output_path/checkpoints, complete or not at all, with a fingerprint
 // of what it was made from; a step whose result is there is not done again.
@@ -123,8 +125,8 @@ class MapperStage {
   Status ReadPartReports(bool require_all_parts);
   Status MergePartModels(const std::string& fingerprint);
   std::unique_ptr<MapperScene> BuildWholeScene() const;
-  Status RefineMerged(const std::string& fingerprint, int num_done,
-                      std::unique_ptr<MapperScene>* scene);
+  // Takes the merged model through the rounds that are left.
+  Status RefineMerged(const std::string& fingerprint, MergeCheckpoint* merged);
   // So that the result is never worse than the prior trajectory.
   void FallBackToCoarsePoses(std::unique_ptr<MapperScene>* scene);
 
