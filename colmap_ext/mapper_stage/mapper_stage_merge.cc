@@ -130,6 +130,11 @@ void MapperStage::FallBackToCoarsePoses(std::unique_ptr<MapperScene>* scene) {
   options.join_parts = false;
   RefineModelSummary refined;
   for (int round = 1; round <= kNumRefinementRounds; ++round) {
+    if (round > 1) {
+      auto next = BuildMapperScene(data_, coarse_, (*scene)->images);
+      PutIntoScene(coarse_scene->reconstruction, next.get());
+      coarse_scene = std::move(next);
+    }
     RefineModel(options, options_.local, round, coarse_scene.get(), &refined);
   }
   if (CountTorn(*coarse_scene) >= num_torn) return;
