@@ -33,7 +33,8 @@ struct MapperStageOptions {
   // threads and as fit into the memory.
   int max_num_parallel_parts = -1;
   // For the parts that run at the same time, in GB (1e9 bytes); -1: 70 % of
-  // what the machine has available when they begin. One part always runs.
+  // what the machine has available when they begin. One part always runs;
+  // MapParts does not begin a model whose refinement is estimated to take more.
   double max_memory_gb = -1.0;
 
   bool IsValid(std::string* error) const;
