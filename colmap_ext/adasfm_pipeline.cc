@@ -20,6 +20,7 @@
 #include "colmap_ext/io/folder_lock.h"
 #include "colmap_ext/io/georeference_file.h"
 #include "colmap_ext/io/output_files.h"
+#include "colmap_ext/stage_memory.h"
 #include "core/check_options.h"
 #include "core/so3.h"
 #include "core/sqlite.h"
@@ -197,10 +198,17 @@ StatusOr<GlobalStageResult> RunStage(const GlobalStageOptions& options,
 StatusOr<PriorImport> ImportPriors(const PriorImportOptions& options,
                                    const PriorImportPaths& paths,
                                    const std::string& summary_path) {
+  std::vector<std::string> warnings;
+  Status status = CheckMemory(EstimateImportMemoryBytes(paths),
+                              options.max_memory_gb,
+                              "AdaSfmPriors.max_memory_gb", &warnings);
+  if (!status.ok()) return status;
   StatusOr<PriorImport> import = ComputePriorImport(paths, options);
   if (!import.ok()) return import;
+  import->warnings.insert(import->warnings.begin(), warnings.begin(),
+                          warnings.end());
   // The database comes last: an error before leaves it as it was.
-  Status status =
+  status =
       WriteTextFile(summary_path, PriorImportToJson(*import) + "\n");
   if (status.ok()) {
     status = WritePriorTables(paths.database_path, import->tables);
@@ -223,6 +231,12 @@ StatusOr<CoarseModelReport> EstimateCoarseModel(
     status = CheckGlobalPaths(options, database_path, output_path);
   }
   if (!status.ok()) return status;
+  CoarseModelReport report;
+  const StatusOr<SceneSize> size = MeasureScene(database_path);
+  if (!size.ok()) return size.status();
+  status = CheckMemory(EstimateGlobalMemoryBytes(*size), options.max_memory_gb,
+                       "AdaSfmGlobal.max_memory_gb", &report.warnings);
+  if (!status.ok()) return status;
   const auto lock =
       FolderLock::Acquire(output_path, FolderLock::Mode::kExclusive);
   if (!lock.ok()) return lock.status();
@@ -240,8 +254,8 @@ StatusOr<CoarseModelReport> EstimateCoarseModel(
   if (!status.ok()) return status;
   const StepReport reading = {"reading", seconds(), text.str()};
 
-  CoarseModelReport report;
-  report.warnings = scene->warnings;
+  report.warnings.insert(report.warnings.end(), scene->warnings.begin(),
+                         scene->warnings.end());
   const StatusOr<ModelFrames> frames =
       ReadModelFrames(database_path, *scene, &report.warnings);
   if (!frames.ok()) return frames.status();

@@ -20,6 +20,7 @@
 #include "colmap_ext/mapper_stage/map_components.h"
 #include "colmap_ext/read_coarse_models.h"
 #include "colmap_ext/scene/georeference.h"
+#include "colmap_ext/stage_memory.h"
 #include "core/check_options.h"
 #include "core/sqlite.h"
 
@@ -52,6 +53,19 @@ StatusOr<std::vector<std::shared_ptr<FolderLock>>> LockMapFolder(
       ".adasfm_part_" + std::to_string(request.part_index) + ".lock");
   if (!part.ok()) return part.status();
   return std::vector<std::shared_ptr<FolderLock>>{*whole, *part};
+}
+
+Status CheckMergeMemory(const MapOptions& options, const MapRequest& request,
+                        std::vector<std::string>* warnings) {
+  if (request.steps != MapperSteps::kAll &&
+      request.steps != MapperSteps::kMerge) {
+    return Status::Ok();
+  }
+  const StatusOr<SceneSize> size = MeasureScene(request.database_path);
+  if (!size.ok()) return size.status();
+  return CheckMemory(EstimateMergeMemoryBytes(*size),
+                     options.stage.max_memory_gb, "AdaSfmMapper.max_memory_gb",
+                     warnings);
 }
 
 // What a stage wrote about itself; empty when it left no summary.
@@ -243,13 +257,15 @@ StatusOr<MapReport> MapParts(const MapOptions& options,
   Status status = CheckOptions(options);
   if (status.ok()) status = CheckMapPaths(request);
   if (!status.ok()) return status;
+  MapReport report;
+  status = CheckMergeMemory(options, request, &report.warnings);
+  if (!status.ok()) return status;
   const auto locks = LockMapFolder(request);
   if (!locks.ok()) return locks.status();
   StatusOr<SceneData> scene = ReadSceneData(request.database_path, {});
   if (!scene.ok()) return scene.status();
   status = CheckHasMatches(request.database_path, *scene);
   if (!status.ok()) return status;
-  MapReport report;
   const MapperStageOptions stage_options = ResolveOptions(options, *scene);
   const bool has_priors = !scene->priors.empty() || !scene->positions.empty() ||
                           !scene->frame_priors.empty();
@@ -264,7 +280,8 @@ StatusOr<MapReport> MapParts(const MapOptions& options,
     CompleteRigs(component.coarse, &component.data);
     AlignCoarseModel(&component, &coarse->warnings);
   }
-  report.warnings = coarse->warnings;
+  report.warnings.insert(report.warnings.end(), coarse->warnings.begin(),
+                         coarse->warnings.end());
   if (!has_priors) report.warnings.push_back(kNoPriorsWarning);
   report.warnings.insert(report.warnings.end(), frame_warnings.begin(),
                          frame_warnings.end());

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <memory>
 #include <optional>
 #include <stdexcept>
 
@@ -105,7 +106,7 @@ class BalancedAdjustment {
     options_.function_tolerance = function_tolerance;
     options_.keypoint_sigma_px = given_.keypoint_sigma_px * factor_;
     is_final_ = function_tolerance == given_.function_tolerance;
-    system_ = ReducedSystem();
+    system_.reset();
     Add(AdjustBundle(options_, problem_, &reconstruction_,
                      NeedsSystem() ? &system_ : nullptr));
     return summary_.success;
@@ -152,7 +153,7 @@ class BalancedAdjustment {
     options.max_num_iterations = kNumIterationsBeforeSigmas;
     Add(AdjustBundle(options, problem_, &reconstruction_, &system_));
     if (!summary_.success) return;
-    LinearAdjustment linear(system_, problem_.priors, options.prior_loss_scale);
+    LinearAdjustment linear(*system_, problem_.priors, options.prior_loss_scale);
     const std::optional<PriorSigmaEstimate> estimate =
         EstimatePriorSigmas(&linear);
     if (!estimate) return;
@@ -191,8 +192,8 @@ class BalancedAdjustment {
   void DescribePriors() {
     summary_.priors_in_balance =
         LargestMeanSquare(Components()) <= balance_.max_mean_square;
-    if (system_.rest.rows() > 0) {
-      LinearAdjustment linear(system_, problem_.priors,
+    if (system_) {
+      LinearAdjustment linear(*system_, problem_.priors,
                               options_.prior_loss_scale);
       linear.Solve({1.0, 1.0, 1.0, 1.0}, &components_);
     }
@@ -208,7 +209,7 @@ class BalancedAdjustment {
   colmap::Reconstruction& reconstruction_;
   PriorBundleAdjustmentSummary summary_;
   // Linearised at its end, where asked for.
-  ReducedSystem system_;
+  std::unique_ptr<ReducedSystem> system_;
   // The newest known, and the factor of the keypoint sigma at which its
   // redundancies were found.
   PriorComponents components_;

@@ -223,7 +223,8 @@ bool PriorBundleAdjustmentOptions::IsValid(std::string* error) const {
 PriorBundleAdjustmentSummary AdjustBundle(
     const PriorBundleAdjustmentOptions& options,
     const PriorBundleAdjustmentProblem& problem,
-    colmap::Reconstruction* reconstruction, ReducedSystem* system) {
+    colmap::Reconstruction* reconstruction,
+    std::unique_ptr<ReducedSystem>* system) {
   std::string error;
   if (!options.IsValid(&error)) throw std::invalid_argument(error);
 

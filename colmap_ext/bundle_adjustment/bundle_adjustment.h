@@ -4,6 +4,7 @@
 #include <array>
 #include <limits>
 #include <map>
+#include <memory>
 #include <set>
 #include <string>
 #include <vector>
@@ -165,7 +166,8 @@ struct ReducedSystem;
 PriorBundleAdjustmentSummary AdjustBundle(
     const PriorBundleAdjustmentOptions& options,
     const PriorBundleAdjustmentProblem& problem,
-    colmap::Reconstruction* reconstruction, ReducedSystem* system = nullptr);
+    colmap::Reconstruction* reconstruction,
+    std::unique_ptr<ReducedSystem>* system = nullptr);
 
 // The priors of an adjustment without the shared errors that it found.
 std::vector<PosePriorEdge> CorrectSharedErrors(

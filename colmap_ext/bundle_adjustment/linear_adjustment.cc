@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "colmap_ext/bundle_adjustment/linear_adjustment.h"
 
+#include <Eigen/CholmodSupport>
 #include <algorithm>
 #include <cmath>
 
@@ -14,15 +15,28 @@ constexpr double kMinShare = 0.005;
 
 }  // namespace
 
+struct LinearAdjustment::Factorization
+    : Eigen::CholmodSupernodalLLT<Eigen::SparseMatrix<double>> {
+  // The caller says what a failure means.
+  Factorization() { cholmod().print = 0; }
+};
+
 LinearAdjustment::LinearAdjustment(const ReducedSystem& system,
                                    const std::vector<PosePriorEdge>& priors,
                                    double prior_loss_scale)
-    : system_(system), priors_(priors), loss_scale_(prior_loss_scale) {
+    : system_(system),
+      priors_(priors),
+      loss_scale_(prior_loss_scale),
+      information_(system.rest),
+      factorization_(std::make_unique<Factorization>()) {
+  factorization_->analyzePattern(information_);
   for (const ReducedPriorRows& rows : system.priors) {
     residuals_.push_back(rows.residuals);
   }
   weights_.resize(residuals_.size());
 }
+
+LinearAdjustment::~LinearAdjustment() = default;
 
 bool LinearAdjustment::IsTested(size_t i) const {
   return IsTestedMeasurement(priors_[system_.priors[i].prior]);
@@ -41,7 +55,8 @@ void LinearAdjustment::ComputeWeights(const PriorSigmaFactors& factors) {
 }
 
 bool LinearAdjustment::Factorize() {
-  std::vector<Eigen::Triplet<double>> triplets;
+  std::copy_n(system_.rest.valuePtr(), system_.rest.nonZeros(),
+              information_.valuePtr());
   for (size_t i = 0; i < weights_.size(); ++i) {
     const std::vector<int>& columns = system_.priors[i].columns;
     const Eigen::MatrixXd jacobian = weights_[i] * system_.priors[i].jacobian;
@@ -49,18 +64,13 @@ bool LinearAdjustment::Factorize() {
     for (size_t row = 0; row < columns.size(); ++row) {
       for (size_t col = 0; col < columns.size(); ++col) {
         if (columns[row] < columns[col]) continue;
-        triplets.emplace_back(columns[row], columns[col],
-                              information(row, col));
+        information_.coeffRef(columns[row], columns[col]) +=
+            information(row, col);
       }
     }
   }
-  Eigen::SparseMatrix<double> sum(system_.rest.rows(), system_.rest.cols());
-  sum.setFromTriplets(triplets.begin(), triplets.end());
-  sum += system_.rest;
-  if (!is_analyzed_) factorization_.analyzePattern(sum);
-  is_analyzed_ = true;
-  factorization_.factorize(sum);
-  return factorization_.info() == Eigen::Success;
+  factorization_->factorize(information_);
+  return factorization_->info() == Eigen::Success;
 }
 
 Eigen::VectorXd LinearAdjustment::ToColumns(const RowValues& values) const {
@@ -78,7 +88,7 @@ Eigen::VectorXd LinearAdjustment::ToColumns(const RowValues& values) const {
 
 LinearAdjustment::RowValues LinearAdjustment::SolveForRows(
     const Eigen::VectorXd& right_hand_side) const {
-  const Eigen::VectorXd step = factorization_.solve(right_hand_side);
+  const Eigen::VectorXd step = factorization_->solve(right_hand_side);
   RowValues values;
   for (size_t i = 0; i < weights_.size(); ++i) {
     const ReducedPriorRows& rows = system_.priors[i];

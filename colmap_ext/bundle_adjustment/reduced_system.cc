@@ -31,7 +31,7 @@ class BlockMatrix {
   }
   Eigen::VectorXd& Gradient() { return gradient_; }
 
-  Eigen::SparseMatrix<double> ToSparse() const {
+  void WriteTo(Eigen::SparseMatrix<double>* matrix) const {
     std::vector<Triplet> triplets;
     for (const Entry& block : blocks_) {
       for (int col = 0; col < block.values.cols(); ++col) {
@@ -42,9 +42,8 @@ class BlockMatrix {
         }
       }
     }
-    Eigen::SparseMatrix<double> matrix(gradient_.size(), gradient_.size());
-    matrix.setFromTriplets(triplets.begin(), triplets.end());
-    return matrix;
+    matrix->resize(gradient_.size(), gradient_.size());
+    matrix->setFromTriplets(triplets.begin(), triplets.end());
   }
 
  private:
@@ -72,8 +71,8 @@ class Reducer {
         size_(NumberColumns()),
         rest_(size_) {}
 
-  ReducedSystem Run() {
-    ReducedSystem system;
+  std::unique_ptr<ReducedSystem> Run() {
+    auto system = std::make_unique<ReducedSystem>();
     const std::vector<BundleProblem::PriorBlock>& priors =
         bundle_.PriorBlocks();
     size_t num_priors = 0;
@@ -83,15 +82,15 @@ class Reducer {
           num_priors < priors.size() && priors[num_priors].residual == id;
       Evaluate(id, !is_prior);
       if (is_prior) {
-        system.priors.push_back(PriorRows(priors[num_priors++]));
+        system->priors.push_back(PriorRows(priors[num_priors++]));
         continue;
       }
       AddRows();
       if (point_ != nullptr) AddPointRows();
     }
     EliminatePoint();
-    system.rest = rest_.ToSparse();
-    system.rest_gradient = rest_.Gradient();
+    rest_.WriteTo(&system->rest);
+    system->rest_gradient = rest_.Gradient();
     return system;
   }
 
@@ -151,10 +150,22 @@ class Reducer {
           a.values.transpose() * residuals_;
       for (const JacobianBlock& b : blocks_) {
         if (b.column > a.column) continue;
-        rest_.Block(a.column, b.column, a.values.cols(), b.values.cols())
-            .noalias() += a.values.transpose().lazyProduct(b.values);
+        BlockOf(a, b).noalias() += a.values.transpose().lazyProduct(b.values);
       }
     }
+  }
+
+  // In the pattern of the sum.
+  void MakeRoomForRows() {
+    for (const JacobianBlock& a : blocks_) {
+      for (const JacobianBlock& b : blocks_) {
+        if (b.column <= a.column) BlockOf(a, b);
+      }
+    }
+  }
+
+  Eigen::MatrixXd& BlockOf(const JacobianBlock& a, const JacobianBlock& b) {
+    return rest_.Block(a.column, b.column, a.values.cols(), b.values.cols());
   }
 
   // Those of one point follow each other.
@@ -198,7 +209,8 @@ class Reducer {
     mixed_.clear();
   }
 
-  ReducedPriorRows PriorRows(const BundleProblem::PriorBlock& prior) const {
+  ReducedPriorRows PriorRows(const BundleProblem::PriorBlock& prior) {
+    MakeRoomForRows();
     ReducedPriorRows rows;
     rows.prior = prior.prior;
     rows.term = prior.term;
@@ -241,7 +253,7 @@ class Reducer {
 
 }  // namespace
 
-ReducedSystem BuildReducedSystem(BundleProblem* bundle) {
+std::unique_ptr<ReducedSystem> BuildReducedSystem(BundleProblem* bundle) {
   return Reducer(bundle).Run();
 }
 

@@ -3,6 +3,7 @@
 
 #include <Eigen/Core>
 #include <Eigen/SparseCore>
+#include <memory>
 #include <vector>
 
 #include "colmap_ext/bundle_adjustment/bundle_adjustment.h"
@@ -30,13 +31,14 @@ struct ReducedPriorRows {
 // problem's residuals name them first.
 struct ReducedSystem {
   // Keypoints, and what is neither keypoint nor prior between two images: what
-  // is believed of shared errors and mounts, positions. The lower triangle.
+  // is believed of shared errors and mounts, positions. The lower triangle, with
+  // zeros where the priors' rows would add.
   Eigen::SparseMatrix<double> rest;
   Eigen::VectorXd rest_gradient;
   std::vector<ReducedPriorRows> priors;
 };
 
 // With the robust weights of all but the priors as they are; priors have none.
-ReducedSystem BuildReducedSystem(BundleProblem* bundle);
+std::unique_ptr<ReducedSystem> BuildReducedSystem(BundleProblem* bundle);
 
 }  // namespace adasfm

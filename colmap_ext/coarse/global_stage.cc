@@ -8,6 +8,7 @@
 
 #include "colmap_ext/coarse/refine_stage_matches.h"
 #include "colmap_ext/scene/scene_bearings.h"
+#include "core/option_checker.h"
 #include "core/release_memory.h"
 #include "core/so3.h"
 
@@ -167,7 +168,11 @@ bool GlobalStageOptions::IsValid(std::string* error) const {
         " must be positive";
     return false;
   }
-  return focal_lengths.IsValid(error) && two_view.IsValid(error) &&
+  return OptionChecker("AdaSfmGlobal", error)
+             .Require(max_memory_gb > 0.0 || max_memory_gb == -1.0,
+                      "max_memory_gb", max_memory_gb, "must be positive, or -1")
+             .AllHold() &&
+         focal_lengths.IsValid(error) && two_view.IsValid(error) &&
          poses.IsValid(error) && structure.IsValid(error) &&
          refinement.IsValid(error);
 }

@@ -30,6 +30,9 @@ struct GlobalStageOptions {
   // 1 sigma of a coarse position there, in m or the model's unit: what coarse
   // models of drives err by.
   double pose_prior_sigma = 0.5;
+  // In GB (1e9 bytes); -1: no bound. EstimateCoarseModel does not begin what
+  // is estimated to take more.
+  double max_memory_gb = -1.0;
   // Of all steps but structure.bundle; -1: all of the machine's.
   int num_threads = -1;
 

@@ -126,6 +126,9 @@ Status RunAdasfmAutomaticReconstructor(int argc, char** argv) {
   command.AddDefault("restart", &options.restart,
                      "1: remove what earlier runs left in the workspace, and "
                      "do it all anew; 0: continue");
+  command.AddDefault("max_memory_gb", &options.max_memory_gb,
+                     "for each of the stages from priors to the model, which "
+                     "do not begin when they may take more [GB]; -1: no bound");
   command.AddDefault("num_threads", &options.num_threads,
                      "-1: all of the machine's");
   const Status parsed = command.Parse(argc, argv);

@@ -104,8 +104,9 @@ void AddMapperOptions(MapperCommandOptions* options, CommandOptions* command) {
   add("max_num_parallel_parts", &options->map.stage.max_num_parallel_parts,
       "parts at a time; -1: as threads and memory allow");
   add("max_memory_gb", &options->map.stage.max_memory_gb,
-      "for the parts that run at the same time [GB]; -1: 70 % of what is "
-      "available");
+      "for the parts that run at the same time, and for the refinement, which "
+      "does not begin when it may take more [GB]; -1: parts take 70 % of what "
+      "is available");
   command->AddDefault("num_threads", &options->map.stage.num_threads,
                       "threads; -1: all of the machine's");
 }

@@ -99,6 +99,9 @@ void AddOptions(PriorImportOptions* options, CommandOptions* command) {
   add("calibrate_focal_lengths", &options->focal_lengths.enabled,
       "two-view rotations are those under focal lengths found from the "
       "verified pairs where the database does not mark them as known (0 or 1)");
+  add("max_memory_gb", &options->max_memory_gb,
+      "an error, before the work, where the import may take more [GB]; -1: a "
+      "warning where it may take more than is free");
   add("max_visual_gap", &options->max_visual_gap,
       "two-view rotations are taken from images at most this many apart");
   AddFusionOptions(&estimation->fusion, command);

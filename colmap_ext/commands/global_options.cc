@@ -47,6 +47,9 @@ void GlobalOptionAdder::AddPaper() {
       "COLMAP 4 database, for global_mapper and pose_prior_mapper (0 or 1)");
   Add("pose_prior_sigma", &stage_->pose_prior_sigma,
       "1 sigma of a coarse position there [m, or the model's unit]");
+  Add("max_memory_gb", &stage_->max_memory_gb,
+      "an error, before the work, where the stage may take more [GB]; -1: a "
+      "warning where it may take more than is free");
   Add("num_threads", &stage_->num_threads, "threads; -1: all of the machine's");
 }
 

@@ -48,6 +48,9 @@ class HostMapper {
   void Begin();
   // Leaves the reconstruction with its registered images only.
   void End();
+  // Frees the matches, which only registration and triangulation need. From
+  // here on FilterPoints alone may be called.
+  void ReleaseMatches();
 
   const colmap::CorrespondenceGraph& Graph() const;
 

@@ -12,6 +12,7 @@
 #include "colmap_ext/mapper/prior_support.h"
 #include "colmap_ext/mapper/register_image.h"
 #include "colmap_ext/scene/georeference.h"
+#include "core/release_memory.h"
 
 namespace adasfm {
 namespace {
@@ -43,14 +44,15 @@ class ModelRefiner {
 
   void JoinParts() {
     if (!options_.join_parts) return;
-    const double loose_px = 3.0 * local_.filter_max_reproj_error_px;
+    ReleaseMatches();
     AdjustTentatively(10);
-    Filter(loose_px);
-    scene_.mapper.CompleteAndMergeTracks(loose_px);
+    Filter(LoosePx());
   }
 
   void AdjustRoughly() {
+    if (options_.join_parts) scene_.mapper.CompleteAndMergeTracks(LoosePx());
     TriangulateWeakImages();
+    ReleaseMatches();
     AdjustTentatively(15);
     Filter(local_.filter_max_reproj_error_px);
     if (PutBackContradictedImages()) AdjustTentatively(10);
@@ -58,6 +60,7 @@ class ModelRefiner {
 
   void AdjustFinely() {
     scene_.mapper.CompleteAndMergeTracks(local_.filter_max_reproj_error_px);
+    ReleaseMatches();
     summary_.keypoint_sigma_factor = 1.0;
     Adjust(25, 1e-6, FindPriors(), &summary_.keypoint_sigma_factor);
     Filter(local_.filter_max_reproj_error_px);
@@ -69,6 +72,15 @@ class ModelRefiner {
     return {reconstruction_.RegImageIds().begin(),
             reconstruction_.RegImageIds().end()};
   }
+
+  // Adjustments take much memory of their own.
+  void ReleaseMatches() {
+    scene_.mapper.ReleaseMatches();
+    ReleaseFreedMemory();
+  }
+
+  // Until tracks of different parts are joined.
+  double LoosePx() const { return 3.0 * local_.filter_max_reproj_error_px; }
 
   void Filter(double max_reproj_error_px) {
     scene_.mapper.FilterPoints(max_reproj_error_px,

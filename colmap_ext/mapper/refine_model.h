@@ -48,7 +48,8 @@ inline constexpr int kNumRefinementRounds = 3;
 // weak coarse motions. An image whose motion contradicts the priors on all
 // sides is put back to where the coarse model has it, without its points, so
 // that the result is not worse than the priors. An image that neither points
-// nor priors hold is left out in the end.
+// nor priors hold is left out in the end. A round begins with a scene that has
+// its matches, and releases them.
 void RefineModel(const RefineModelOptions& options,
                  const LocalMapperOptions& local, int round, MapperScene* scene,
                  RefineModelSummary* summary);

@@ -33,7 +33,8 @@ struct MapperStageOptions {
   // threads and as fit into the memory.
   int max_num_parallel_parts = -1;
   // For the parts that run at the same time, in GB (1e9 bytes); -1: 70 % of
-  // what the machine has available when they begin. One part always runs.
+  // what the machine has available when they begin. One part always runs;
+  // MapParts does not begin a model whose refinement is estimated to take more.
   double max_memory_gb = -1.0;
 
   bool IsValid(std::string* error) const;
@@ -74,6 +75,8 @@ using MapperProgress = std::function<void(const std::string&, double)>;
 using PartMapper = std::function<LocalMapResult(
     const LocalMapperOptions&, const SceneData&, const CoarsePoseMap&,
     const std::set<image_t>&)>;
+
+struct MergeCheckpoint;
 
 // The mapper stage on a folder (design 7.3 to 7.5, 10). Every step leaves its
 // result in output_path/checkpoints, complete or not at all, with a fingerprint
@@ -123,8 +126,8 @@ class MapperStage {
   Status ReadPartReports(bool require_all_parts);
   Status MergePartModels(const std::string& fingerprint);
   std::unique_ptr<MapperScene> BuildWholeScene() const;
-  Status RefineMerged(const std::string& fingerprint, int num_done,
-                      std::unique_ptr<MapperScene>* scene);
+  // Takes the merged model through the rounds that are left.
+  Status RefineMerged(const std::string& fingerprint, MergeCheckpoint* merged);
   // So that the result is never worse than the prior trajectory.
   void FallBackToCoarsePoses(std::unique_ptr<MapperScene>* scene);
 

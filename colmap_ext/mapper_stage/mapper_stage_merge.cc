@@ -130,6 +130,11 @@ void MapperStage::FallBackToCoarsePoses(std::unique_ptr<MapperScene>* scene) {
   options.join_parts = false;
   RefineModelSummary refined;
   for (int round = 1; round <= kNumRefinementRounds; ++round) {
+    if (round > 1) {
+      auto next = BuildMapperScene(data_, coarse_, (*scene)->images);
+      PutIntoScene(coarse_scene->reconstruction, next.get());
+      coarse_scene = std::move(next);
+    }
     RefineModel(options, options_.local, round, coarse_scene.get(), &refined);
   }
   if (CountTorn(*coarse_scene) >= num_torn) return;
@@ -138,30 +143,34 @@ void MapperStage::FallBackToCoarsePoses(std::unique_ptr<MapperScene>* scene) {
   *scene = std::move(coarse_scene);
 }
 
-Status MapperStage::RefineMerged(const std::string& fingerprint, int num_done,
-                                 std::unique_ptr<MapperScene>* scene) {
+Status MapperStage::RefineMerged(const std::string& fingerprint,
+                                 MergeCheckpoint* merged) {
   RefineModelOptions options = options_.refine;
   options.join_parts =
       summary_.parts.size() > 1 || !summary_.merge.coarse_images.empty();
-  for (int round = num_done + 1; round <= kNumRefinementRounds; ++round) {
-    Report("refining " +
-               std::to_string((*scene)->reconstruction.NumRegImages()) +
+  while (merged->num_rounds < kNumRefinementRounds) {
+    const int round = merged->num_rounds + 1;
+    Report("refining " + std::to_string(merged->model.NumRegImages()) +
                " images, round " + std::to_string(round) + " of " +
                std::to_string(kNumRefinementRounds),
            0.65 + 0.3 * (round - 1) / kNumRefinementRounds);
-    RefineModel(options, options_.local, round, scene->get(), &summary_.refine);
-    if (round == kNumRefinementRounds) FallBackToCoarsePoses(scene);
+    std::unique_ptr<MapperScene> scene = BuildWholeScene();
+    PutIntoScene(merged->model, scene.get());
+    merged->model = colmap::Reconstruction();
+    ReleaseFreedMemory();
+    RefineModel(options, options_.local, round, scene.get(), &summary_.refine);
+    if (round == kNumRefinementRounds) FallBackToCoarsePoses(&scene);
     const Status status = WriteMergeCheckpoint(checkpoint_path_, fingerprint,
-                                               round, summary_, **scene);
+                                               round, summary_, *scene);
     if (!status.ok()) return status;
     // From the file, as a run that was killed here would: its points have other
     // ids, and so another order.
-    scene->reset();
+    scene.reset();
     ReleaseFreedMemory();
-    *scene = BuildWholeScene();
-    const StatusOr<int> read = ReadMergeCheckpoint(
-        checkpoint_path_, fingerprint, &summary_, scene->get());
+    StatusOr<MergeCheckpoint> read =
+        ReadMergeCheckpoint(checkpoint_path_, fingerprint, &summary_);
     if (!read.ok()) return read.status();
+    *merged = std::move(*read);
   }
   return Status::Ok();
 }
@@ -176,29 +185,22 @@ StatusOr<colmap::Reconstruction> MapperStage::Merge(bool require_all_parts) {
   if (!status.ok()) return status;
   const std::string fingerprint = ComputeMergeFingerprint(
       fingerprint_, options_.align, options_.refine, summary_.parts);
-  std::unique_ptr<MapperScene> scene = BuildWholeScene();
-  StatusOr<int> num_done = ReadMergeCheckpoint(checkpoint_path_, fingerprint,
-                                               &summary_, scene.get());
-  if (!num_done.ok()) {
-    Report(num_done.status().message() + ": merging the parts", 0.63);
-    scene.reset();  // Merging needs one of its own.
+  StatusOr<MergeCheckpoint> merged =
+      ReadMergeCheckpoint(checkpoint_path_, fingerprint, &summary_);
+  if (!merged.ok()) {
+    Report(merged.status().message() + ": merging the parts", 0.63);
     status = MergePartModels(fingerprint);
     if (!status.ok()) return status;
     ReleaseFreedMemory();
-    scene = BuildWholeScene();
-    num_done = ReadMergeCheckpoint(checkpoint_path_, fingerprint, &summary_,
-                                   scene.get());
-    if (!num_done.ok()) return num_done.status();
+    merged = ReadMergeCheckpoint(checkpoint_path_, fingerprint, &summary_);
+    if (!merged.ok()) return merged.status();
   }
   summary_.merge_seconds = timer.Seconds();
-  if (scene->reconstruction.NumRegImages() < 2) {
-    return colmap::Reconstruction();
-  }
+  colmap::Reconstruction& model = merged->model;
+  if (model.NumRegImages() < 2) return colmap::Reconstruction();
   const StepTimer refine_timer;
-  status = RefineMerged(fingerprint, *num_done, &scene);
+  status = RefineMerged(fingerprint, &*merged);
   if (!status.ok()) return status;
-  scene->mapper.End();
-  colmap::Reconstruction& model = scene->reconstruction;
   summary_.is_level =
       summary_.is_georeferenced || AlignToGravity(data_, &model);
   summary_.refine_seconds = refine_timer.Seconds();

@@ -82,33 +82,13 @@ void SummaryFromJson(const nlohmann::json& json, MapperStageSummary* summary) {
       .get_to(summary->started_from_coarse_poses);
 }
 
-void PutIntoScene(const colmap::Reconstruction& model, MapperScene* scene) {
-  for (const auto& [camera_id, camera] : model.Cameras()) {
-    scene->reconstruction.Camera(camera_id).SetParams(camera.Params());
-  }
-  for (const auto& [image_id, pose] : CamsFromWorld(model)) {
-    SetCamFromWorld(pose, &scene->reconstruction.Image(image_id));
-    scene->reconstruction.RegisterImage(image_id);
-  }
-  std::vector<colmap::point3D_t> point_ids;
-  for (const auto& [point_id, point] : model.Points3D()) {
-    point_ids.push_back(point_id);
-  }
-  std::sort(point_ids.begin(), point_ids.end());
-  for (const colmap::point3D_t point_id : point_ids) {
-    const colmap::Point3D& point = model.Point3D(point_id);
-    const colmap::point3D_t new_id = scene->reconstruction.AddPoint3D(
-        point.XYZ(), point.Track(), point.Color());
-    scene->reconstruction.Point3D(new_id).SetError(point.Error());
-  }
-}
-
-Status ReadRound(const std::string& path, const std::string& fingerprint,
-                 int num_rounds, MapperStageSummary* summary,
-                 MapperScene* scene) {
+StatusOr<MergeCheckpoint> ReadRound(const std::string& path,
+                                    const std::string& fingerprint,
+                                    int num_rounds,
+                                    MapperStageSummary* summary) {
   const StatusOr<nlohmann::json> state = ReadCheckpointState(path, fingerprint);
   if (!state.ok()) return state.status();
-  const StatusOr<colmap::Reconstruction> model = ReadCheckpointModel(path);
+  StatusOr<colmap::Reconstruction> model = ReadCheckpointModel(path);
   if (!model.ok()) return model.status();
   try {
     if (state->at("num_rounds").get<int>() != num_rounds) {
@@ -118,8 +98,7 @@ Status ReadRound(const std::string& path, const std::string& fingerprint,
   } catch (const nlohmann::json::exception&) {
     return Status::Error(path + " is damaged");
   }
-  PutIntoScene(*model, scene);
-  return Status::Ok();
+  return MergeCheckpoint{num_rounds, std::move(*model)};
 }
 
 }  // namespace
@@ -141,21 +120,41 @@ Status WriteMergeCheckpoint(const std::string& checkpoint_path,
   return status;
 }
 
-StatusOr<int> ReadMergeCheckpoint(const std::string& checkpoint_path,
-                                  const std::string& fingerprint,
-                                  MapperStageSummary* summary,
-                                  MapperScene* scene) {
+StatusOr<MergeCheckpoint> ReadMergeCheckpoint(
+    const std::string& checkpoint_path, const std::string& fingerprint,
+    MapperStageSummary* summary) {
   std::string problems;
   for (int num_rounds = kNumRefinementRounds; num_rounds >= 0; --num_rounds) {
     const std::string path = RoundPath(checkpoint_path, num_rounds);
     if (!std::filesystem::exists(path)) continue;
-    const Status status =
-        ReadRound(path, fingerprint, num_rounds, summary, scene);
-    if (status.ok()) return num_rounds;
-    problems += (problems.empty() ? "" : "; ") + status.message();
+    StatusOr<MergeCheckpoint> read =
+        ReadRound(path, fingerprint, num_rounds, summary);
+    if (read.ok()) return read;
+    problems += (problems.empty() ? "" : "; ") + read.status().message();
   }
   return Status::Error(
       problems.empty() ? "no merged model in " + checkpoint_path : problems);
+}
+
+void PutIntoScene(const colmap::Reconstruction& model, MapperScene* scene) {
+  for (const auto& [camera_id, camera] : model.Cameras()) {
+    scene->reconstruction.Camera(camera_id).SetParams(camera.Params());
+  }
+  for (const auto& [image_id, pose] : CamsFromWorld(model)) {
+    SetCamFromWorld(pose, &scene->reconstruction.Image(image_id));
+    scene->reconstruction.RegisterImage(image_id);
+  }
+  std::vector<colmap::point3D_t> point_ids;
+  for (const auto& [point_id, point] : model.Points3D()) {
+    point_ids.push_back(point_id);
+  }
+  std::sort(point_ids.begin(), point_ids.end());
+  for (const colmap::point3D_t point_id : point_ids) {
+    const colmap::Point3D& point = model.Point3D(point_id);
+    const colmap::point3D_t new_id = scene->reconstruction.AddPoint3D(
+        point.XYZ(), point.Track(), point.Color());
+    scene->reconstruction.Point3D(new_id).SetError(point.Error());
+  }
 }
 
 }  // namespace adasfm

@@ -17,13 +17,19 @@ Status WriteMergeCheckpoint(const std::string& checkpoint_path,
                             const MapperStageSummary& summary,
                             const MapperScene& scene);
 
-// Reads the checkpoint of most rounds into the summary and the scene, none of
-// whose images may be registered, and returns its rounds. An error when there
-// is none of this fingerprint that is sound; it says what is wrong with those
-// that are there.
-StatusOr<int> ReadMergeCheckpoint(const std::string& checkpoint_path,
-                                  const std::string& fingerprint,
-                                  MapperStageSummary* summary,
-                                  MapperScene* scene);
+struct MergeCheckpoint {
+  int num_rounds = 0;
+  colmap::Reconstruction model;
+};
+
+// Reads the checkpoint of most rounds, with the summary. An error when there is
+// none of this fingerprint that is sound; it says what is wrong with those that
+// are there.
+StatusOr<MergeCheckpoint> ReadMergeCheckpoint(
+    const std::string& checkpoint_path, const std::string& fingerprint,
+    MapperStageSummary* summary);
+
+// Puts the model into the scene, none of whose images may be registered.
+void PutIntoScene(const colmap::Reconstruction& model, MapperScene* scene);
 
 }  // namespace adasfm

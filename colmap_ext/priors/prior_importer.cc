@@ -21,6 +21,7 @@
 #include "colmap_ext/priors/stamp_images.h"
 #include "colmap_ext/scene/scene_data.h"
 #include "colmap_ext/scene/two_view_poses.h"
+#include "core/option_checker.h"
 #include "global/two_view/refine_relative_poses.h"
 #include "sensors/bags/bag_reader.h"
 #include "sensors/io/read_wheel.h"
@@ -321,7 +322,11 @@ bool PriorImportOptions::IsValid(std::string* error) const {
              std::to_string(max_visual_gap) + "; it must be positive";
     return false;
   }
-  return focal_lengths.IsValid(error) && rig.IsValid(error) &&
+  return OptionChecker("AdaSfmPriors", error)
+             .Require(max_memory_gb > 0.0 || max_memory_gb == -1.0,
+                      "max_memory_gb", max_memory_gb, "must be positive, or -1")
+             .AllHold() &&
+         focal_lengths.IsValid(error) && rig.IsValid(error) &&
          estimation.IsValid(error) && trajectory.IsValid(error) &&
          positions.IsValid(error);
 }

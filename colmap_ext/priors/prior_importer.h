@@ -44,6 +44,9 @@ struct PriorImportOptions {
   // Two-view rotations are taken from images at most this many apart in time:
   // rotations grow with the gap, but so does the chance of a wrong pair.
   int max_visual_gap = 3;
+  // In GB (1e9 bytes); -1: no bound. ImportPriors does not begin what is
+  // estimated to take more.
+  double max_memory_gb = -1.0;
 
   bool IsValid(std::string* error) const;
 };

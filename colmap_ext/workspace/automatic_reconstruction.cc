@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
+#include <sstream>
 #include <stdexcept>
 
 #include "colmap_ext/coarse/global_report.h"
@@ -162,6 +163,13 @@ bool AutomaticReconstructionOptions::IsValid(std::string* error) const {
   if (refine_intrinsics < -1 || refine_intrinsics > 1) {
     *error = "refine_intrinsics = " + std::to_string(refine_intrinsics) +
              " must be -1, 0 or 1";
+    return false;
+  }
+  if (!(max_memory_gb > 0.0 || max_memory_gb == -1.0)) {
+    std::ostringstream message;
+    message << "max_memory_gb = " << max_memory_gb
+            << " must be positive, or -1";
+    *error = message.str();
     return false;
   }
   return bag.photos.IsValid(error) && features.IsValid(error) &&

@@ -35,6 +35,8 @@ struct AutomaticReconstructionOptions {
   int refine_intrinsics = -1;
   // Removes what earlier calls left in the workspace, and does it all anew.
   bool restart = false;
+  // Of import, coarse model and mapper, each, in GB (1e9 bytes); -1: theirs.
+  double max_memory_gb = -1.0;
   // Of all stages; -1: all of the machine's.
   int num_threads = -1;
 

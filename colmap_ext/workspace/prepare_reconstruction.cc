@@ -75,6 +75,9 @@ Status PrepareReconstruction(AutomaticReconstructionOptions* options,
         "sensor logs need the calibration of the sensors; give --sensors_path");
   }
   options->pairs.image_times_path = paths->image_times_path;
+  options->priors.max_memory_gb = options->max_memory_gb;
+  options->global.max_memory_gb = options->max_memory_gb;
+  options->map.stage.max_memory_gb = options->max_memory_gb;
   options->features.num_threads = options->num_threads;
   options->pairs.descriptors.num_threads = options->num_threads;
   options->global.num_threads = options->num_threads;

@@ -6,6 +6,8 @@
 #include <sfm/incremental_mapper.h>
 
 #include <limits>
+#include <memory>
+#include <new>
 #include <utility>
 
 namespace adasfm {
@@ -50,11 +52,24 @@ void HostMapper::Begin() {
   mapper_->BeginReconstruction(&reconstruction_);
   // The reconstruction has its own copy of the keypoints.
   for (const auto& [image_id, image] : reconstruction_.Images()) {
-    cache_->Image(image_id) = colmap::Image();
+    // An assignment would keep the memory: COLMAP's images are never moved.
+    colmap::Image* copy = &cache_->Image(image_id);
+    std::destroy_at(copy);
+    new (copy) colmap::Image();
   }
 }
 
 void HostMapper::End() { mapper_->EndReconstruction(/*discard=*/false); }
+
+void HostMapper::ReleaseMatches() {
+  // Takes its pointer to the graph from the reconstruction.
+  reconstruction_.Load(colmap::DatabaseCache());
+  for (const auto& [image_id, image] : reconstruction_.Images()) {
+    reconstruction_.Image(image_id).TearDown();
+  }
+  mapper_.reset();
+  cache_.reset();
+}
 
 const colmap::CorrespondenceGraph& HostMapper::Graph() const {
   return std::as_const(*cache_).CorrespondenceGraph();
@@ -100,10 +115,7 @@ void HostMapper::CompleteAndMergeTracks(double max_reproj_error_px) {
 
 void HostMapper::FilterPoints(double max_reproj_error_px,
                               double min_angle_deg) {
-  colmap::IncrementalMapper::Options options;
-  options.filter_max_reproj_error = max_reproj_error_px;
-  options.filter_min_tri_angle = min_angle_deg;
-  mapper_->FilterPoints(options);
+  reconstruction_.FilterAllPoints3D(max_reproj_error_px, min_angle_deg);
 }
 
 void RefinePose(const PointsInImage& points,

@@ -38,11 +38,11 @@ TEST(PriorComponents, RedundancyIsWhatMeasurementsTestOfEachOther) {
                              problem.priors.end());
     }
     colmap::Reconstruction adjusted = model;
-    ReducedSystem system;
+    std::unique_ptr<ReducedSystem> system;
     ASSERT_TRUE(AdjustBundle(options, repeated, &adjusted, &system).success);
     PriorComponents components;
     ASSERT_TRUE(
-        LinearAdjustment(system, repeated.priors, options.prior_loss_scale)
+        LinearAdjustment(*system, repeated.priors, options.prior_loss_scale)
             .Solve(kStated, &components));
     const double share = 1.0 - 1.0 / num_measurements;
     for (int k = 0; k < 3; ++k) {
@@ -66,9 +66,9 @@ TEST(LinearAdjustment, ForeseesAnAdjustmentWithOtherSigmas) {
   // Plain squares: robust weights would change with the step.
   options.prior_loss_scale = 1e3;
   options.reproj_loss_scale_px = 0.0;
-  ReducedSystem system;
+  std::unique_ptr<ReducedSystem> system;
   ASSERT_TRUE(AdjustBundle(options, problem, &model, &system).success);
-  LinearAdjustment linear(system, problem.priors, options.prior_loss_scale);
+  LinearAdjustment linear(*system, problem.priors, options.prior_loss_scale);
   options.prior_sigma_factors = {0.5, 2.0, 0.3, 1.0};
   PriorComponents foreseen;
   ASSERT_TRUE(linear.Solve(options.prior_sigma_factors, &foreseen));

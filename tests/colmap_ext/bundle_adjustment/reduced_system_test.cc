@@ -85,7 +85,9 @@ TEST(ReducedSystem, HasTheStepAndTheCovarianceOfTheWholeAdjustment) {
     options.refine_focal_length = refines_focal_length;
     BundleProblem bundle(options, problem, model);
     bundle.FixFirstPose();
-    const ReducedSystem system = BuildReducedSystem(&bundle);
+    const std::unique_ptr<ReducedSystem> reduced_system =
+        BuildReducedSystem(&bundle);
+    const ReducedSystem& system = *reduced_system;
     Eigen::MatrixXd information =
         Eigen::MatrixXd(system.rest).selfadjointView<Eigen::Lower>();
     Eigen::VectorXd gradient = system.rest_gradient;

@@ -1,0 +1,102 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "colmap_ext/stage_memory.h"
+
+#include <filesystem>
+#include <iomanip>
+#include <sstream>
+
+#include "colmap_ext/mapper_stage/part_memory.h"
+#include "core/sqlite.h"
+
+namespace adasfm {
+namespace {
+
+namespace fs = std::filesystem;
+
+// Measured (docs/results/growth.md), rounded up. The program and its libraries:
+constexpr double kBytesOfProgram = 65e6;
+// Of a log as text.
+constexpr double kImportBytesPerLogByte = 11.0;
+constexpr double kGlobalBytesPerKeypoint = 200.0;
+constexpr double kGlobalBytesPerMatch = 160.0;
+constexpr double kMergeBytesPerKeypoint = 400.0;
+constexpr double kMergeBytesPerMatch = 160.0;
+
+// Of a file, or of all files below a folder; 0 where there is none.
+double SizeOnDisk(const std::string& path) {
+  std::error_code error;
+  if (fs::is_regular_file(path, error)) {
+    return static_cast<double>(fs::file_size(path, error));
+  }
+  double size = 0.0;
+  for (const fs::directory_entry& entry :
+       fs::recursive_directory_iterator(path, error)) {
+    if (entry.is_regular_file(error)) {
+      size += static_cast<double>(entry.file_size(error));
+    }
+  }
+  return size;
+}
+
+int64_t SumOfRows(const std::string& table, SqliteConnection* database) {
+  if (!database->HasTable(table)) return 0;
+  SqliteStatement statement(database, "SELECT SUM(rows) FROM " + table);
+  return statement.Step() && !statement.IsNull(0) ? statement.Int(0) : 0;
+}
+
+}  // namespace
+
+StatusOr<SceneSize> MeasureScene(const std::string& database_path) {
+  SceneSize size;
+  try {
+    SqliteConnection database(database_path, SqliteConnection::Mode::kRead);
+    size.num_keypoints = SumOfRows("keypoints", &database);
+    size.num_matches = SumOfRows("two_view_geometries", &database);
+  } catch (const SqliteError& error) {
+    return Status::Error(database_path + ": " + error.what());
+  }
+  return size;
+}
+
+double EstimateImportMemoryBytes(const PriorImportPaths& paths) {
+  double log_bytes = 0.0;
+  for (const std::string& path :
+       {paths.image_times_path, paths.imu_path, paths.wheel_path,
+        paths.gnss_path, paths.trajectory_path}) {
+    if (!path.empty()) log_bytes += SizeOnDisk(path);
+  }
+  return kBytesOfProgram + kImportBytesPerLogByte * log_bytes;
+}
+
+double EstimateGlobalMemoryBytes(const SceneSize& size) {
+  return kBytesOfProgram + kGlobalBytesPerKeypoint * size.num_keypoints +
+         kGlobalBytesPerMatch * size.num_matches;
+}
+
+double EstimateMergeMemoryBytes(const SceneSize& size) {
+  return kBytesOfProgram + kMergeBytesPerKeypoint * size.num_keypoints +
+         kMergeBytesPerMatch * size.num_matches;
+}
+
+Status CheckMemory(double bytes, double max_memory_gb,
+                   const std::string& option,
+                   std::vector<std::string>* warnings) {
+  std::ostringstream text;
+  text << std::setprecision(2) << "this may take " << bytes / 1e9
+       << " GB of memory, more than the ";
+  if (max_memory_gb > 0.0) {
+    if (bytes <= 1e9 * max_memory_gb) return Status::Ok();
+    text << max_memory_gb << " GB of --" << option
+         << "; nothing was done. Give it more, extract fewer features, or map "
+            "pieces of the drive";
+    return Status::Error(text.str());
+  }
+  const double available = AvailableMemoryBytes();
+  if (bytes > available) {
+    text << available / 1e9 << " GB that are free";
+    warnings->push_back(text.str());
+  }
+  return Status::Ok();
+}
+
+}  // namespace adasfm
