@@ -20,6 +20,7 @@
 
 #include "colmap_ext/commands/progress_display.h"
 #include "core/interruption.h"
+#include "sensors/io/log_file.h"
 
 namespace adasfm {
 namespace {
@@ -170,6 +171,7 @@ Status CommandOptions::ReadProject(const std::string& path,
     return Status::Error("cannot read the project file " + path +
                          "; check --project_path");
   }
+  SkipByteOrderMark(&file);
   // A project file serves several commands, so other commands' options are
   // passed over; a misspelt option of ours is not.
   const po::parsed_options parsed =
