@@ -87,8 +87,18 @@ void WriteToStderr(const char* text) {
   _exit(EXIT_FAILURE);
 }
 
+// Eigen frees a matrix again that it could not get memory to resize, and glibc
+// then aborts; it has already said so on standard error.
+void ReportAbort(int) {
+  WriteToStderr(
+      "ERROR: a library aborted; mend its cause (most likely memory that is "
+      "short), then give the same command again\n");
+  _exit(EXIT_FAILURE);
+}
+
 void SetUpLogging(const char* name) {
   std::set_terminate(&ReportUncaughtException);
+  std::signal(SIGABRT, &ReportAbort);
   google::InitGoogleLogging(name);
   google::InstallFailureFunction(
       reinterpret_cast<google::logging_fail_func_t>(&ExitOnFailedCheck));
