@@ -4,6 +4,7 @@
 #include <fstream>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <set>
 #include <utility>
 
@@ -68,11 +69,18 @@ Status CheckMergeMemory(const MapOptions& options, const MapRequest& request,
                      warnings);
 }
 
-// What a stage wrote about itself; empty when it left no summary.
+// What a stage wrote about itself; no object when it left no summary.
+nlohmann::json ReadSummary(const std::string& path) {
+  std::ifstream file(path);
+  return nlohmann::json::parse(file, nullptr, /*allow_exceptions=*/false);
+}
+
+std::string ImportSummaryPath(const MapRequest& request) {
+  return request.database_path + ".priors.json";
+}
+
 std::vector<std::string> ReadWarnings(const std::string& summary_path) {
-  std::ifstream file(summary_path);
-  const nlohmann::json json =
-      nlohmann::json::parse(file, nullptr, /*allow_exceptions=*/false);
+  const nlohmann::json json = ReadSummary(summary_path);
   std::vector<std::string> warnings;
   if (!json.is_object() || !json.contains("warnings")) return warnings;
   for (const nlohmann::json& warning : json["warnings"]) {
@@ -84,8 +92,7 @@ std::vector<std::string> ReadWarnings(const std::string& summary_path) {
 std::vector<std::string> ReadEarlierWarnings(const MapRequest& request) {
   std::vector<std::string> warnings;
   // The importer's other warnings are about its input.
-  for (std::string& warning :
-       ReadWarnings(request.database_path + ".priors.json")) {
+  for (std::string& warning : ReadWarnings(ImportSummaryPath(request))) {
     if (warning.find("contradict") == std::string::npos) continue;
     warnings.push_back(std::move(warning));
   }
@@ -96,6 +103,18 @@ std::vector<std::string> ReadEarlierWarnings(const MapRequest& request) {
     warnings.push_back(std::move(warning));
   }
   return warnings;
+}
+
+// How well the wheels' unit is known (SensorSummary); none when nobody says.
+std::optional<double> ReadWheelScaleSigma(const MapRequest& request) {
+  const nlohmann::json json = ReadSummary(ImportSummaryPath(request));
+  if (!json.is_object() || !json.contains("wheel_scale_sigma") ||
+      !json["wheel_scale_sigma"].is_number()) {
+    return std::nullopt;
+  }
+  const double sigma = json["wheel_scale_sigma"].get<double>();
+  if (!(sigma > 0.0)) return std::nullopt;
+  return sigma;
 }
 
 // The stage's options for this scene's cameras.
@@ -161,6 +180,9 @@ Verdict Assess(const MapRequest& request, const CoarseModels& coarse,
   Verdict verdict =
       AssessModels(assessed, coarse.rest, ReadEarlierWarnings(request));
   verdict.lost_images = std::move(lost);
+  if (verdict.metric_source == "wheels") {
+    verdict.metric_sigma = ReadWheelScaleSigma(request);
+  }
   return verdict;
 }
 

@@ -11,9 +11,18 @@
 
 namespace adasfm {
 
+namespace {
+
+// More threads for each of the machine's only cost time: 10,000 took nine times
+// as long as 2.
+constexpr int kMaxThreadsEach = 16;
+
+}  // namespace
+
 int EffectiveNumThreads(int num_threads) {
-  if (num_threads > 0) return num_threads;
-  return std::max(1u, std::thread::hardware_concurrency());
+  const int num_hardware = std::max(1u, std::thread::hardware_concurrency());
+  return num_threads > 0 ? std::min(num_threads, kMaxThreadsEach * num_hardware)
+                         : num_hardware;
 }
 
 void ParallelFor(int num_threads, size_t count,

@@ -6,7 +6,7 @@
 
 namespace adasfm {
 
-// The number of threads to use: the request, or all of the machine's for -1.
+// The request, within 16 for each thread of the machine, or one each for -1.
 int EffectiveNumThreads(int num_threads);
 
 // Calls function(i) once for every i in [0, count), on num_threads threads

@@ -93,7 +93,8 @@ void CollectGeometries(GlobalStageResult* result) {
   for (RefinedPair& pair : result->refinement.pairs) {
     if (pair.removed) {
       result->removed_pairs.push_back(pair.pair);
-    } else if (pair.cam2_from_cam1.translation.norm() > 0.0) {
+    } else if (!pair.cam2_from_cam1.translation.isZero()) {
+      // Cameras at one place, as of equal photos, have no epipolar geometry.
       result->geometries.push_back(
           {pair.pair, std::move(pair.matches), pair.cam2_from_cam1});
     }

@@ -20,6 +20,7 @@
 
 #include "colmap_ext/commands/progress_display.h"
 #include "core/interruption.h"
+#include "sensors/io/log_file.h"
 
 namespace adasfm {
 namespace {
@@ -86,8 +87,18 @@ void WriteToStderr(const char* text) {
   _exit(EXIT_FAILURE);
 }
 
+// Eigen frees a matrix again that it could not get memory to resize, and glibc
+// then aborts; it has already said so on standard error.
+void ReportAbort(int) {
+  WriteToStderr(
+      "ERROR: a library aborted; mend its cause (most likely memory that is "
+      "short), then give the same command again\n");
+  _exit(EXIT_FAILURE);
+}
+
 void SetUpLogging(const char* name) {
   std::set_terminate(&ReportUncaughtException);
+  std::signal(SIGABRT, &ReportAbort);
   google::InitGoogleLogging(name);
   google::InstallFailureFunction(
       reinterpret_cast<google::logging_fail_func_t>(&ExitOnFailedCheck));
@@ -170,6 +181,7 @@ Status CommandOptions::ReadProject(const std::string& path,
     return Status::Error("cannot read the project file " + path +
                          "; check --project_path");
   }
+  SkipByteOrderMark(&file);
   // A project file serves several commands, so other commands' options are
   // passed over; a misspelt option of ours is not.
   const po::parsed_options parsed =

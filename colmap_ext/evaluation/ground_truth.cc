@@ -8,6 +8,7 @@
 #include "colmap_ext/evaluation/evaluation.h"
 #include "colmap_ext/host/model.h"
 #include "core/sensor_log.h"
+#include "sensors/io/log_file.h"
 #include "sensors/io/read_image_times.h"
 #include "sensors/io/read_wheel.h"
 
@@ -24,6 +25,7 @@ bool IsNumber(const std::string& word) {
 // not an image name.
 bool IsTrajectory(const std::string& path) {
   std::ifstream file(path);
+  SkipByteOrderMark(&file);
   std::string line;
   while (std::getline(file, line)) {
     std::istringstream words(line);
@@ -40,6 +42,7 @@ StatusOr<NamedPoses> ReadPoseLines(const std::string& path) {
     return Status::Error("cannot read the ground truth " + path +
                          "; check --ground_truth_path");
   }
+  SkipByteOrderMark(&file);
   NamedPoses poses;
   std::string line;
   for (int number = 1; std::getline(file, line); ++number) {

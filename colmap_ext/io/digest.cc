@@ -12,6 +12,18 @@ namespace {
 
 namespace fs = std::filesystem;
 
+// Whether the entry is a link to a folder that holds it.
+bool IsCircle(const fs::path& path) {
+  std::error_code none;
+  if (!fs::is_symlink(path, none)) return false;
+  for (fs::path above = fs::absolute(path, none).lexically_normal();
+       above != above.parent_path();) {
+    above = above.parent_path();
+    if (fs::equivalent(above, path, none)) return true;
+  }
+  return false;
+}
+
 }  // namespace
 
 std::string DigestText(const std::string& text) {
@@ -80,8 +92,9 @@ StatusOr<std::vector<std::string>> ListFilesRecursively(
     // A link that leads nowhere, or to itself, is no file.
     std::error_code none;
     if (entry->is_directory(none)) {
-      if (is_hidden || (!excluded.empty() &&
-                        fs::equivalent(entry->path(), excluded, none))) {
+      if (is_hidden || IsCircle(entry->path()) ||
+          (!excluded.empty() &&
+           fs::equivalent(entry->path(), excluded, none))) {
         entry.disable_recursion_pending();
       }
       continue;

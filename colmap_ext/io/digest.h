@@ -27,7 +27,8 @@ std::string DigestFiles(const std::string& folder,
                         const std::vector<std::string>& names);
 
 // The regular files below a folder, hidden ones left out, as paths relative to
-// it, sorted; without those in `excluded`, a folder that may lie in it.
+// it, sorted; without those in `excluded`, a folder that may lie in it. Links
+// are followed, but none to a folder that holds the link.
 StatusOr<std::vector<std::string>> ListFilesRecursively(
     const std::string& folder, const std::string& excluded = "");
 

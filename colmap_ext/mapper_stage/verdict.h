@@ -2,6 +2,7 @@
 #pragma once
 
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -36,6 +37,9 @@ struct Verdict {
   bool is_metric = false;  // all models are
   // Where metres come from; empty without.
   std::string metric_source;
+  // Relative 1 sigma of the metres, where wheels alone tell them; filled by the
+  // caller, from what the import says.
+  std::optional<double> metric_sigma;
   std::vector<PriorAgreement> priors;
   // Of each camera, in the model where it is largest.
   std::map<camera_t, LensError> lens_errors;

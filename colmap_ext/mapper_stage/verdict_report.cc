@@ -51,6 +51,10 @@ std::string FormatVerdict(const Verdict& verdict) {
                ? "no metres"
                : FormatOfModels(verdict.num_metric_models, verdict.num_models) +
                      "in metres from " + verdict.metric_source);
+  if (verdict.num_metric_models > 0 && verdict.metric_sigma) {
+    text << " (to " << std::setprecision(2) << 100.0 * *verdict.metric_sigma
+         << " %)";
+  }
   for (const PriorAgreement& priors : verdict.priors) {
     text << ", " << priors.kind << "s agree to "
          << FormatShare(1.0 - priors.share_contradicting);
@@ -78,6 +82,7 @@ nlohmann::json VerdictToJson(const Verdict& verdict) {
       {"keypoint_sigma_px", verdict.keypoint_sigma_px},
       {"keypoint_sigma_factor", verdict.keypoint_sigma_factor},
       {"mean_reproj_error_px", verdict.mean_reproj_error_px}};
+  if (verdict.metric_sigma) json["metric_sigma"] = *verdict.metric_sigma;
   json["priors"] = nlohmann::json::array();
   for (const PriorAgreement& priors : verdict.priors) {
     json["priors"].push_back(

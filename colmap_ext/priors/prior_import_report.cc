@@ -106,8 +106,11 @@ std::string FormatPriorImport(const PriorImport& import) {
       text << "  slip              " << slip.start_ns << " to " << slip.end_ns
            << " ns, " << slip.speed_error_m_s << " m/s off\n";
     }
-    text << "expected drift      " << summary.drift_per_100m_m << " m and "
-         << summary.drift_per_100m_deg << " deg per 100 m\n";
+    text << "expected drift      " << summary.drift_per_100m_m << " m";
+    if (summary.drift_per_100m_deg > 0.0) {
+      text << " and " << summary.drift_per_100m_deg << " deg";
+    }
+    text << " per 100 m\n";
   }
   if (import.num_fixes > 0) text << PositionLines(import);
   for (const std::string& warning : import.warnings) {

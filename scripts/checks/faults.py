@@ -50,6 +50,9 @@ def parse_arguments():
                       help='no trial begins later; all campaigns get their '
                       'share')
   parser.add_argument('--seed', type=int, default=1)
+  parser.add_argument('--journal', metavar='FILE',
+                      help='writes each trial there, a line each, and counts '
+                      'those that are there in place of running them again')
   parser.add_argument('--replay', metavar='CAMPAIGN:NUMBER',
                       help='this trial alone')
   parser.add_argument('--folder', help='keep worlds and the last trial there')
@@ -64,8 +67,29 @@ class Runner:
                       'injections': Injections(build_shim(folder)),
                       'limits': try_limit, 'twice': try_two, 'files': try_file}
     self.counts = {name: collections.Counter() for name in CAMPAIGNS}
+    self.journal = self.read_journal()
+
+  def read_journal(self):
+    """Outcome of each trial of this seed that was run before."""
+    if not self.args.journal or not os.path.exists(self.args.journal):
+      return {}
+    with open(self.args.journal) as file:
+      rows = [line.rstrip('\n').split('\t') for line in file
+              if line.endswith('\n')]
+    return {(campaign, int(number)): outcome
+            for seed, campaign, number, outcome in rows
+            if int(seed) == self.args.seed}
+
+  def write_journal(self, campaign, number, outcome):
+    if self.args.journal:
+      with open(self.args.journal, 'a') as file:
+        file.write('%d\t%s\t%d\t%s\n' % (self.args.seed, campaign, number,
+                                         outcome))
 
   def run(self, campaign, number):
+    if (campaign, number) in self.journal:
+      self.counts[campaign][self.journal[campaign, number]] += 1
+      return
     generator = random.Random('%d %s %d' % (self.args.seed, campaign, number))
     try:
       outcome = self.functions[campaign](self.world, generator, number)
@@ -74,6 +98,7 @@ class Runner:
       print('--seed %d --replay %s:%d: %s' % (self.args.seed, campaign, number,
                                               error), flush=True)
     self.counts[campaign][outcome] += 1
+    self.write_journal(campaign, number, outcome)
 
   def run_all(self):
     """The campaign that lacks most of its share is next."""

@@ -86,7 +86,7 @@ class WheelChecker {
 
 double WheelChecker::LogLikelihood(const WheelFit& fit) const {
   const auto gain = [&](double correlation) {
-    return -0.5 * fit.num_windows / kBinsPerObservation *
+    return -0.5 * fit.sum_of_weights / kBinsPerObservation *
            std::log(1.0 - 0.999 * correlation * correlation);
   };
   // Acceleration has a sign; yaw may be that of exchanged wheels.
@@ -213,7 +213,7 @@ std::string WheelChecker::CheckAxes(const WheelFit& fit) const {
     return std::log(1.0 - 0.999 * correlation * correlation);
   };
   const double evidence =
-      fit.num_windows / kBinsPerObservation *
+      fit.sum_of_weights / kBinsPerObservation *
       (misfit(fit.force_correlation) - misfit(fit.mirrored_correlation));
   if (evidence < kMinEvidence) return "";
   return "the accelerometer's horizontal axes do not fit the wheels and the "

@@ -14,6 +14,8 @@ namespace adasfm {
 // How the wheels' motion fits the IMU's over windows of 0.4 s.
 struct WheelFit {
   int num_windows = 0;
+  // Slipping windows count little (FitWheels).
+  double sum_of_weights = 0.0;
   // True horizontal acceleration per logged one, as a complex number in the
   // wheel frame's plane: 1 when all is right, 1 / 3.6 for km/h, -1 for wheels
   // that count backwards; and its correlation.

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <complex>
 
+#include "core/median.h"
 #include "sensors/calibration_check/check_wheels.h"
 
 namespace adasfm {
@@ -18,12 +19,20 @@ constexpr double kWeights[] = {0.125, 0.25, 0.25, 0.25, 0.125};
 // Of longer drives the first hour tells enough.
 constexpr double kMaxLengthS = 3600.0;
 
+// Errors beyond so many sigmas are slips; no error below this is one, m/s^2.
+constexpr double kMaxSigmas = 3.0;
+constexpr double kMinSlip = 0.1;
+// Of the length of a plane vector with unit sigmas.
+constexpr double kRayleighMedian = 1.1774;
+constexpr int kNumReweightings = 10;
+
 // What both logs say of one window.
 struct Window {
   Complex acceleration;  // logged by the wheels, turned by the gyroscope
   Complex force;
   double wheel_yaw = 0.0;
   double gyroscope_yaw = 0.0;
+  double weight = 1.0;
 };
 
 bool IsFull(const MotionBins& bins, int middle, bool of_imu) {
@@ -64,8 +73,10 @@ std::vector<Window> MakeWindows(const MotionBins& bins,
 // Biases, tilt and mounting are constants: only what varies is compared.
 void SubtractMeans(std::vector<Window>* windows) {
   Window mean;
+  double sum = 0.0;
+  for (const Window& window : *windows) sum += window.weight;
   for (const Window& window : *windows) {
-    const double share = 1.0 / windows->size();
+    const double share = window.weight / sum;
     mean.acceleration += share * window.acceleration;
     mean.force += share * window.force;
     mean.wheel_yaw += share * window.wheel_yaw;
@@ -77,6 +88,37 @@ void SubtractMeans(std::vector<Window>* windows) {
     window.wheel_yaw -= mean.wheel_yaw;
     window.gyroscope_yaw -= mean.gyroscope_yaw;
   }
+}
+
+// Slipping wheels accelerate where the drive does not, by so much that two
+// slips hide the rest of a short log. The logged acceleration is therefore
+// fitted to the force, which has no such outliers, by iteratively reweighted
+// least squares (Cauchy, scale from the median): a window far off the fit
+// counts little.
+void WeighSlips(std::vector<Window>* windows) {
+  for (int i = 0; i < kNumReweightings; ++i) {
+    SubtractMeans(windows);
+    Complex product = 0.0;
+    double square = 0.0;
+    for (const Window& window : *windows) {
+      product += window.weight * window.acceleration * std::conj(window.force);
+      square += window.weight * std::norm(window.force);
+    }
+    if (square <= 0.0) return;
+    std::vector<double> errors;
+    for (const Window& window : *windows) {
+      errors.push_back(
+          std::abs(window.acceleration - product / square * window.force));
+    }
+    std::vector<double> sorted = errors;
+    const double limit =
+        std::max(kMinSlip, kMaxSigmas / kRayleighMedian * UpperMedian(&sorted));
+    for (size_t k = 0; k < windows->size(); ++k) {
+      const double ratio = errors[k] / limit;
+      (*windows)[k].weight = 1.0 / (1.0 + ratio * ratio);
+    }
+  }
+  SubtractMeans(windows);
 }
 
 double Correlation(double product, double square1, double square2) {
@@ -141,24 +183,26 @@ WheelFit FitWheels(const MotionBins& bins, const Eigen::Matrix3d& axes,
   std::vector<Window> windows = MakeWindows(bins, axes, shift);
   fit.num_windows = static_cast<int>(windows.size());
   if (windows.empty()) return fit;
-  SubtractMeans(&windows);
+  WeighSlips(&windows);
   Complex product = 0.0, mirrored = 0.0;
   double acceleration = 0.0, force = 0.0, forward = 0.0, forward_force = 0.0,
          forward_product = 0.0, wheel_yaw = 0.0, gyroscope_yaw = 0.0,
          yaw_product = 0.0;
   for (const Window& window : windows) {
+    const double weight = window.weight;
     const Complex& a = window.acceleration;
     const Complex& f = window.force;
-    product += f * std::conj(a);
-    mirrored += f * a;
-    acceleration += std::norm(a);
-    force += std::norm(f);
-    forward += a.real() * a.real();
-    forward_force += f.real() * f.real();
-    forward_product += a.real() * f.real();
-    wheel_yaw += window.wheel_yaw * window.wheel_yaw;
-    gyroscope_yaw += window.gyroscope_yaw * window.gyroscope_yaw;
-    yaw_product += window.wheel_yaw * window.gyroscope_yaw;
+    fit.sum_of_weights += weight;
+    product += weight * f * std::conj(a);
+    mirrored += weight * f * a;
+    acceleration += weight * std::norm(a);
+    force += weight * std::norm(f);
+    forward += weight * a.real() * a.real();
+    forward_force += weight * f.real() * f.real();
+    forward_product += weight * a.real() * f.real();
+    wheel_yaw += weight * window.wheel_yaw * window.wheel_yaw;
+    gyroscope_yaw += weight * window.gyroscope_yaw * window.gyroscope_yaw;
+    yaw_product += weight * window.wheel_yaw * window.gyroscope_yaw;
   }
   if (acceleration > 0.0) fit.force = product / acceleration;
   if (gyroscope_yaw > 0.0) fit.yaw = yaw_product / gyroscope_yaw;
@@ -168,8 +212,8 @@ WheelFit FitWheels(const MotionBins& bins, const Eigen::Matrix3d& axes,
   fit.forward_correlation =
       Correlation(forward_product, forward, forward_force);
   fit.yaw_correlation = Correlation(yaw_product, wheel_yaw, gyroscope_yaw);
-  fit.acceleration_rms = std::sqrt(acceleration / windows.size());
-  fit.yaw_rate_rms = std::sqrt(gyroscope_yaw / windows.size());
+  fit.acceleration_rms = std::sqrt(acceleration / fit.sum_of_weights);
+  fit.yaw_rate_rms = std::sqrt(gyroscope_yaw / fit.sum_of_weights);
   return fit;
 }
 

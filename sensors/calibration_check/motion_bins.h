@@ -39,8 +39,9 @@ class MotionBins {
   std::vector<Bin> bins_;
 };
 
-// The fit when the force's axes (in the wheel frame) are read as axes * force,
-// and the wheels' bins are taken as so many bins later.
+// The fit, in which slipping wheels count little, when the force's axes (in the
+// wheel frame) are read as axes * force, and the wheels' bins are taken as so
+// many bins later.
 WheelFit FitWheels(const MotionBins& bins, const Eigen::Matrix3d& axes,
                    int shift);
 

@@ -56,6 +56,13 @@ StatusOr<LogFile> LogFile::Read(const std::string& path) {
   return Parse(path, std::move(text));
 }
 
+void SkipByteOrderMark(std::istream* stream) {
+  std::string begin(kByteOrderMark.size(), '\0');
+  stream->read(begin.data(), begin.size());
+  stream->clear();
+  if (begin != kByteOrderMark) stream->seekg(0);
+}
+
 StatusOr<LogFile> LogFile::Parse(const std::string& path, std::string text) {
   LogFile file;
   file.path_ = path;

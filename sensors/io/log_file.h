@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <istream>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -16,6 +17,10 @@ struct LogLine {
   size_t number = 0;  // from 1, as editors count
   std::vector<std::string_view> fields;
 };
+
+// Past the mark that editors of Windows begin a text with, if it is there; the
+// stream is at its begin.
+void SkipByteOrderMark(std::istream* stream);
 
 // A text log in memory. Fields are separated by commas when the first data line
 // has any, else by white space; '#' begins a comment line, and so does a first

@@ -12,6 +12,13 @@
 namespace adasfm {
 namespace {
 
+TEST(EffectiveNumThreads, NoThreadsThatOnlyCostTime) {
+  const int num_hardware = EffectiveNumThreads(-1);
+  EXPECT_GE(num_hardware, 1);
+  EXPECT_EQ(EffectiveNumThreads(3), 3);
+  EXPECT_LE(EffectiveNumThreads(10000), 16 * num_hardware);
+}
+
 TEST(ParallelFor, CallsEveryIndexOnce) {
   for (const int num_threads : {1, 2, 7, -1}) {
     for (const size_t count : {0u, 1u, 5u, 1000u}) {

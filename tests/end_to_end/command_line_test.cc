@@ -146,6 +146,11 @@ TEST_F(CommandLineTest, ProjectFile) {
       "project.ini", "database_path=" + folder_.File("from_file.db") +
                          "\n[SiftExtraction]\nmax_num_features=9\n");
   ExpectError("adasfm_restorer --project_path " + project, "from_file.db");
+  ExpectError("adasfm_restorer --project_path " +
+                  folder_.Write("windows.ini",
+                                "\xEF\xBB\xBF"
+                                "database_path=windows.db\n"),
+              "windows.db");
   ExpectError("adasfm_restorer --project_path " + project +
                   " --database_path " + folder_.File("from_line.db"),
               "from_line.db");
@@ -224,7 +229,11 @@ TEST_F(ImporterTest, EitherSensorAlone) {
     EXPECT_TRUE(prior.HasRotation());
     EXPECT_FALSE(prior.HasLength());
   }
-  ASSERT_EQ(Call(Arguments("imu_path", "''")).ExitCode(), 0);
+  const Run wheels_alone = Call(Arguments("imu_path", "''"));
+  ASSERT_EQ(wheels_alone.ExitCode(), 0);
+  // Nobody knows how far they turn wrongly.
+  EXPECT_NE(wheels_alone.out.find("m per 100 m"), std::string::npos);
+  EXPECT_EQ(wheels_alone.out.find("deg per 100 m"), std::string::npos);
   loaded = ReadPriorTables(database_);
   ASSERT_FALSE(loaded->tables.priors.empty());
   for (const RelativePosePrior& prior : loaded->tables.priors) {

@@ -70,6 +70,10 @@ TEST_F(FilesTest, VerdictClosesTheMapper) {
   EXPECT_THAT(run.out, HasSubstr("\nVerdict: good. 40 of 40 images"));
   EXPECT_EQ(Verdict()["result"], "good");
   EXPECT_EQ(Verdict()["metric_source"], "wheels");
+  // The wheels' radius is known to 1 %, and better once the drive has begun.
+  EXPECT_GT(Verdict()["metric_sigma"], 0.0);
+  EXPECT_LT(Verdict()["metric_sigma"], 0.01);
+  EXPECT_THAT(run.out, HasSubstr("in metres from wheels (to 0."));
   // And opens the report.
   const Run report = Call("adasfm_reporter --input_path " + folder_.File("m") +
                           " --output_path " + folder_.File("report.html"));

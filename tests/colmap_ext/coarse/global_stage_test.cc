@@ -8,6 +8,11 @@
 #include <string>
 
 #include "colmap_ext/coarse/global_report.h"
+#include "colmap_ext/coarse/refine_stage_matches.h"
+#include "colmap_ext/host/colmap.h"
+#include "colmap_ext/host/pose_conversion.h"
+#include "colmap_ext/scene/raw_matches.h"
+#include "colmap_ext/scene/scene_bearings.h"
 #include "tests/testing/colmap_ext/synthetic_scene.h"
 
 namespace adasfm {
@@ -105,6 +110,32 @@ TEST(RunGlobalStageTest, RefinedMatchesAreTrueOnes) {
   }
   EXPECT_EQ(num_lines, result.removed_pairs.size());
   EXPECT_GT(num_refuted, 0);
+}
+
+// Two equal photos of a camera that stood still, some rounding apart.
+TEST(RefineStageMatchesTest, EqualPhotosHaveNoGeometry) {
+  SceneData scene = BuildSyntheticScene(BuildSyntheticWorld(SmallWorld()),
+                                        SyntheticPriorOptions());
+  GlobalStageResult result = RunStage(scene);
+  ScenePair& pair = scene.pairs.front();
+  SceneImage& copy = scene.images.at(pair.image_id2);
+  copy.keypoints = scene.images.at(pair.image_id1).keypoints;
+  pair.inlier_matches.clear();
+  for (size_t i = 0; i < copy.keypoints.size(); ++i) {
+    pair.inlier_matches.emplace_back(i, i);
+  }
+  pair.raw_matches = pair.inlier_matches;
+  colmap::Reconstruction& model = result.models[0].reconstruction;
+  Rigid3d pose = CamFromWorld(model.Image(pair.image_id1));
+  pose.translation.x() += 1e-14;
+  SetCamFromWorld(pose, &model.Image(pair.image_id2));
+  result.geometries.clear();
+  RefineStageMatches(GlobalStageOptions(), scene, RawMatchesOfScene(scene),
+                     ComputeSceneBearings(scene, 1), &result);
+  EXPECT_FALSE(result.geometries.empty());
+  for (const NewTwoViewGeometry& geometry : result.geometries) {
+    EXPECT_FALSE(geometry.cam2_from_cam1.translation.isZero());
+  }
 }
 
 // With keypoints that err by 2 px half of the true matches are further than 4

@@ -240,7 +240,9 @@ TEST(ReadGroundTruth, LinesModelAndTrajectoryAgree) {
   WriteModel(poses, folder.File("model"));
   for (const std::string& path :
        {folder.Write("gt.txt", PoseLines(poses)), folder.File("model"),
-        folder.Write("tum.txt", trajectory.str())}) {
+        folder.Write("tum.txt", trajectory.str()),
+        folder.Write("windows.txt", "\xEF\xBB\xBF" + PoseLines(poses)),
+        folder.Write("windows_tum.txt", "\xEF\xBB\xBF" + trajectory.str())}) {
     const StatusOr<NamedPoses> read =
         ReadGroundTruth(path, names, GroundTruthOptions());
     ASSERT_TRUE(read.ok()) << read.status().message();

@@ -79,5 +79,23 @@ TEST(ListFilesRecursively, PassesOverLinksThatLeadNowhere) {
   EXPECT_THAT(*names, testing::ElementsAre("photo.jpg"));
 }
 
+TEST(ListFilesRecursively, FollowsNoLinkInCircles) {
+  const TemporaryFolder folder;
+  namespace fs = std::filesystem;
+  fs::create_directories(folder.File("images/left"));
+  fs::create_directories(folder.File("elsewhere"));
+  folder.Write("images/left/photo.jpg", "x");
+  folder.Write("elsewhere/other.jpg", "x");
+  fs::create_directory_symlink(".", folder.File("images/self"));
+  fs::create_directory_symlink("..", folder.File("images/left/up"));
+  fs::create_directory_symlink("../..", folder.File("images/left/above"));
+  fs::create_directory_symlink("../elsewhere", folder.File("images/linked"));
+  fs::create_directory_symlink("../images", folder.File("elsewhere/back"));
+  const auto names = ListFilesRecursively(folder.File("images"));
+  ASSERT_TRUE(names.ok()) << names.status().message();
+  EXPECT_THAT(*names,
+              testing::ElementsAre("left/photo.jpg", "linked/other.jpg"));
+}
+
 }  // namespace
 }  // namespace adasfm

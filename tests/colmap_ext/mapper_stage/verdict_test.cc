@@ -71,6 +71,15 @@ TEST_F(VerdictTest, HonestModelIsGood) {
   EXPECT_EQ(json["num_images"], 40);
   EXPECT_EQ(json["priors"][0]["kind"], "rotation");
   EXPECT_EQ(json["line"], FormatVerdict(verdict));
+  EXPECT_FALSE(json.contains("metric_sigma"));
+}
+
+TEST_F(VerdictTest, SaysHowWellMetresAreKnown) {
+  Verdict verdict = Assess();
+  verdict.metric_sigma = 0.0074;
+  ExpectResult(verdict, VerdictResult::kGood,
+               "in metres from wheels (to 0.74 %)");
+  EXPECT_EQ(VerdictToJson(verdict)["metric_sigma"], 0.0074);
 }
 
 TEST_F(VerdictTest, LostImages) {

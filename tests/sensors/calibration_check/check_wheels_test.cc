@@ -40,24 +40,15 @@ TEST(CheckWheels, SaysNothingOfHealthyDrives) {
   }
 }
 
-// Wheels that slip by 3 % each, and spin four times, correlate with the IMU by
-// less than a half on some of these drives, but best at their own clock. On one
-// of the ten another clock fits nearly as well, for its streets are alike.
+// Wheels that slip by 10 % each all the time, and spin four times.
 TEST(CheckWheels, TakesWheelsOnGravel) {
-  int num_refused = 0;
-  int num_taken_though_unlike = 0;
   for (uint64_t seed = 1; seed <= 10; ++seed) {
     SyntheticWorldOptions options = SmallWorld(seed, 150);
-    options.wheel_slip_sigma = 0.03;
+    options.wheel_slip_sigma = 0.1;
     options.num_wheel_slips = 4;
     const WheelCheck check = Check(ToDataset(BuildSyntheticWorld(options)));
-    const bool is_unlike =
-        check.fit.yaw_correlation < 0.5 && check.fit.force_correlation < 0.5;
-    num_refused += !check.contradiction.empty();
-    num_taken_though_unlike += is_unlike && check.contradiction.empty();
+    EXPECT_EQ(check.contradiction, "") << seed;
   }
-  EXPECT_LE(num_refused, 1);
-  EXPECT_GE(num_taken_though_unlike, 1);
 }
 
 TEST(CheckWheels, SaysNothingOfRealDrives) {
@@ -92,6 +83,30 @@ TEST(CheckWheels, NamesWheelsThatCountBackwards) {
         }
       },
       "count backwards");
+}
+
+// Two slips in 16 s of driving: their accelerations are the largest of the log.
+TEST(CheckWheels, NamesMistakesOfShortDrivesWithSlips) {
+  const auto scale = [](double factor, Dataset* data) {
+    for (WheelSample& sample : data->logs.wheel) {
+      sample.first *= factor;
+      sample.second *= factor;
+    }
+  };
+  for (uint64_t seed = 1; seed <= 10; ++seed) {
+    SyntheticWorldOptions options = SmallWorld(seed, 60);
+    options.num_wheel_slips = 2;
+    const Dataset drive = ToDataset(BuildSyntheticWorld(options));
+    EXPECT_EQ(Check(drive).contradiction, "") << seed;
+    for (const auto& [factor, words] : {std::make_pair(-1.0, "count backwards"),
+                                        std::make_pair(3.6, "like km/h")}) {
+      Dataset data = drive;
+      scale(factor, &data);
+      const std::string text = Check(data).contradiction;
+      EXPECT_NE(text.find(words), std::string::npos)
+          << "seed " << seed << ": '" << text << "'";
+    }
+  }
 }
 
 TEST(CheckWheels, NamesATurnedWheelFrame) {
