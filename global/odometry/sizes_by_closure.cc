@@ -41,15 +41,13 @@ class ClosureProblem {
   Eigen::MatrixXd SizeCovariance() {
     const Eigen::SparseMatrix<double> information = Information();
     const Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>> ldlt(information);
-    Eigen::MatrixXd selection =
-        Eigen::MatrixXd::Zero(information.rows(), ring_sets_.size());
-    for (size_t a = 0; a < ring_sets_.size(); ++a) {
-      selection(kUnknowns * a, a) = 1.0;
-    }
-    const Eigen::MatrixXd columns = ldlt.solve(selection);
     Eigen::MatrixXd covariance(ring_sets_.size(), ring_sets_.size());
     for (size_t a = 0; a < ring_sets_.size(); ++a) {
-      covariance.row(a) = columns.row(kUnknowns * a);
+      const Eigen::VectorXd column =
+          ldlt.solve(Eigen::VectorXd::Unit(information.rows(), kUnknowns * a));
+      for (size_t b = 0; b < ring_sets_.size(); ++b) {
+        covariance(b, a) = column[kUnknowns * b];
+      }
     }
     return covariance;
   }
