@@ -3,14 +3,21 @@
 """Verdict against error: is a model that is called good a good one?
 
 Runs the chain on synthetic worlds, as they are, hard, and spoilt in ways that
-users spoil them, and prints a table of the verdict of adasfm_mapper beside the
-model's error over the limit: the error of the mapper from the true poses on the
-unspoilt data. Fails when a model above MAX_GOOD_RATIO times the limit is called
-good, or one within it is called failed for another reason than that most images
-are lost. Needs only Python's standard library.
+users spoil them, and prints a table of the verdict of adasfm_mapper beside
+- the error of the model's shape (after a similarity) over that of the limit, the
+  mapper from the true poses on the unspoilt data;
+- how many of its stated sigmas (`metric_sigma` of the verdict) its metres are
+  off: the limit's own metres come from the same wheels, so that comparing
+  errors in metres would compare two draws of one scale;
+- the error in metres and its ratio to the limit's, for who wants it.
+Fails when a model above MAX_GOOD_RATIO times the limit's shape, or of metres
+off by more than MAX_GOOD_SIGMAS, is called good, or one within both is called
+failed for another reason than that most images are lost. Needs only Python's
+standard library.
 """
 
 import argparse
+import collections
 import json
 import os
 import random
@@ -26,6 +33,7 @@ from benchmarking.spoil import cut_logs, scale_focal_length
 from global_worlds import PLAIN, WORLDS, world
 
 MAX_GOOD_RATIO = 3.0
+MAX_GOOD_SIGMAS = 3.0
 # So that few images have room for it: streets are driven once.
 BASE = dict(PLAIN, alias_ratio=0, num_blackouts=1, blackout_images=6)
 # Of worlds that ask for look-alikes or longer blackouts.
@@ -110,6 +118,12 @@ WRONG = {
 }
 
 
+# Errors of a model: of its shape and in metres as they are (of the shape when
+# there are none) [m], true metres per metre, and their stated relative sigma;
+# None: no metres, or no stated sigma.
+Errors = collections.namedtuple('Errors', 'shape_m metric_m scale sigma')
+
+
 class Chain:
   def __init__(self, colmap, folder):
     self.colmap = colmap
@@ -142,20 +156,21 @@ class Chain:
     with open(self.path('evaluation.json')) as file:
       return json.load(file)
 
-  def shape_error_m(self, output):
-    return self.evaluate(output)['sim3_least_squares']['translation_rmse_m']
-
-  def error_m(self, output):
-    """In metres as they are, or of the shape when there are none."""
+  def errors(self, output):
     evaluation = self.evaluate(output)
     with open(self.path(output + '/summary.json')) as file:
-      is_metric = json.load(file)['is_metric']
-    kind = 'se3_least_squares' if is_metric else 'sim3_least_squares'
-    return evaluation[kind]['translation_rmse_m']
+      summary = json.load(file)
+    shape = evaluation['sim3_least_squares']
+    if not summary['is_metric']:
+      return Errors(shape['translation_rmse_m'], shape['translation_rmse_m'],
+                    None, None)
+    return Errors(shape['translation_rmse_m'],
+                  evaluation['se3_least_squares']['translation_rmse_m'],
+                  shape['scale'], summary['verdict'].get('metric_sigma'))
 
 
 def run_world(colmap, folder, options, images, seed):
-  """Verdict, error, limit and the last line of what was said."""
+  """Verdict, Errors, those of the limit and the last line of what was said."""
   shutil.rmtree(folder, ignore_errors=True)
   chain = Chain(colmap, folder)
   arguments = dict(BASE, **options['synthesizer'])
@@ -172,25 +187,40 @@ def run_world(colmap, folder, options, images, seed):
                    chain.path('truth'), matched_only=False)
   # Its own verdict may be "failed", with a model all the same.
   chain.mapper('truth', 'limit', {})
-  limit_m = (max(LEAST_LIMIT_M, chain.error_m('limit'))
-             if os.path.exists(chain.path('limit/summary.json')) else None)
+  limit = (chain.errors('limit')
+           if os.path.exists(chain.path('limit/summary.json')) else None)
   if options['spoil']:
     options['spoil'](folder)
     imported = chain.importer(options)
     if imported.returncode != 0:
-      return 'refused by the importer', None, limit_m, imported.stderr
+      return 'refused by the importer', None, limit, imported.stderr
   coarse = chain.call('global', '--database_path', chain.path('database.db'),
                       '--output_path', chain.path('g'),
                       *options.get('global', []))
   if coarse.returncode != 0:
-    return 'refused by adasfm_global', None, limit_m, coarse.stderr
+    return 'refused by adasfm_global', None, limit, coarse.stderr
   done = chain.mapper('g/0', 'm', options)
   try:
     with open(chain.path('m/summary.json')) as file:
       verdict = json.load(file)['verdict']
   except OSError:
-    return 'no model', None, limit_m, done.stderr
-  return verdict['result'], chain.error_m('m'), limit_m, verdict['line']
+    return 'no model', None, limit, done.stderr
+  return verdict['result'], chain.errors('m'), limit, verdict['line']
+
+
+def judge(result, said, errors, limit):
+  """Ratio of shapes, sigmas of the metres, ratio in metres, is it wrong."""
+  if errors is None or limit is None:
+    return None, None, None, False
+  shape = errors.shape_m / limit.shape_m
+  metric = errors.metric_m / max(LEAST_LIMIT_M, limit.metric_m)
+  sigmas = abs(errors.scale - 1.0) / errors.sigma if errors.sigma else None
+  # Metres without a stated sigma have to be as good as the limit's.
+  is_right = shape <= MAX_GOOD_RATIO and (
+      sigmas <= MAX_GOOD_SIGMAS if errors.sigma else metric <= MAX_GOOD_RATIO)
+  is_wrong = (result == 'good' and not is_right or
+              result == 'failed' and is_right and not LOST_IMAGES.search(said))
+  return shape, sigmas, metric, is_wrong
 
 
 def main():
@@ -203,23 +233,21 @@ def main():
   args = parser.parse_args()
   colmap = os.path.abspath(args.colmap)
   num_wrong = 0
-  print('| world | seed | verdict | error [m] | limit [m] | ratio | said |')
-  print('|---|---|---|---|---|---|---|')
+  print('| world | seed | verdict | shape: ratio | metres: sigmas off | error [m] '
+        '| limit [m] | ratio | said |')
+  print('|---|---|---|---|---|---|---|---|---|')
   for name, options in {**WORLDS, **WRONG}.items():
     if args.only not in name:
       continue
     for seed in args.seeds:
       folder = os.path.join(os.path.abspath(args.folder), 'world')
-      result, error_m, limit_m, said = run_world(colmap, folder, options,
-                                                 args.images, seed)
-      ratio = error_m / limit_m if error_m is not None and limit_m else None
-      is_wrong = ratio is not None and (
-          result == 'good' and ratio > MAX_GOOD_RATIO or
-          result == 'failed' and ratio <= MAX_GOOD_RATIO and
-          not LOST_IMAGES.search(said))
+      result, errors, limit, said = run_world(colmap, folder, options,
+                                              args.images, seed)
+      shape, sigmas, metric, is_wrong = judge(result, said, errors, limit)
       num_wrong += is_wrong
       numbers = ['-' if value is None else '%.3g' % value
-                 for value in (error_m, limit_m, ratio)]
+                 for value in (shape, sigmas, errors and errors.metric_m,
+                               limit and limit.metric_m, metric)]
       print('| %s | %d | %s%s | %s | %s |' % (
           name, seed, result, ' (WRONG)' if is_wrong else '',
           ' | '.join(numbers), said.strip().replace('|', '/')[:300]),

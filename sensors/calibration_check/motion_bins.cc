@@ -5,7 +5,6 @@
 #include <cmath>
 #include <complex>
 
-#include "core/median.h"
 #include "sensors/calibration_check/check_wheels.h"
 
 namespace adasfm {
@@ -22,8 +21,10 @@ constexpr double kMaxLengthS = 3600.0;
 // Errors beyond so many sigmas are slips; no error below this is one, m/s^2.
 constexpr double kMaxSigmas = 3.0;
 constexpr double kMinSlip = 0.1;
-// Of the length of a plane vector with unit sigmas.
-constexpr double kRayleighMedian = 1.1774;
+// Slips may fill more than half of a short log, but hardly three quarters: the
+// noise is that of the least quarter of the errors. Of plane vectors with unit
+// sigmas a quarter is shorter than this.
+constexpr double kRayleighQuarter = 0.7585;
 constexpr int kNumReweightings = 10;
 
 // What both logs say of one window.
@@ -93,8 +94,8 @@ void SubtractMeans(std::vector<Window>* windows) {
 // Slipping wheels accelerate where the drive does not, by so much that two
 // slips hide the rest of a short log. The logged acceleration is therefore
 // fitted to the force, which has no such outliers, by iteratively reweighted
-// least squares (Cauchy, scale from the median): a window far off the fit
-// counts little.
+// least squares (Cauchy, noise from the least quarter): a window far off the
+// fit counts little.
 void WeighSlips(std::vector<Window>* windows) {
   for (int i = 0; i < kNumReweightings; ++i) {
     SubtractMeans(windows);
@@ -111,8 +112,10 @@ void WeighSlips(std::vector<Window>* windows) {
           std::abs(window.acceleration - product / square * window.force));
     }
     std::vector<double> sorted = errors;
+    const auto quarter = sorted.begin() + sorted.size() / 4;
+    std::nth_element(sorted.begin(), quarter, sorted.end());
     const double limit =
-        std::max(kMinSlip, kMaxSigmas / kRayleighMedian * UpperMedian(&sorted));
+        std::max(kMinSlip, kMaxSigmas / kRayleighQuarter * *quarter);
     for (size_t k = 0; k < windows->size(); ++k) {
       const double ratio = errors[k] / limit;
       (*windows)[k].weight = 1.0 / (1.0 + ratio * ratio);

@@ -121,8 +121,8 @@ TEST(RefineStageMatchesTest, EqualPhotosHaveNoGeometry) {
   SceneImage& copy = scene.images.at(pair.image_id2);
   copy.keypoints = scene.images.at(pair.image_id1).keypoints;
   pair.inlier_matches.clear();
-  for (size_t i = 0; i < copy.keypoints.size(); ++i) {
-    pair.inlier_matches.emplace_back(i, i);
+  for (uint32_t i = 0; i < copy.keypoints.size(); ++i) {
+    pair.inlier_matches.push_back({i, i});
   }
   pair.raw_matches = pair.inlier_matches;
   colmap::Reconstruction& model = result.models[0].reconstruction;
@@ -130,9 +130,15 @@ TEST(RefineStageMatchesTest, EqualPhotosHaveNoGeometry) {
   pose.translation.x() += 1e-14;
   SetCamFromWorld(pose, &model.Image(pair.image_id2));
   result.geometries.clear();
+  result.removed_pairs.clear();
   RefineStageMatches(GlobalStageOptions(), scene, RawMatchesOfScene(scene),
                      ComputeSceneBearings(scene, 1), &result);
   EXPECT_FALSE(result.geometries.empty());
+  // Its matches agree, so that it is not removed, and keeps its verified row.
+  const ImagePair equal(pair.image_id1, pair.image_id2);
+  EXPECT_EQ(std::count(result.removed_pairs.begin(), result.removed_pairs.end(),
+                       equal),
+            0);
   for (const NewTwoViewGeometry& geometry : result.geometries) {
     EXPECT_FALSE(geometry.cam2_from_cam1.translation.isZero());
   }

@@ -85,6 +85,16 @@ TEST(CheckWheels, NamesWheelsThatCountBackwards) {
       "count backwards");
 }
 
+// A short drive that slips half of the time is healthy.
+TEST(CheckWheels, TakesEightSlipsInSixteenSeconds) {
+  for (uint64_t seed = 1; seed <= 10; ++seed) {
+    SyntheticWorldOptions options = SmallWorld(seed, 60);
+    options.num_wheel_slips = 8;
+    EXPECT_EQ(Check(ToDataset(BuildSyntheticWorld(options))).contradiction, "")
+        << seed;
+  }
+}
+
 // Two slips in 16 s of driving: their accelerations are the largest of the log.
 TEST(CheckWheels, NamesMistakesOfShortDrivesWithSlips) {
   const auto scale = [](double factor, Dataset* data) {
