@@ -397,7 +397,9 @@ void Smoother::FillCovariances(OdometryFusionResult* result) const {
   result->accelerometer_check = checks.accelerometer;
   result->wheel_speed_check = checks.wheel_speed.Check();
   result->wheel_yaw_check = checks.wheel_yaw.Check();
-  result->wheel_persistence = checks.wheel_persistence.Ratio();
+  // The less the smoother follows the wheels, the more of it residuals show.
+  result->wheel_persistence =
+      problem_.wheel_persistence * checks.wheel_persistence.Ratio();
   result->speed_sigma_ratio = UpperMedian(&checks.speed_sigma_ratios);
   const Shared::Vector growth = shared.Growth();
   for (size_t k = 0; k < num_links; ++k) {
