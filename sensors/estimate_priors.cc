@@ -26,8 +26,12 @@ namespace {
 // Noise figures are corrected this often at most, within this factor of the
 // stated ones, and for as long as they change by more than estimates of some
 // hundred residuals err.
-constexpr int kMaxNumCorrections = 3;
+constexpr int kMaxNumCorrections = 6;
 constexpr double kMaxNoiseFactor = 5.0;
+// Slip is a share of the speed, which no figure of the log's noise states: on
+// gravel wheels err by 40 times theirs. Sums over seconds vary by as much more.
+constexpr double kMaxWheelNoiseFactor = 100.0;
+constexpr double kMaxWheelPersistence = 100.0;
 constexpr double kMinNoiseChange = 1.2;
 // The smoother finds a delay of the wheels that is within its prior.
 constexpr double kMaxDelaySigmas = 2.0;
@@ -36,9 +40,8 @@ constexpr double kMaxDelaySigmas = 2.0;
 constexpr double kMinSameMotionCorrelation = 0.4;
 
 // Moves a factor by another, within limits; whether it moved enough to matter.
-bool Correct(double by, double min_factor, double* factor) {
-  const double corrected =
-      std::clamp(*factor * by, min_factor, kMaxNoiseFactor);
+bool Correct(double by, double min_factor, double max_factor, double* factor) {
+  const double corrected = std::clamp(*factor * by, min_factor, max_factor);
   const double change = corrected / *factor;
   if (std::max(change, 1.0 / change) < kMinNoiseChange) return false;
   *factor = corrected;
@@ -100,6 +103,7 @@ class PriorEstimator {
   bool has_visual_bias_ = false;
   Eigen::Vector3d visual_bias_ = Eigen::Vector3d::Zero();
   double visual_bias_sigma_ = 0.0;
+  double wheel_persistence_ = 1.0;  // OdometryFusionProblem's
   OdometryTimeline timeline_;
   OdometryFusionProblem problem_;
   OdometryFusionResult fused_;
@@ -303,6 +307,7 @@ void PriorEstimator::BuildProblem() {
   timeline_ = BuildTimeline(times, logs_, link_options);
   problem_.imu_from_wheel = calibration_.imu_from_wheel;
   problem_.imu_noise = calibration_.imu_noise;
+  problem_.wheel_persistence = wheel_persistence_;
   problem_.links = BuildOdometryLinks(timeline_.times_ns, logs_, calibration_,
                                       ImuBias(), link_options);
   const ImuBias bias = FirstBias();
@@ -343,11 +348,18 @@ bool PriorEstimator::CorrectNoise() {
   }
   // A smaller figure than the stated one is not believed: what wheels err by is
   // more than the noise of their readings.
-  bool any = Correct(speed.Factor(), 1.0, &summary.wheel_speed_noise_factor);
-  any |= Correct(yaw.Factor(), 1.0, &summary.wheel_yaw_noise_factor);
+  bool any = Correct(speed.Factor(), 1.0, kMaxWheelNoiseFactor,
+                     &summary.wheel_speed_noise_factor);
+  any |= Correct(yaw.Factor(), 1.0, kMaxNoiseFactor,
+                 &summary.wheel_yaw_noise_factor);
+  double persistence = std::sqrt(wheel_persistence_);
+  any |= Correct(std::sqrt(fused_.wheel_persistence / wheel_persistence_), 1.0,
+                 std::sqrt(kMaxWheelPersistence), &persistence);
+  wheel_persistence_ = persistence * persistence;
   double accelerometer = calibration_.imu_noise.accelerometer_noise_density /
                          stated_.imu_noise.accelerometer_noise_density;
-  any |= Correct(fused_.accelerometer_check.Factor(), 1.0, &accelerometer);
+  any |= Correct(fused_.accelerometer_check.Factor(), 1.0, kMaxNoiseFactor,
+                 &accelerometer);
   calibration_.imu_noise.accelerometer_noise_density =
       accelerometer * stated_.imu_noise.accelerometer_noise_density;
   calibration_.wheel_speed_noise =

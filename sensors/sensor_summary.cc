@@ -65,6 +65,11 @@ void SummarizeFusion(const OdometryFusionProblem& problem,
   if (!(logs.wheel.empty() && logs.odometry.empty())) {
     summary->wheel_scale = fused.wheel_scale;
     summary->wheel_scale_sigma = fused.wheel_scale_sigma;
+    summary->wheel_persistence = problem.wheel_persistence;
+    // White noise leaves errors of less than 0.2 % and a second.
+    if (problem.wheel_persistence > 1.0) {
+      summary->length_drift_ratio = fused.speed_sigma_ratio;
+    }
     summary->wheel_delay_s = fused.wheel_delay_s;
     summary->wheel_delay_sigma_s = fused.wheel_delay_sigma_s;
     summary->wheel_mount_deg = RadToDeg(1.0) * fused.wheel_mount;

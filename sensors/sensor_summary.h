@@ -37,6 +37,11 @@ struct SensorSummary {
   double accelerometer_noise_factor = 1.0;
   double wheel_speed_noise_factor = 1.0;
   double wheel_yaw_noise_factor = 1.0;
+  // Of the wheels' speed, see OdometryFusionProblem.
+  double wheel_persistence = 1.0;
+  // 1 sigma of the error that neighbouring motions' lengths share, as a ratio;
+  // 0 where the wheels' errors do not persist.
+  double length_drift_ratio = 0.0;
   // At the first image in the logs, in its camera frame; zero when unknown.
   Eigen::Vector3d first_gravity_in_cam = Eigen::Vector3d::Zero();
   // True speed = scale * logged speed.

@@ -11,6 +11,7 @@
 #include "colmap_ext/bundle_adjustment/factor_size.h"
 #include "colmap_ext/bundle_adjustment/position_priors.h"
 #include "colmap_ext/bundle_adjustment/reduced_system.h"
+#include "core/median.h"
 #include "core/parallel.h"
 
 namespace adasfm {
@@ -68,12 +69,19 @@ void AssignWindows(double window_s, int SharedErrorWindows::*number,
   }
 }
 
+// Once for the windows of each error, and what drifts in them.
 void AssignWindows(const SharedErrorOptions& options,
                    std::vector<PosePriorEdge>* edges) {
   AssignWindows(options.gyroscope_window_s, &SharedErrorWindows::gyroscope,
                 edges);
   AssignWindows(options.direction_window_s, &SharedErrorWindows::direction,
                 edges);
+  const double direction_sigma_rad = MedianDirectionSigma(*edges);
+  if (!(direction_sigma_rad > 0.0)) return;
+  for (PosePriorEdge& edge : *edges) {
+    edge.windows.length_per_direction =
+        options.length_drift_ratio / direction_sigma_rad;
+  }
 }
 
 // By index in `images`, those of higher index that see a point together.
@@ -189,6 +197,16 @@ PosePriorEdge PosePriorEdgeFromPrior(const RelativePosePrior& prior) {
     }
   }
   return edge;
+}
+
+double MedianDirectionSigma(const std::vector<PosePriorEdge>& edges) {
+  std::vector<double> sigmas;
+  for (const PosePriorEdge& edge : edges) {
+    if (edge.dt_s >= 0.0 && std::isfinite(edge.direction_sigma_rad)) {
+      sigmas.push_back(edge.direction_sigma_rad);
+    }
+  }
+  return UpperMedian(&sigmas);
 }
 
 bool PriorBundleAdjustmentOptions::IsValid(std::string* error) const {

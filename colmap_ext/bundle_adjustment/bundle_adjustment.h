@@ -64,6 +64,9 @@ struct PosePriorEdge {
 // do not claim stays infinite.
 PosePriorEdge PosePriorEdgeFromPrior(const RelativePosePrior& prior);
 
+// Of the directions that the motions of sensors state; 0 when none does.
+double MedianDirectionSigma(const std::vector<PosePriorEdge>& edges);
+
 struct PriorBundleAdjustmentOptions {
   // 1 sigma of a keypoint's position; the unit in which priors and keypoints
   // are compared. Half a pixel is the noise of one keypoint where residuals do

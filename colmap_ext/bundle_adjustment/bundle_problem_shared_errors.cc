@@ -6,7 +6,6 @@
 #include <memory>
 
 #include "colmap_ext/bundle_adjustment/bundle_problem.h"
-#include "core/median.h"
 
 namespace adasfm {
 namespace {
@@ -38,23 +37,17 @@ class DifferenceCost final : public ceres::SizedCostFunction<3, 3, 3> {
   double decay_;
 };
 
-// Of the directions that the motions of sensors state; 0 when none does.
-double MedianDirectionSigma(const std::vector<PosePriorEdge>& edges) {
-  std::vector<double> sigmas;
-  for (const PosePriorEdge& edge : edges) {
-    if (edge.dt_s >= 0.0 && std::isfinite(edge.direction_sigma_rad)) {
-      sigmas.push_back(edge.direction_sigma_rad);
-    }
-  }
-  return UpperMedian(&sigmas);
-}
-
 }  // namespace
 
 std::vector<double*> BundleProblem::SharedParameters(const PosePriorEdge& edge,
                                                      const PosePriorCost& cost,
                                                      PosePriorCost::Term term) {
   if (cost.parameter_block_sizes().size() == 2) return {};
+  if (term == PosePriorCost::Term::kLength) {
+    SharedBlock& drift = shared_[direction_drift_ + edge.windows.direction];
+    drift.is_used = true;
+    return {drift.values};
+  }
   if (term != PosePriorCost::Term::kRotation) {
     SharedBlock& direction = shared_[kDrivingDirection];
     SharedBlock& drift = shared_[direction_drift_ + edge.windows.direction];

@@ -107,12 +107,22 @@ PosePriorCost::PosePriorCost(const PosePriorEdge& edge, Term term,
     const Eigen::Matrix3d from_middle = CameraFromMiddle(rotation_);
     const Eigen::Matrix3d from_direction =
         -inverse_sigma_ * Hat(translation_) * from_middle;
+    // How the drift lengthens the motion, as a ratio.
+    const Eigen::RowVector3d length_ratio = edge.windows.length_per_direction *
+                                            direction_.transpose() *
+                                            from_middle;
     if (term == Term::kRotation) {
       from_shared_ = {inverse_sigma_ * (Eigen::Matrix3d::Identity() -
                                         rotation_.toRotationMatrix()),
                       inverse_sigma_ * edge.dt_s * from_middle};
     } else if (term == Term::kTranslation) {
-      from_shared_ = {from_direction, from_direction};
+      from_shared_ = {
+          from_direction,
+          from_direction + inverse_sigma_ * translation_ * length_ratio};
+    } else if (term == Term::kLength && edge.windows.length_per_direction > 0) {
+      Eigen::Matrix3d along = Eigen::Matrix3d::Zero();
+      along.row(0) = inverse_sigma_ * length_ * length_ratio;
+      from_shared_ = {along};
     } else if (term == Term::kDirection && length_ > kMinLength) {
       Eigen::Matrix3d in_plane = Eigen::Matrix3d::Zero();
       in_plane.topRows<2>() = basis_.transpose() * from_direction / length_;

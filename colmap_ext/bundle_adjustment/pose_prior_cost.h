@@ -31,6 +31,7 @@ Eigen::Vector2d DirectionError(const Eigen::Vector3d& vector,
 // when the edge has part in the errors that all priors share (shared_errors.h),
 //   kRotation: extrinsic_rotation (3), gyroscope_bias of the window (3)
 //   kDirection, kTranslation: driving_direction (3), direction_drift (3)
+//   kLength: direction_drift (3), where it has part in the drift
 // whose effect on R^ and t^ is taken off to first order. The poses are read
 // from the objects, which must be up to date. One cost per term, so that the
 // robust loss can drop a wrong term and keep the others.

@@ -25,7 +25,8 @@ bool SharedErrorOptions::IsValid(std::string* error) const {
          check("driving_direction_sigma_rad", driving_direction_sigma_rad,
                true) &&
          check("direction_drift_time_s", direction_drift_time_s, true) &&
-         check("direction_window_s", direction_window_s, false);
+         check("direction_window_s", direction_window_s, false) &&
+         check("length_drift_ratio", length_drift_ratio, true);
 }
 
 Eigen::Matrix3d CameraFromMiddle(const Eigen::Quaterniond& cam2_from_cam1) {
@@ -42,10 +43,16 @@ Rigid3d SharedErrors::Correct(const Rigid3d& cam2_from_cam1, double dt_s,
     error += dt_s * (from_middle * bias->second);
   }
   Eigen::Vector3d direction = driving_direction;
+  Eigen::Vector3d translation = cam2_from_cam1.translation;
   const auto drift = direction_drift.find(windows.direction);
-  if (drift != direction_drift.end()) direction += drift->second;
+  if (drift != direction_drift.end()) {
+    direction += drift->second;
+    translation *=
+        1.0 + windows.length_per_direction *
+                  translation.normalized().dot(from_middle * drift->second);
+  }
   return Rigid3d((ExpSo3(error) * rotation).normalized(),
-                 ExpSo3(from_middle * direction) * cam2_from_cam1.translation);
+                 ExpSo3(from_middle * direction) * translation);
 }
 
 }  // namespace adasfm

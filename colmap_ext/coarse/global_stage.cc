@@ -221,6 +221,9 @@ StatusOr<GlobalStageResult> RunGlobalStage(
   ReleaseFreedMemory();
 
   // 2.7 Structure and adjustment.
+  CoarseStructureOptions structure_options = options.structure;
+  structure_options.bundle.shared_errors.length_drift_ratio =
+      scene.length_drift_ratio;
   for (const CoarseComponent& component : result.poses.components) {
     CoarseModelInput input = CreateModelInput(
         MatchAnew(options.refinement, scene, raw_matches,
@@ -228,7 +231,7 @@ StatusOr<GlobalStageResult> RunGlobalStage(
         component, result.poses, &correspondences);
     watch = begin(DescribeTrackMemory(input), 0.5);
     result.models.push_back(BuildCoarseModel(
-        options.structure, scene, correspondences.bearings, std::move(input)));
+        structure_options, scene, correspondences.bearings, std::move(input)));
     result.steps.push_back(
         {"structure", watch.Seconds(), DescribeModel(result.models.back())});
   }

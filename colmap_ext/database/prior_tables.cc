@@ -36,7 +36,10 @@ void CreateTables(SqliteConnection* database) {
       "antenna_in_cam BLOB NOT NULL);"
       "CREATE TABLE IF NOT EXISTS adasfm_gyroscope_bias ("
       "image_id INTEGER PRIMARY KEY NOT NULL, name TEXT NOT NULL, "
-      "covariance BLOB NOT NULL);");
+      "covariance BLOB NOT NULL);"
+      "CREATE TABLE IF NOT EXISTS adasfm_length_drift ("
+      "image_id INTEGER PRIMARY KEY NOT NULL, name TEXT NOT NULL, "
+      "sigma_ratio REAL NOT NULL);");
 }
 
 using Names = std::map<image_t, std::string>;
@@ -128,6 +131,18 @@ void WriteGyroscopeBias(const Names& names, const PriorTables& tables,
   statement.Step();
 }
 
+void WriteLengthDrift(const Names& names, const PriorTables& tables,
+                      SqliteConnection* database) {
+  if (!(tables.length_drift_ratio > 0.0) || tables.priors.empty()) return;
+  const image_t image_id = tables.priors.front().image_id1;
+  SqliteStatement statement(database,
+                            "INSERT INTO adasfm_length_drift VALUES (?, ?, ?)");
+  statement.BindInt(1, image_id);
+  statement.BindText(2, NameOf(names, image_id));
+  statement.BindDouble(3, tables.length_drift_ratio);
+  statement.Step();
+}
+
 void WritePositionOrigin(const std::optional<GeodeticPosition>& origin,
                          SqliteConnection* database) {
   database->Execute("DELETE FROM adasfm_meta WHERE key = 'position_origin'");
@@ -179,12 +194,14 @@ Status WritePriorTables(const std::string& database_path,
         "DELETE FROM adasfm_relative_pose_priors;"
         "DELETE FROM adasfm_gravity;"
         "DELETE FROM adasfm_position_priors;"
-        "DELETE FROM adasfm_gyroscope_bias;");
+        "DELETE FROM adasfm_gyroscope_bias;"
+        "DELETE FROM adasfm_length_drift;");
     WriteImageTimes(names, tables.image_times, &database);
     WritePriors(names, tables.priors, &database);
     WriteGravity(names, tables.gravity, &database);
     WritePositions(names, tables.positions, &database);
     WriteGyroscopeBias(names, tables, &database);
+    WriteLengthDrift(names, tables, &database);
     WritePositionOrigin(tables.position_origin, &database);
     WriteRigCameras(tables.rig_cameras, &database);
     RemovePriorCorrections(&database);

@@ -17,9 +17,10 @@
 namespace adasfm {
 
 // The tables adasfm_image_times, adasfm_relative_pose_priors, adasfm_gravity,
-// adasfm_position_priors, adasfm_gyroscope_bias and adasfm_rig_cameras inside a
-// COLMAP database (docs/reference/formats.md). Databases of before the last
-// three are read as having no positions, no stated bias and no rig.
+// adasfm_position_priors, adasfm_gyroscope_bias, adasfm_length_drift and
+// adasfm_rig_cameras inside a COLMAP database (docs/reference/formats.md).
+// Databases of before the last four are read as having no positions, no stated
+// bias or drift and no rig.
 
 struct ImageTimeRow {
   image_t image_id = kInvalidImageId;
@@ -43,6 +44,9 @@ struct PriorTables {
   // Of what the import left of the gyroscope's bias, in the camera frame,
   // rad^2/s^2; none without a gyroscope, and in databases of before it.
   std::optional<Eigen::Matrix3d> gyroscope_bias_covariance;
+  // 1 sigma of the error that the lengths of neighbouring priors share, as a
+  // ratio; 0 where nothing shows one, and in databases of before it.
+  double length_drift_ratio = 0.0;
   // Of one rig of several cameras; all known. Written here, and read by
   // ReadCameraRigs.
   std::map<camera_t, RigCamera> rig_cameras;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <Eigen/Cholesky>
 #include <algorithm>
+#include <cmath>
 #include <locale>
 #include <map>
 #include <optional>
@@ -221,6 +222,21 @@ void ReadGyroscopeBias(SqliteConnection* database, PriorTables* tables) {
   }
 }
 
+// Of merged imports, the one with the largest.
+void ReadLengthDrift(SqliteConnection* database, PriorTables* tables) {
+  if (!database->HasTable("adasfm_length_drift")) return;
+  SqliteStatement statement(
+      database, "SELECT name, sigma_ratio FROM adasfm_length_drift");
+  while (statement.Step()) {
+    const double ratio = statement.Double(1);
+    if (!std::isfinite(ratio) || !(ratio > 0.0)) {
+      throw SqliteError("table adasfm_length_drift, image " +
+                        statement.Text(0) + ": a sigma that is not positive");
+    }
+    tables->length_drift_ratio = std::max(tables->length_drift_ratio, ratio);
+  }
+}
+
 void ReadPositionOrigin(SqliteConnection* database, PriorTables* tables) {
   if (!database->HasTable("adasfm_meta")) return;
   SqliteStatement statement(
@@ -259,6 +275,7 @@ LoadedPriorTables ReadPriorTables(SqliteConnection* database) {
   ReadGravity(ids, database, &loaded);
   ReadPositions(ids, database, &loaded);
   ReadGyroscopeBias(database, &loaded.tables);
+  ReadLengthDrift(database, &loaded.tables);
   ReadPositionOrigin(database, &loaded.tables);
   return loaded;
 }

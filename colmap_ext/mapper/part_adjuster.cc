@@ -86,6 +86,7 @@ void PartAdjuster::AdjustImages(const std::set<image_t>& images,
   options.max_num_iterations = max_num_iterations;
   options.function_tolerance = kFunctionTolerance;
   options.num_threads = options_.num_threads;
+  options.shared_errors.length_drift_ratio = scene_.data->length_drift_ratio;
   if (!constant_images.empty()) {
     // Neighbours that stand fixed say nothing about the balance.
     options.keypoint_sigma_px *= keypoint_sigma_factor_;

@@ -176,6 +176,7 @@ class ModelRefiner {
     PriorBundleAdjustmentOptions options;
     options.keypoint_sigma_px = local_.keypoint_sigma_px;
     options.shared_errors.enabled = !is_tentative;
+    options.shared_errors.length_drift_ratio = scene_.data->length_drift_ratio;
     if (is_tentative) {
       options.position_loss_scale = options_.initial_position_loss_scale;
     }

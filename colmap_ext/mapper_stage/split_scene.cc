@@ -99,6 +99,7 @@ SplitSceneData SplitScene(const std::vector<CoarsePoseMap>& coarse_models,
     component.cameras = scene.cameras;
     component.rigs.cameras = scene.rigs.cameras;
     component.position_origin = scene.position_origin;
+    component.length_drift_ratio = scene.length_drift_ratio;
   }
   split.rest.cameras = std::move(scene.cameras);
   split.rest.warnings = std::move(scene.warnings);

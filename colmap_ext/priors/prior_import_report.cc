@@ -90,6 +90,10 @@ std::string FormatPriorImport(const PriorImport& import) {
        << ", accelerometer " << summary.accelerometer_noise_factor
        << ", wheels " << summary.wheel_speed_noise_factor << " (speed), "
        << summary.wheel_yaw_noise_factor << " (yaw rate)\n";
+  if (summary.length_drift_ratio > 0.0) {
+    text << "lengths             err alike for seconds by "
+         << 100.0 * summary.length_drift_ratio << " %\n";
+  }
   if (summary.wheel_rate_hz > 0.0) {
     text << "wheels              " << summary.wheel_rate_hz << " Hz, "
          << summary.num_wheel_gaps << " gaps (longest "
@@ -164,6 +168,8 @@ std::string PriorImportToJson(const PriorImport& import) {
       {"max_wheel_gap_s", summary.max_wheel_gap_s},
       {"wheel_scale", summary.wheel_scale},
       {"wheel_scale_sigma", summary.wheel_scale_sigma},
+      {"wheel_persistence", summary.wheel_persistence},
+      {"length_drift_ratio", summary.length_drift_ratio},
       {"wheel_delay_s", summary.wheel_delay_s},
       {"wheel_delay_sigma_s", summary.wheel_delay_sigma_s},
       {"wheel_mount_deg", ToList(summary.wheel_mount_deg)},

@@ -397,6 +397,7 @@ StatusOr<PriorImport> ComputePriorImport(const PriorImportPaths& given_paths,
   }
   import.tables.gyroscope_bias_covariance =
       BiasCovarianceInCam(estimate->summary, *calibration);
+  import.tables.length_drift_ratio = estimate->summary.length_drift_ratio;
   import.summary = std::move(estimate->summary);
   import.warnings.insert(import.warnings.end(), import.summary.warnings.begin(),
                          import.summary.warnings.end());

@@ -55,8 +55,9 @@ struct SceneData {
   // Consecutive images, sorted by time; of a rig's frames, their leaders. Empty
   // without sensors.
   std::vector<RelativePosePrior> priors;
-  // As in PriorTables; the priors share this error.
+  // As in PriorTables; the priors share these errors.
   std::optional<Eigen::Matrix3d> gyroscope_bias_covariance;
+  double length_drift_ratio = 0.0;
   // Cameras that are mounted together, and ComputeFramePriors of them.
   CameraRigs rigs;
   std::vector<RelativePosePrior> frame_priors;

@@ -17,11 +17,17 @@ namespace {
 
 using Unknowns = Eigen::Matrix<double, kNumMountUnknowns, 1>;
 using Information = Eigen::Matrix<double, kNumMountUnknowns, kNumMountUnknowns>;
+// The turns of the mount and of the direction of driving.
+constexpr int kNumTurns = kRateUnknown;
+using Turns = Eigen::Matrix<double, kNumTurns, 1>;
+using TurnCovariance = Eigen::Matrix<double, kNumTurns, kNumTurns>;
 
 // Fewer spans of the drive do not tell how they vary.
 constexpr int kMinNumSpans = 5;
-// 1 sigma of the other unknowns: what may be left of a gyroscope's bias, and
-// what all two-view rotations are wrong by alike.
+// 1 sigma of the other unknowns: the direction of driving as the odometry
+// chain grants it, what may be left of a gyroscope's bias, and what all
+// two-view rotations are wrong by alike.
+constexpr double kDrivingDirectionSigmaRad = 0.01;
 constexpr double kRateSigmaRadS = 1e-3;
 constexpr double kOffsetSigmaRad = 2e-3;
 
@@ -57,26 +63,27 @@ double HuberWeight(const MountObservation& observation,
 struct MountSolution {
   // Further turn of the mount, and the rest.
   Unknowns unknowns = Unknowns::Zero();
-  // Of the turn.
-  Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
+  TurnCovariance covariance = TurnCovariance::Zero();
   double residual_variance = 0.0;
   bool success = false;
 };
 
-Information PriorInformation(const CameraMountOptions& options) {
+// 1 sigma of the unknowns before any data.
+Unknowns PriorSigmas(const CameraMountOptions& options) {
   Unknowns sigmas;
   sigmas << Eigen::Vector3d::Constant(DegToRad(options.sigma_deg)),
+      Eigen::Vector3d::Constant(kDrivingDirectionSigmaRad),
       Eigen::Vector3d::Constant(kRateSigmaRadS),
       Eigen::Vector3d::Constant(kOffsetSigmaRad);
-  return sigmas.cwiseAbs2().cwiseInverse().asDiagonal();
+  return sigmas;
 }
 
 // What the observations vary by from span to span, on top of their own
 // covariance: pairs of one span share what moves, what is planar, how the
 // machine pitches.
-Eigen::Matrix3d SpreadOfSpans(const std::vector<MountObservation>& observations,
-                              const MountSolution& solution,
-                              const Information& covariance) {
+TurnCovariance SpreadOfSpans(const std::vector<MountObservation>& observations,
+                             const MountSolution& solution,
+                             const Information& covariance) {
   std::map<int, Unknowns> gradients;
   for (const MountObservation& observation : observations) {
     gradients.emplace(observation.span, Unknowns::Zero()).first->second +=
@@ -88,7 +95,8 @@ Eigen::Matrix3d SpreadOfSpans(const std::vector<MountObservation>& observations,
   for (const auto& [span, gradient] : gradients) {
     spread += gradient * gradient.transpose();
   }
-  return (covariance * spread * covariance).topLeftCorner<3, 3>();
+  return (covariance * spread * covariance)
+      .topLeftCorner<kNumTurns, kNumTurns>();
 }
 
 // Squared residuals per degree of freedom, 1 when chain and matches are as
@@ -110,7 +118,8 @@ MountSolution Solve(const CameraMountOptions& options,
                     const std::vector<MountObservation>& observations,
                     const Eigen::Vector3d& turn_rad) {
   constexpr int kNumIterations = 8;
-  const Information prior = PriorInformation(options);
+  const Information prior =
+      PriorSigmas(options).cwiseAbs2().cwiseInverse().asDiagonal();
   // The prior is of the whole turn.
   Unknowns known = Unknowns::Zero();
   known.head<3>() = -turn_rad;
@@ -131,7 +140,7 @@ MountSolution Solve(const CameraMountOptions& options,
   const Information covariance = information.inverse();
   solution.residual_variance = ResidualVariance(observations, solution);
   solution.covariance = std::max(1.0, solution.residual_variance) *
-                        (covariance.topLeftCorner<3, 3>() +
+                        (covariance.topLeftCorner<kNumTurns, kNumTurns>() +
                          SpreadOfSpans(observations, solution, covariance));
   solution.success =
       solution.unknowns.allFinite() && solution.covariance.allFinite();
@@ -144,18 +153,23 @@ int CountSpans(const std::vector<MountPair>& pairs) {
   return spans.size();
 }
 
-// What of the turn stands out of its noise, axis by axis.
-Eigen::Vector3d KeepKnown(const Eigen::Vector3d& turn_rad,
-                          const Eigen::Matrix3d& covariance) {
+// What of the mount's turn stands out of its noise, axis by axis. In units of
+// what is believed before any data, what the data cannot tell apart (a turn of
+// the mount from one of the direction of driving) has no value of its own.
+Eigen::Vector3d KeepKnown(const CameraMountOptions& options, const Turns& turns,
+                          const TurnCovariance& covariance) {
   constexpr double kNumSigmas = 2.0;
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(covariance);
-  Eigen::Vector3d along = eigen.eigenvectors().transpose() * turn_rad;
-  for (int k = 0; k < 3; ++k) {
+  const Turns sigmas = PriorSigmas(options).head<kNumTurns>();
+  const auto inverse = sigmas.cwiseInverse().asDiagonal();
+  const Eigen::SelfAdjointEigenSolver<TurnCovariance> eigen(
+      TurnCovariance(inverse * covariance * inverse));
+  Turns along = eigen.eigenvectors().transpose() * (inverse * turns);
+  for (int k = 0; k < kNumTurns; ++k) {
     if (std::abs(along(k)) < kNumSigmas * std::sqrt(eigen.eigenvalues()(k))) {
       along(k) = 0.0;
     }
   }
-  return eigen.eigenvectors() * along;
+  return (sigmas.asDiagonal() * (eigen.eigenvectors() * along)).head<3>();
 }
 
 }  // namespace
@@ -219,12 +233,15 @@ CameraMountReport CorrectCameraMount(
   report.turn_rad = LogSo3(turn);
   report.residual_variance = solution.residual_variance;
   const double floor_rad = DegToRad(options.min_sigma_deg);
-  const Eigen::Matrix3d covariance =
-      solution.covariance + floor_rad * floor_rad * Eigen::Matrix3d::Identity();
-  report.chi2 = report.turn_rad.dot(covariance.ldlt().solve(report.turn_rad));
+  const TurnCovariance covariance =
+      solution.covariance + floor_rad * floor_rad * TurnCovariance::Identity();
+  Turns turns = solution.unknowns.head<kNumTurns>();
+  turns.head<3>() = report.turn_rad;
+  report.chi2 = turns.dot(covariance.ldlt().solve(turns));
   const Eigen::Vector3d axis = report.turn_rad.normalized();
-  report.sigma_rad = std::sqrt(axis.dot(covariance * axis));
-  const Eigen::Vector3d known = KeepKnown(report.turn_rad, covariance);
+  report.sigma_rad =
+      std::sqrt(axis.dot(covariance.topLeftCorner<3, 3>() * axis));
+  const Eigen::Vector3d known = KeepKnown(options, turns, covariance);
   if (report.chi2 < options.min_num_sigmas * options.min_num_sigmas ||
       known.norm() == 0.0) {
     return report;

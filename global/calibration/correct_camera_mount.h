@@ -36,9 +36,9 @@ struct CameraMountReport {
   // The true camera frame from the one that T_cam_imu states, a rotation
   // vector: what was found, applied or not.
   Eigen::Vector3d turn_rad = Eigen::Vector3d::Zero();
-  // 1 sigma of its angle.
+  // 1 sigma of its angle, whatever of it the direction of driving may have.
   double sigma_rad = 0.0;
-  // Its squared size in sigmas.
+  // The squared size of both turns in sigmas.
   double chi2 = 0.0;
   // Squared residuals of the pairs per degree of freedom; sigmas grow with what
   // is above 1, as noise that the sensors do not declare does not average out.
@@ -48,8 +48,11 @@ struct CameraMountReport {
 // Finds by what rotation E of the camera T_cam_imu is wrong, and takes it out
 // of the priors: R^ -> E R^ E^T, t^ -> E t^. Vision sees the axis about which
 // the camera turns (R = E R^ E^T for each pair), and where it moves to: with
-// the sensors' rotation held, a pair's matches have one direction, E t^. Linear
-// in E, a constant gyroscope bias and an offset of all visual rotations
+// the sensors' rotation held, a pair's matches have one direction, E t^. The
+// direction of driving may be wrong in the same way, and directions cannot tell
+// the two apart: it is an unknown of its own (kDrivingDirectionSigmaRad), which
+// shares the blame and widens E's sigma to what rotations leave open. Linear in
+// both, a constant gyroscope bias and an offset of all visual rotations
 // (kOffsetSigmaRad), Huber weights, relinearised. The covariance is that of
 // spans of the drive, whose pairs share their errors.
 // graph has rotations that do not know the priors (RefineRelativePoses without

@@ -41,6 +41,7 @@ struct TurnedMotion {
   // Changes of the rotation (from the left) by all unknowns, as vision sees it
   // from the sensors' but without vision's own offset.
   Jacobian rotation_change = Jacobian::Zero();
+  Eigen::Matrix3d camera_from_middle;
   bool has_direction = false;
 };
 
@@ -59,8 +60,9 @@ TurnedMotion TurnMotion(const ChainMotion& motion,
   // between is good enough for a few steps.
   turned.rotation_change.leftCols<3>() =
       Eigen::Matrix3d::Identity() - turned.rotation;
-  turned.rotation_change.middleCols<3>(3) =
-      seconds * ExpSo3(0.5 * LogSo3(rotation)).toRotationMatrix();
+  turned.camera_from_middle = ExpSo3(0.5 * LogSo3(rotation)).toRotationMatrix();
+  turned.rotation_change.middleCols<3>(kRateUnknown) =
+      seconds * turned.camera_from_middle;
   const Eigen::Vector3d& translation = motion.cam2_from_cam1.translation;
   const double length = translation.norm();
   turned.has_direction = motion.has_position && length > kMinLengthM;
@@ -216,7 +218,11 @@ std::vector<MountObservation> ObserveMount(const OdometryChain& chain,
       solver.solve(information.matrix.bottomLeftCorner<2, 3>());
   Eigen::Matrix<double, 2, kNumMountUnknowns> jacobian =
       by_rotation * motion.rotation_change;
-  jacobian.leftCols<3>() -= basis.transpose() * Hat(motion.direction);
+  const Eigen::Matrix<double, 2, 3> by_turn =
+      -basis.transpose() * Hat(motion.direction);
+  jacobian.leftCols<3>() += by_turn;
+  jacobian.middleCols<3>(kDrivingDirectionUnknown) +=
+      by_turn * motion.camera_from_middle;
   observations.push_back(Whiten<2>(
       pair, jacobian, -basis.transpose() * motion.direction,
       by_matches +

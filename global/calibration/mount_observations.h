@@ -12,10 +12,13 @@
 
 namespace adasfm {
 
-// What all pairs share: the turn of the camera's mount, the gyroscope's bias
-// (rad/s) and vision's own offset in the later camera (rad), three numbers
-// each.
-constexpr int kNumMountUnknowns = 9;
+// What all pairs share: the turn of the camera's mount, that of the direction
+// of driving against it (both rad), the gyroscope's bias (rad/s) and vision's
+// own offset in the later camera (rad), three numbers each. The first two look
+// the same in the direction of a motion.
+constexpr int kNumMountUnknowns = 12;
+constexpr int kDrivingDirectionUnknown = 3;
+constexpr int kRateUnknown = 6;
 
 // One pair's rotation or direction, whitened: residual = jacobian * unknowns.
 // Rows that a term does not have are zero.

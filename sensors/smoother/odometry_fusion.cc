@@ -27,6 +27,8 @@ constexpr double kFirstSlipWeight = 1e-4;
 constexpr double kConvergedStep = 0.01;
 // The threshold comes down after a smaller step than this: rad, m/s, m.
 constexpr double kSettledStep = 1e-2;
+// Slower machines have no speed that could err by a share, m/s.
+constexpr double kMinSpeed = 0.05;
 
 // 1 up to the threshold, then falling faster than the residual grows.
 double RobustWeight(double chi2, double threshold_sigma) {
@@ -50,9 +52,47 @@ struct RowRatios {
   }
 };
 
+// How much more residuals add up to over seconds than independent ones would:
+// the squares of their sums over blocks of time, over the sum of their squares.
+class Persistence {
+ public:
+  void Add(double dt_s, double residual) {
+    sum_ += residual;
+    square_sum_ += residual * residual;
+    seconds_ += dt_s;
+    if (seconds_ >= kBlockS) FinishBlock();
+  }
+  // Neighbours are missing: sums begin anew.
+  void FinishBlock() {
+    if (seconds_ == 0.0) return;
+    block_square_sum_ += sum_ * sum_;
+    num_blocks_ += std::min(1.0, seconds_ / kBlockS);
+    sum_ = seconds_ = 0.0;
+  }
+  // Few blocks tell little: 1 weighs as much as kPriorBlocks of them.
+  double Ratio() const {
+    if (square_sum_ <= 0.0) return 1.0;
+    return std::max(
+        1.0, (kPriorBlocks + num_blocks_ * block_square_sum_ / square_sum_) /
+                 (kPriorBlocks + num_blocks_));
+  }
+
+ private:
+  static constexpr double kBlockS = 4.0;
+  static constexpr double kPriorBlocks = 4.0;
+
+  double sum_ = 0.0;
+  double seconds_ = 0.0;
+  double square_sum_ = 0.0;
+  double block_square_sum_ = 0.0;
+  double num_blocks_ = 0.0;
+};
+
 struct NoiseChecks {
   RowRatios wheel_speed, wheel_yaw;
   NoiseCheck accelerometer;
+  Persistence wheel_persistence;
+  std::vector<double> speed_sigma_ratios;
 };
 
 class Smoother {
@@ -94,6 +134,8 @@ class Smoother {
   // link's coordinates.
   OdometryMotion Motion(size_t k) const;
   Eigen::Matrix<double, 6, kLinkSize> MotionMap(size_t k) const;
+  // 1 sigma of the speed at the link's end as a ratio, the scale known.
+  double SpeedSigmaRatio(size_t k, const LinkCovariance& covariance) const;
   void CheckNoise(size_t k, const LinkResiduals& residuals,
                   const LinkCovariance& covariance, NoiseChecks* checks) const;
   void FillCovariances(OdometryFusionResult* result) const;
@@ -261,6 +303,20 @@ std::vector<std::pair<size_t, double>> Smoother::FindSlippingLinks() const {
   return links;
 }
 
+double Smoother::SpeedSigmaRatio(size_t k,
+                                 const LinkCovariance& covariance) const {
+  constexpr int kVelocity = ChainState::kSize + ChainState::kVelocity;
+  const int scale = SharedUncertainty::Column(SharedUncertainty::kScale);
+  const Eigen::Vector3d& velocity = states_[k + 1].state.velocity_in_imu;
+  const double speed = std::max(velocity.norm(), kMinSpeed);
+  const Eigen::Vector3d by_scale = covariance.block<3, 1>(kVelocity, scale);
+  const Eigen::Matrix3d known =
+      covariance.block<3, 3>(kVelocity, kVelocity) -
+      by_scale * by_scale.transpose() / covariance(scale, scale);
+  return std::sqrt(std::max(0.0, velocity.dot(known * velocity))) /
+         (speed * speed);
+}
+
 void Smoother::CheckNoise(size_t k, const LinkResiduals& residuals,
                           const LinkCovariance& covariance,
                           NoiseChecks* checks) const {
@@ -268,24 +324,33 @@ void Smoother::CheckNoise(size_t k, const LinkResiduals& residuals,
   // Wheels at rest err less.
   if (!link.has_imu || !link.has_wheel ||
       link.standstill != StandstillKind::kNone) {
+    checks->wheel_persistence.FinishBlock();
     return;
   }
   const auto redundancy = [&](int row) {
     const auto jacobian = residuals.jacobian.row(row);
     return 1.0 - (jacobian * covariance).cwiseProduct(jacobian).sum();
   };
-  const auto add = [&](const LinkResiduals::Rows& rows, RowRatios* ratios) {
+  const auto add = [&](const LinkResiduals::Rows& rows, double factor,
+                       RowRatios* ratios) {
     for (int row = rows.first; row < rows.first + rows.size; ++row) {
       const double share = redundancy(row);
       if (share <= 0.0) continue;
       const double value = residuals.values[row];
-      ratios->values.push_back(value * value / (weights_[k].wheel * share));
+      ratios->values.push_back(factor * value * value /
+                               (weights_[k].wheel * share));
       ratios->redundancy += share;
     }
   };
-  add(residuals.wheel_speed, &checks->wheel_speed);
-  add(residuals.wheel_yaw, &checks->wheel_yaw);
-  if (weights_[k].wheel < 1.0) return;
+  add(residuals.wheel_speed, problem_.wheel_persistence, &checks->wheel_speed);
+  add(residuals.wheel_yaw, 1.0, &checks->wheel_yaw);
+  checks->speed_sigma_ratios.push_back(SpeedSigmaRatio(k, covariance));
+  if (weights_[k].wheel < 1.0) {
+    checks->wheel_persistence.FinishBlock();
+    return;
+  }
+  checks->wheel_persistence.Add(link.dt_s,
+                                residuals.values[residuals.wheel_speed.first]);
   const LinkResiduals::Rows& rows = residuals.accelerometer;
   for (int row = rows.first; row < rows.first + rows.size; ++row) {
     checks->accelerometer.chi2 += residuals.values[row] * residuals.values[row];
@@ -332,6 +397,10 @@ void Smoother::FillCovariances(OdometryFusionResult* result) const {
   result->accelerometer_check = checks.accelerometer;
   result->wheel_speed_check = checks.wheel_speed.Check();
   result->wheel_yaw_check = checks.wheel_yaw.Check();
+  // The less the smoother follows the wheels, the more of it residuals show.
+  result->wheel_persistence =
+      problem_.wheel_persistence * checks.wheel_persistence.Ratio();
+  result->speed_sigma_ratio = UpperMedian(&checks.speed_sigma_ratios);
   const Shared::Vector growth = shared.Growth();
   for (size_t k = 0; k < num_links; ++k) {
     result->motions[k].covariance +=

@@ -100,6 +100,9 @@ struct OdometryFusionProblem {
   std::vector<OdometryLink> links;
   Rigid3d imu_from_wheel;
   ImuNoise imu_noise;
+  // The wheels' speed may err alike for seconds (gravel): the variance of its
+  // errors' sum over such a time, over that of the links' stated ones.
+  double wheel_persistence = 1.0;
   // What else is known of the gyroscope's bias at the first state, e.g. from
   // vision; a sigma of 0 takes the options'.
   Eigen::Vector3d prior_gyroscope_bias = Eigen::Vector3d::Zero();
@@ -163,6 +166,11 @@ struct OdometryFusionResult {
   // Over the links on the move: of the accelerometer over those whose wheels do
   // not slip, of the wheels by the median of all.
   NoiseCheck accelerometer_check, wheel_speed_check, wheel_yaw_check;
+  // The wheel_persistence that the residuals show, at least 1.
+  double wheel_persistence = 1.0;
+  // 1 sigma of the speed, with the wheels' scale known, as a ratio: the median
+  // of the links on the move. Where lengths err, all neighbours err by it.
+  double speed_sigma_ratio = 0.0;
   int num_iterations = 0;
   bool converged = false;
 };

@@ -39,11 +39,16 @@ void LinkBuilder::AddWheel(double weight) {
   jacobian_.middleRows<3>(row) =
       (wheel_from_start * jacobian_.middleRows<3>(row)).eval();
   if (link_.has_imu) AddWheelDelay(row);
-  Whiten<3>(wheel_from_start * wheel.covariance * wheel_from_start.transpose() /
-            weight);
+  Eigen::Matrix3d covariance =
+      wheel_from_start * wheel.covariance * wheel_from_start.transpose();
+  const double persistence = context_.problem->wheel_persistence;
+  covariance(0, 0) *= persistence;
+  Whiten<3>(covariance / weight);
   rows_.wheel_speed = {row, 1};
-  wheel_chi2_ +=
-      weight > 0.0 ? values_.segment<3>(row).squaredNorm() / weight : 0.0;
+  // A slip is judged by what one link errs by.
+  wheel_chi2_ += (persistence * values_[row] * values_[row] +
+                  values_.segment<2>(row + 1).squaredNorm()) /
+                 weight;
   if (wheel.has_rotation) {
     AddRotationResidual(wheel.rotation, wheel.rotation_covariance / weight);
     rows_.wheel_yaw = {row + 3, 3};

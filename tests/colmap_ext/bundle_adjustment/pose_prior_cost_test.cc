@@ -115,6 +115,7 @@ TEST_P(PosePriorCostTest, JacobiansBySharedErrorsEqualNumericOnes) {
     AdjustedPose pose2 = RandomPose(&random);
     PosePriorEdge edge = RandomEdge(&random);
     edge.dt_s = 0.3;
+    edge.windows.length_per_direction = 0.5 * (seed % 3);
     const PosePriorCost cost(edge, GetParam(), 1.0, &pose1, &pose2);
     Eigen::Vector3d shared[] = {random.GaussianVector(0.1),
                                 random.GaussianVector(0.1)};
@@ -139,22 +140,26 @@ TEST_P(PosePriorCostTest, SharedErrorsAreThoseThatCorrectTakesOut) {
     Random random(seed);
     PosePriorEdge edge = RandomEdge(&random);
     edge.dt_s = 0.3;
+    edge.windows.length_per_direction = 0.5 * (seed % 3);
     SharedErrors errors;
     errors.gyroscope_bias[0] = random.GaussianVector(1e-3);
     errors.extrinsic_rotation = random.GaussianVector(1e-3);
     errors.driving_direction = random.GaussianVector(1e-3);
     errors.direction_drift[0] = random.GaussianVector(1e-3);
     AdjustedPose pose1 = RandomPose(&random);
-    AdjustedPose pose2(errors.Correct(edge.cam2_from_cam1, edge.dt_s, {}) *
-                       pose1.CamFromWorld());
+    AdjustedPose pose2(
+        errors.Correct(edge.cam2_from_cam1, edge.dt_s, edge.windows) *
+        pose1.CamFromWorld());
     const PosePriorCost cost(edge, GetParam(), 1.0, &pose1, &pose2);
     const bool is_rotation = GetParam() == PosePriorCost::Term::kRotation;
-    const double* parameters[] = {pose1.parameters, pose2.parameters,
-                                  is_rotation ? errors.extrinsic_rotation.data()
-                                              : errors.driving_direction.data(),
-                                  is_rotation
-                                      ? errors.gyroscope_bias.at(0).data()
-                                      : errors.direction_drift.at(0).data()};
+    const bool is_length = GetParam() == PosePriorCost::Term::kLength;
+    const double* drift = errors.direction_drift.at(0).data();
+    const double* parameters[] = {
+        pose1.parameters, pose2.parameters,
+        is_rotation ? errors.extrinsic_rotation.data()
+        : is_length ? drift
+                    : errors.driving_direction.data(),
+        is_rotation ? errors.gyroscope_bias.at(0).data() : drift};
     std::vector<double> residuals(cost.num_residuals());
     cost.Evaluate(parameters, residuals.data(), nullptr);
     // Second-order terms of errors of 1e-3.

@@ -160,5 +160,58 @@ TEST(SharedErrorsTest, DirectionsThatErrTogetherDoNotOutvoteVision) {
   EXPECT_LT(with_drift, 0.8 * without_drift);
 }
 
+// Wheels on gravel: the length of each motion errs by what the one before it
+// did, and a little of its own.
+std::vector<PosePriorEdge> LengthDriftPriors(const BundleWorldOptions& options,
+                                             double sigma_ratio,
+                                             Random* random) {
+  constexpr double kDt = 0.3;
+  constexpr double kSigma = 0.01;
+  const double decay = std::exp(-kDt / 3.0);
+  double drift = random->Gaussian(sigma_ratio);
+  std::vector<PosePriorEdge> edges = TruePriors(options);
+  for (PosePriorEdge& edge : edges) {
+    edge.dt_s = kDt;
+    edge.rotation_sigma_rad = 2e-4;
+    edge.direction_sigma_rad = kSigma;
+    Rigid3d& motion = edge.cam2_from_cam1;
+    edge.length_sigma_m = 0.01 * motion.translation.norm();
+    motion.rotation = (ExpSo3(random->GaussianVector(edge.rotation_sigma_rad)) *
+                       motion.rotation)
+                          .normalized();
+    motion.translation *= 1.0 + drift;
+    drift = decay * drift +
+            random->Gaussian(sigma_ratio * std::sqrt(1.0 - decay * decay));
+  }
+  return edges;
+}
+
+TEST(SharedErrorsTest, LengthsThatErrTogetherDoNotOutvoteVision) {
+  constexpr double kRatio = 0.02;
+  BundleWorldOptions world;
+  world.num_images = 200;
+  world.num_keypoints_per_image = 150;
+  world.pixel_noise_px = 0.3;
+  double with_drift = 0.0;
+  double without_drift = 0.0;
+  for (const uint64_t seed : {1, 2, 3, 4, 5, 6}) {
+    world.seed = seed;
+    Random random(seed);
+    const colmap::Reconstruction given = BuildBundleWorld(world);
+    PriorBundleAdjustmentProblem problem = ProblemOfAll(given);
+    problem.priors = LengthDriftPriors(world, kRatio, &random);
+    PriorBundleAdjustmentOptions options = ConvergeFully();
+    options.keypoint_sigma_px = world.pixel_noise_px;
+    colmap::Reconstruction without = given;
+    ASSERT_TRUE(AdjustBundle(options, problem, &without).success);
+    options.shared_errors.length_drift_ratio = kRatio;
+    colmap::Reconstruction with = given;
+    ASSERT_TRUE(AdjustBundle(options, problem, &with).success);
+    with_drift += AlignedCenterError(world, with);
+    without_drift += AlignedCenterError(world, without);
+  }
+  EXPECT_LT(with_drift, 0.8 * without_drift);
+}
+
 }  // namespace
 }  // namespace adasfm

@@ -60,6 +60,7 @@ class PriorTablesTest : public testing::Test {
     const Eigen::Matrix3d root = Eigen::Matrix3d::NullaryExpr(
         [&random]() { return random.Gaussian(1e-3); });
     tables.gyroscope_bias_covariance = root * root.transpose();
+    tables.length_drift_ratio = random.Uniform(0.001, 0.1);
     // The last one has seen no translation.
     RelativePosePrior& last = tables.priors.back();
     last.flags = kPriorRotation;
@@ -114,6 +115,7 @@ void ExpectEqual(const PriorTables& a, const PriorTables& b) {
     EXPECT_EQ(a.positions[i].antenna_in_cam, b.positions[i].antenna_in_cam);
   }
   EXPECT_EQ(a.gyroscope_bias_covariance, b.gyroscope_bias_covariance);
+  EXPECT_EQ(a.length_drift_ratio, b.length_drift_ratio);
   ASSERT_EQ(a.position_origin.has_value(), b.position_origin.has_value());
   if (!a.position_origin) return;
   EXPECT_EQ(a.position_origin->latitude_deg, b.position_origin->latitude_deg);
@@ -144,14 +146,16 @@ TEST_F(PriorTablesTest, ReadsWhatWasWrittenLast) {
   EXPECT_EQ(scene->images.at(2).timestamp_ns, world_.images[1].timestamp_ns);
   EXPECT_TRUE(scene->images.at(2).gravity_in_cam.has_value());
   EXPECT_TRUE(scene->gyroscope_bias_covariance.has_value());
+  EXPECT_GT(scene->length_drift_ratio, 0.0);
 }
 
 // As written before imports stated it, and again by one without a gyroscope.
-TEST_F(PriorTablesTest, DatabasesWithoutABiasCovarianceAreRead) {
+TEST_F(PriorTablesTest, DatabasesWithoutSharedErrorsAreRead) {
   PriorTables tables = MakeTables(1);
   ASSERT_TRUE(WritePriorTables(path_, tables).ok());
-  Execute("DROP TABLE adasfm_gyroscope_bias;");
+  Execute("DROP TABLE adasfm_gyroscope_bias; DROP TABLE adasfm_length_drift;");
   tables.gyroscope_bias_covariance.reset();
+  tables.length_drift_ratio = 0.0;
   StatusOr<LoadedPriorTables> loaded = ReadPriorTables(path_);
   ASSERT_TRUE(loaded.ok()) << loaded.status().message();
   ExpectEqual(loaded->tables, tables);
@@ -255,6 +259,7 @@ TEST_F(PriorTablesTest, RefusesRowsItCouldNotHaveWritten) {
       "UPDATE adasfm_meta SET value = 'here' WHERE key = 'position_origin';",
       "UPDATE adasfm_gyroscope_bias SET covariance = zeroblob(72);",
       "UPDATE adasfm_gyroscope_bias SET covariance = zeroblob(71);",
+      "UPDATE adasfm_length_drift SET sigma_ratio = -0.01;",
   };
   ASSERT_TRUE(WritePriorTables(path_, MakeTables(1)).ok());
   const std::string original = ReadBytes(path_);

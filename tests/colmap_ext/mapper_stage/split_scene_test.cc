@@ -43,6 +43,7 @@ class SplitSceneTest : public testing::Test {
       scene_.positions.push_back(position);
     }
     scene_.position_origin = GeodeticPosition();
+    scene_.length_drift_ratio = 0.01;
     coarse_ = {{{1, {}}, {2, {}}, {3, {}}}, {{5, {}}, {6, {}}}};
   }
 
@@ -84,6 +85,7 @@ TEST_F(SplitSceneTest, EveryImageHasOneComponent) {
   EXPECT_EQ(split.components[1].positions.size(), 3);
   EXPECT_EQ(split.rest.positions.size(), 2);
   EXPECT_TRUE(split.components[1].position_origin.has_value());
+  EXPECT_EQ(split.components[1].length_drift_ratio, 0.01);
   EXPECT_EQ(split.components[0].cameras.size(), 1);
 }
 
