@@ -17,10 +17,11 @@ namespace fs = std::filesystem;
 constexpr double kBytesOfProgram = 65e6;
 // Of a log as text.
 constexpr double kImportBytesPerLogByte = 11.0;
-constexpr double kGlobalBytesPerKeypoint = 200.0;
-constexpr double kGlobalBytesPerMatch = 160.0;
+constexpr double kBytesPerImage = 1e5;
+constexpr double kGlobalBytesPerKeypoint = 100.0;
+constexpr double kGlobalBytesPerMatch = 140.0;
 constexpr double kMergeBytesPerKeypoint = 400.0;
-constexpr double kMergeBytesPerMatch = 160.0;
+constexpr double kMergeBytesPerMatch = 110.0;
 
 // Of a file, or of all files below a folder; 0 where there is none.
 double SizeOnDisk(const std::string& path) {
@@ -38,9 +39,11 @@ double SizeOnDisk(const std::string& path) {
   return size;
 }
 
-int64_t SumOfRows(const std::string& table, SqliteConnection* database) {
+// `what`: an expression of SQL.
+int64_t Query(const std::string& what, const std::string& table,
+              SqliteConnection* database) {
   if (!database->HasTable(table)) return 0;
-  SqliteStatement statement(database, "SELECT SUM(rows) FROM " + table);
+  SqliteStatement statement(database, "SELECT " + what + " FROM " + table);
   return statement.Step() && !statement.IsNull(0) ? statement.Int(0) : 0;
 }
 
@@ -50,8 +53,9 @@ StatusOr<SceneSize> MeasureScene(const std::string& database_path) {
   SceneSize size;
   try {
     SqliteConnection database(database_path, SqliteConnection::Mode::kRead);
-    size.num_keypoints = SumOfRows("keypoints", &database);
-    size.num_matches = SumOfRows("two_view_geometries", &database);
+    size.num_images = Query("COUNT(*)", "keypoints", &database);
+    size.num_keypoints = Query("SUM(rows)", "keypoints", &database);
+    size.num_matches = Query("SUM(rows)", "two_view_geometries", &database);
   } catch (const SqliteError& error) {
     return Status::Error(database_path + ": " + error.what());
   }
@@ -69,12 +73,14 @@ double EstimateImportMemoryBytes(const PriorImportPaths& paths) {
 }
 
 double EstimateGlobalMemoryBytes(const SceneSize& size) {
-  return kBytesOfProgram + kGlobalBytesPerKeypoint * size.num_keypoints +
+  return kBytesOfProgram + kBytesPerImage * size.num_images +
+         kGlobalBytesPerKeypoint * size.num_keypoints +
          kGlobalBytesPerMatch * size.num_matches;
 }
 
 double EstimateMergeMemoryBytes(const SceneSize& size) {
-  return kBytesOfProgram + kMergeBytesPerKeypoint * size.num_keypoints +
+  return kBytesOfProgram + kBytesPerImage * size.num_images +
+         kMergeBytesPerKeypoint * size.num_keypoints +
          kMergeBytesPerMatch * size.num_matches;
 }
 

@@ -15,6 +15,7 @@ namespace adasfm {
 
 // Sizes of a database.
 struct SceneSize {
+  int64_t num_images = 0;  // with keypoints
   int64_t num_keypoints = 0;
   int64_t num_matches = 0;  // verified
 };

@@ -112,6 +112,31 @@ TEST_F(HostMapperTest, NextImagesSeeEnoughPointsMostFirst) {
   EXPECT_TRUE(mapper.RegisterNextImage(images[0], 8.0, 10));
 }
 
+// Adjustments and filters go on without the matches, which take memory.
+TEST_F(HostMapperTest, FiltersAlikeWithoutMatches) {
+  std::vector<size_t> num_points;
+  for (const bool releases : {false, true}) {
+    colmap::Reconstruction model;
+    HostMapper mapper(&model);
+    Fill(&mapper);
+    for (const image_t image_id : {kFirst, kSecond}) {
+      RegisterAtTruth(image_id, &mapper, &model);
+    }
+    const size_t num_before = model.NumPoints3D();
+    if (releases) mapper.ReleaseMatches();
+    EXPECT_EQ(model.NumImages(), 21);
+    // Every second point is moved out of its observations.
+    for (const colmap::point3D_t id : model.Point3DIds()) {
+      if (id % 2 == 0) model.Point3D(id).XYZ() *= 3.0;
+    }
+    mapper.FilterPoints(4.0, 0.1);
+    EXPECT_LT(model.NumPoints3D(), num_before);
+    EXPECT_GT(model.NumPoints3D(), 0);
+    num_points.push_back(model.NumPoints3D());
+  }
+  EXPECT_EQ(num_points[0], num_points[1]);
+}
+
 TEST_F(HostMapperTest, ThreadsDoNotChangeTheResult) {
   const auto expected = Map();
   std::vector<std::map<image_t, Rigid3d>> results(3);
