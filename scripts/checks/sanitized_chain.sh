@@ -6,8 +6,8 @@
 #   scripts/checks/sanitized_chain.sh address|thread [BUILD_FOLDER]
 #   scripts/checks/sanitized_chain.sh run COLMAP      only the chain
 #
-# address: AddressSanitizer and UBSan; thread: ThreadSanitizer. The first build
-# takes some 25 CPU minutes. COLMAP and the system's libraries are not
+# address: AddressSanitizer and UBSan; thread: ThreadSanitizer. The first build of
+# 54 rooms takes tens of CPU minutes. COLMAP and the system's libraries are not
 # instrumented, so ThreadSanitizer knows nothing of how these synchronise:
 # tsan.supp beside this file names what of theirs is passed over.
 # COLMAP_DIR names COLMAP's CMake package (scripts/setup.sh says where it lies).
@@ -28,7 +28,7 @@ if [ "$1" = run ]; then
   colmap=$(realpath "$2")
 else
   build=${2:-$root/build-sanitize-$1}
-  # -O1 and line numbers only: half of the time to compile.
+  # Compiling is what takes long, so only line numbers and few optimisations.
   cmake -S "$root" -B "$build" -G Ninja -DCMAKE_BUILD_TYPE=RelWithDebInfo \
     -DCMAKE_CXX_FLAGS_RELWITHDEBINFO='-O1 -g1' -DADASFM_UNITY=ON \
     -DCOLMAP_DIR="${COLMAP_DIR:-$HOME/.cache/adasfm/colmap-3.8/share/colmap}" \
