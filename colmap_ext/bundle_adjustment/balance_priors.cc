@@ -42,10 +42,8 @@ struct PriorSigmaEstimate {
 
 // Lowers the sigmas that the residuals refute as too large, as far as one
 // standard deviation of the estimate goes. None when the system is singular.
-// Lengths that drift are not: within a window of the drift they err alike, and
-// look better than they are.
 std::optional<PriorSigmaEstimate> EstimatePriorSigmas(
-    bool lengths_drift, LinearAdjustment* linear) {
+    LinearAdjustment* linear) {
   PriorSigmaEstimate estimate;
   PriorSigmaFactors& factors = estimate.factors;
   PriorComponents& components = estimate.components;
@@ -55,10 +53,7 @@ std::optional<PriorSigmaEstimate> EstimatePriorSigmas(
     if (!linear->Solve(factors, &components)) return std::nullopt;
     change = 1.0;
     for (int k = 0; k < kNumPriorTerms; ++k) {
-      if (components[k].num_residuals == 0 ||
-          (lengths_drift && static_cast<PriorTerm>(k) == PriorTerm::kLength)) {
-        continue;
-      }
+      if (components[k].num_residuals == 0) continue;
       const double factor =
           std::clamp(factors[k] * std::sqrt(components[k].Chi2PerDof()),
                      kMinSigmaFactor, 1.0);
@@ -160,8 +155,8 @@ class BalancedAdjustment {
     if (!summary_.success) return;
     LinearAdjustment linear(*system_, problem_.priors,
                             options.prior_loss_scale);
-    const std::optional<PriorSigmaEstimate> estimate = EstimatePriorSigmas(
-        options.shared_errors.length_drift_ratio > 0.0, &linear);
+    const std::optional<PriorSigmaEstimate> estimate =
+        EstimatePriorSigmas(&linear);
     if (!estimate) return;
     options_.prior_sigma_factors = estimate->factors;
     components_ = estimate->components;
