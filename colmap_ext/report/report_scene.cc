@@ -254,7 +254,7 @@ nlohmann::json PointsToJson(const colmap::Reconstruction& reconstruction,
   for (size_t i = 0; i < count; ++i) {
     const colmap::Point3D& point =
         reconstruction.Point3D(ids[i * ids.size() / count]);
-    Append(scene.level_from_world * point.XYZ(), &positions);
+    Append(scene.level_from_world * XyzOf(point), &positions);
     for (int k = 0; k < 3; ++k) {
       colors.push_back(point.Color(k));
       any_color = any_color || point.Color(k) != 0;
