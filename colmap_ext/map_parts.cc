@@ -122,7 +122,7 @@ MapperStageOptions ResolveOptions(const MapOptions& options,
                                   const SceneData& scene) {
   const bool is_calibrated = std::all_of(
       scene.cameras.begin(), scene.cameras.end(),
-      [](const auto& entry) { return entry.second.HasPriorFocalLength(); });
+      [](const auto& entry) { return HasPriorFocalLength(entry.second); });
   const auto resolve = [is_calibrated](int choice) {
     return choice < 0 ? !is_calibrated : choice != 0;
   };

@@ -93,8 +93,8 @@ void TakeCameras(const CoarseModelFile& model, SceneData* scene,
   for (const auto& [camera_id, camera] : model.cameras) {
     const auto given = scene->cameras.find(camera_id);
     if (given == scene->cameras.end() ||
-        given->second.ModelId() != camera.ModelId() ||
-        given->second.Params() == camera.Params()) {
+        ModelIdOf(given->second) != ModelIdOf(camera) ||
+        ParamsOf(given->second) == ParamsOf(camera)) {
       continue;
     }
     std::ostringstream text;
@@ -103,7 +103,7 @@ void TakeCameras(const CoarseModelFile& model, SceneData* scene,
          << model.coarse_index << " and " << given->second.MeanFocalLength()
          << " px in the database; the coarse model's camera is used";
     warnings->push_back(text.str());
-    given->second.SetParams(camera.Params());
+    ParamsOf(&given->second) = ParamsOf(camera);
   }
 }
 

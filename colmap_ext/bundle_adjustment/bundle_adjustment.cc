@@ -100,8 +100,8 @@ std::vector<std::vector<int>> FindNeighbors(
     const int index = index_of.at(image_id);
     for (const auto& point2D : reconstruction.Image(image_id).Points2D()) {
       if (!point2D.HasPoint3D()) continue;
-      const auto& point = reconstruction.Point3D(point2D.Point3DId());
-      for (const auto& element : point.Track().Elements()) {
+      const auto& point = reconstruction.Point3D(PointIdOf(point2D));
+      for (const auto& element : TrackOf(point).Elements()) {
         const auto other = index_of.find(element.image_id);
         if (other == index_of.end() || other->second <= index ||
             last_seen_from[other->second] == index) {

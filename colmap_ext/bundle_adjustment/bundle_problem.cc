@@ -55,11 +55,11 @@ void BundleProblem::AddImages(const PriorBundleAdjustmentProblem& problem,
   const auto add = [&](image_t image_id, bool is_constant) {
     if (!reconstruction.ExistsImage(image_id)) return;
     const colmap::Image& image = reconstruction.Image(image_id);
-    if (!image.IsRegistered()) return;
+    if (!IsRegistered(reconstruction, image_id)) return;
     ImageBlock& block = images_[image_id];
     block.is_constant = is_constant;
     const colmap::Camera& camera = reconstruction.Camera(image.CameraId());
-    cameras_[image.CameraId()].params = camera.Params();
+    cameras_[image.CameraId()].params = ParamsOf(camera);
   };
   for (const image_t image_id : problem.images) add(image_id, false);
   for (const image_t image_id : problem.constant_images) add(image_id, true);
@@ -143,16 +143,16 @@ std::vector<BundleProblem::Observation> BundleProblem::FindObservations(
     const colmap::Point3D& point) const {
   std::vector<Observation> observations;
   bool is_adjusted = false;
-  for (const colmap::TrackElement& element : point.Track().Elements()) {
+  for (const colmap::TrackElement& element : TrackOf(point).Elements()) {
     const auto block = images_.find(element.image_id);
     if (block == images_.end()) continue;
     const AdjustedPose& pose = *block->second.pose;
-    const double depth = pose.rotation.row(2).dot(point.XYZ() - pose.center);
+    const double depth = pose.rotation.row(2).dot(XyzOf(point) - pose.center);
     if (!(depth > kMinProjectionDepth)) continue;
     const colmap::Image& image = reconstruction.Image(element.image_id);
     Observation observation;
     observation.image_id = element.image_id;
-    observation.xy = image.Point2D(element.point2D_idx).XY();
+    observation.xy = XyOf(image.Point2D(element.point2D_idx));
     if (!NormalizeKeypoint(reconstruction.Camera(image.CameraId()),
                            observation.xy, options_.keypoint_sigma_px,
                            &observation.keypoint)) {
@@ -174,7 +174,7 @@ void BundleProblem::AddPoints(const colmap::Reconstruction& reconstruction) {
   for (const auto& [image_id, block] : images_) {
     if (block.is_constant) continue;
     for (const auto& point2D : reconstruction.Image(image_id).Points2D()) {
-      if (point2D.HasPoint3D()) point_ids.push_back(point2D.Point3DId());
+      if (point2D.HasPoint3D()) point_ids.push_back(PointIdOf(point2D));
     }
   }
   std::sort(point_ids.begin(), point_ids.end());
@@ -183,11 +183,11 @@ void BundleProblem::AddPoints(const colmap::Reconstruction& reconstruction) {
   points_.reserve(point_ids.size());
   for (const colmap::point3D_t point_id : point_ids) {
     const colmap::Point3D& point = reconstruction.Point3D(point_id);
-    if (!point.XYZ().allFinite()) continue;
+    if (!XyzOf(point).allFinite()) continue;
     const std::vector<Observation> observations =
         FindObservations(reconstruction, point);
     if (observations.empty()) continue;
-    points_.push_back({point_id, point.XYZ()});
+    points_.push_back({point_id, XyzOf(point)});
     for (const Observation& observation : observations) {
       AddObservation(reconstruction, observation, &points_.back());
     }
@@ -276,7 +276,7 @@ void BundleProblem::SetConstantBlocks(
     if (!block.is_used) continue;
     const colmap::Camera& camera = reconstruction.Camera(camera_id);
     std::vector<int> constant;
-    const auto hold = [&](bool refine, const std::vector<size_t>& indices) {
+    const auto hold = [&](bool refine, const auto& indices) {
       if (!refine)
         constant.insert(constant.end(), indices.begin(), indices.end());
     };
@@ -361,11 +361,11 @@ void BundleProblem::WriteTo(colmap::Reconstruction* reconstruction) const {
     SetCamFromWorld(cam_from_world, &reconstruction->Image(image_id));
   }
   for (const PointBlock& point : points_) {
-    reconstruction->Point3D(point.id).SetXYZ(point.xyz);
+    SetXyz(point.xyz, &reconstruction->Point3D(point.id));
   }
   for (const auto& [camera_id, block] : cameras_) {
     if (block.is_used) {
-      reconstruction->Camera(camera_id).SetParams(block.params);
+      ParamsOf(&reconstruction->Camera(camera_id)) = block.params;
     }
   }
 }

@@ -14,16 +14,16 @@ bool NormalizeKeypoint(const colmap::Camera& camera, const Eigen::Vector2d& xy,
                        double sigma_px, NormalizedKeypoint* keypoint) {
   // Half a step to either side: exact for pinholes, error of third order else.
   const double step = 0.5 / camera.MeanFocalLength();
-  const Eigen::Vector2d normalized = camera.ImageToWorld(xy);
+  const Eigen::Vector2d normalized = PlaneFromPixel(camera, xy);
   const Eigen::Vector2d dx(step, 0.0), dy(0.0, step);
   Eigen::Matrix2d jacobian;
-  jacobian.col(0) = (camera.WorldToImage(normalized + dx) -
-                     camera.WorldToImage(normalized - dx)) /
+  jacobian.col(0) = (PixelFromPlane(camera, normalized + dx) -
+                     PixelFromPlane(camera, normalized - dx)) /
                     (2.0 * step);
-  jacobian.col(1) = (camera.WorldToImage(normalized + dy) -
-                     camera.WorldToImage(normalized - dy)) /
+  jacobian.col(1) = (PixelFromPlane(camera, normalized + dy) -
+                     PixelFromPlane(camera, normalized - dy)) /
                     (2.0 * step);
-  const Eigen::Vector2d error = camera.WorldToImage(normalized) - xy;
+  const Eigen::Vector2d error = PixelFromPlane(camera, normalized) - xy;
   if (!jacobian.allFinite() || !(error.norm() < kMaxUndistortionErrorPx)) {
     return false;
   }
@@ -36,11 +36,11 @@ std::unique_ptr<ceres::CostFunction> CreateCameraCost(
     const colmap::Camera& camera, const Eigen::Vector2d& xy, double sigma_px,
     const AdjustedPose* pose) {
   std::unique_ptr<ceres::CostFunction> cost;
-  VisitCameraModel(camera.ModelId(), [&](auto model) {
+  VisitCameraModel(ModelIdOf(camera), [&](auto model) {
     using Model = decltype(model);
     using Cost = CameraReprojectionCost<Model>;
-    cost = std::make_unique<ceres::AutoDiffCostFunction<
-        Cost, 2, 6, 3, static_cast<int>(Model::kNumParams)>>(
+    cost = std::make_unique<
+        ceres::AutoDiffCostFunction<Cost, 2, 6, 3, Model::kNumParams>>(
         new Cost(xy, sigma_px, pose));
   });
   return cost;

@@ -30,9 +30,9 @@ double SquaredError(const colmap::Reconstruction& reconstruction,
   const colmap::Image& image = reconstruction.Image(element.image_id);
   const Eigen::Vector3d in_cam = cam_from_world * point;
   if (!(in_cam.z() > 0.0)) return std::numeric_limits<double>::infinity();
-  const Eigen::Vector2d projected = reconstruction.Camera(image.CameraId())
-                                        .WorldToImage(in_cam.hnormalized());
-  return (projected - image.Point2D(element.point2D_idx).XY()).squaredNorm();
+  const Eigen::Vector2d projected = PixelFromPlane(
+      reconstruction.Camera(image.CameraId()), in_cam.hnormalized());
+  return (projected - XyOf(image.Point2D(element.point2D_idx))).squaredNorm();
 }
 
 }  // namespace
@@ -43,14 +43,14 @@ std::optional<double> EstimateKeypointSigma(
   std::vector<double> variances;
   double num_dof_of_points = 0.0;
   for (const auto& [point_id, point] : reconstruction.Points3D()) {
-    const size_t length = point.Track().Length();
+    const size_t length = TrackOf(point).Length();
     const double num_dof = 2.0 * length - 3.0;
     if (length >= 2) num_dof_of_points += num_dof;
     if (length < kMinTrackLength) continue;
     double sum = 0.0;
-    for (const colmap::TrackElement& element : point.Track().Elements()) {
+    for (const colmap::TrackElement& element : TrackOf(point).Elements()) {
       sum += SquaredError(reconstruction, poses.at(element.image_id), element,
-                          point.XYZ());
+                          XyzOf(point));
     }
     if (std::isfinite(sum)) {
       variances.push_back(sum / (num_dof * MedianOfChi2PerDof(num_dof)));

@@ -80,7 +80,7 @@ double FarthestRatio(const colmap::Reconstruction& before,
 bool KnowsFocalLengths(const colmap::Reconstruction& reconstruction) {
   return std::all_of(
       reconstruction.Cameras().begin(), reconstruction.Cameras().end(),
-      [](const auto& entry) { return entry.second.HasPriorFocalLength(); });
+      [](const auto& entry) { return HasPriorFocalLength(entry.second); });
 }
 
 std::optional<FocalLengthError> FindFocalLengthError(

@@ -39,8 +39,8 @@ TermErrors ErrorsOf(const Rigid3d& motion, const Rigid3d& prior) {
 // Of the motion between the prior's images; none when one is missing.
 std::optional<TermErrors> ErrorsAt(
     const PosePriorEdge& edge, const colmap::Reconstruction& reconstruction) {
-  if (!reconstruction.IsImageRegistered(edge.image_id1) ||
-      !reconstruction.IsImageRegistered(edge.image_id2)) {
+  if (!IsRegistered(reconstruction, edge.image_id1) ||
+      !IsRegistered(reconstruction, edge.image_id2)) {
     return std::nullopt;
   }
   return ErrorsOf(

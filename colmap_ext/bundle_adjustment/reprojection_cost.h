@@ -106,9 +106,11 @@ class CameraReprojectionCost {
       residuals[0] = residuals[1] = T(kBehindCameraResidual);
       return true;
     }
-    CameraModel::WorldToImage(camera_params, x_in_cam[0] / x_in_cam[2],
-                              x_in_cam[1] / x_in_cam[2], &residuals[0],
-                              &residuals[1]);
+    if (!CameraModel::Project(camera_params, T(x_in_cam[0] / x_in_cam[2]),
+                              T(x_in_cam[1] / x_in_cam[2]), residuals)) {
+      residuals[0] = residuals[1] = T(kBehindCameraResidual);
+      return true;
+    }
     residuals[0] = (residuals[0] - keypoint_.x()) / sigma_px_;
     residuals[1] = (residuals[1] - keypoint_.y()) / sigma_px_;
     return true;

@@ -23,18 +23,17 @@ colmap::Reconstruction CreateReconstruction(
   for (const auto& [image_id, pose] : cams_from_world) {
     const SceneImage& scene_image = scene.images.at(image_id);
     if (!reconstruction.ExistsCamera(scene_image.camera_id)) {
-      reconstruction.AddCamera(before.ExistsCamera(scene_image.camera_id)
-                                   ? before.Camera(scene_image.camera_id)
-                                   : scene.cameras.at(scene_image.camera_id));
+      AddCamera(before.ExistsCamera(scene_image.camera_id)
+                    ? before.Camera(scene_image.camera_id)
+                    : scene.cameras.at(scene_image.camera_id),
+                &reconstruction);
     }
     colmap::Image image;
     image.SetImageId(image_id);
     image.SetName(scene_image.name);
     image.SetCameraId(scene_image.camera_id);
     image.SetPoints2D(scene_image.keypoints);
-    SetCamFromWorld(pose, &image);
-    reconstruction.AddImage(image);
-    reconstruction.RegisterImage(image_id);
+    AddRegisteredImage(std::move(image), pose, &reconstruction);
   }
   return reconstruction;
 }
@@ -302,10 +301,10 @@ CoarseModel BuildCoarseModel(
     RepeatWithFreeFocalLength(options, scene, bearings, input, tracks, problem,
                               &keypoint_sigma_factor, &model);
   }
-  model.reconstruction.FilterAllPoints3D(
-      options.final_max_reproj_error_px,
-      std::min(options.min_angle_floor_deg,
-               options.triangulation.min_triangulation_angle_deg));
+  FilterPoints(options.final_max_reproj_error_px,
+               std::min(options.min_angle_floor_deg,
+                        options.triangulation.min_triangulation_angle_deg),
+               &model.reconstruction);
   model.gravity_aligned =
       is_georeferenced ||
       AlignToGravity(scene, &model.reconstruction, input.camera_mount);

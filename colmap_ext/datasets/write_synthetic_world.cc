@@ -11,9 +11,9 @@
 #include <system_error>
 #include <vector>
 
-#include "colmap_ext/host/colmap.h"
+#include "colmap_ext/host/camera_models.h"
+#include "colmap_ext/host/database_writer.h"
 #include "colmap_ext/io/output_files.h"
-#include "core/so3.h"
 #include "core/sqlite.h"
 #include "synthetic/world_summary.h"
 
@@ -22,61 +22,38 @@ namespace {
 
 namespace fs = std::filesystem;
 
-colmap::Camera ConvertCamera(const SyntheticCamera& synthetic) {
-  colmap::Camera camera;
-  camera.SetWidth(synthetic.width);
-  camera.SetHeight(synthetic.height);
-  camera.SetPriorFocalLength(true);
+colmap::Camera ConvertCamera(camera_t camera_id,
+                             const SyntheticCamera& synthetic) {
   std::vector<double> params = {synthetic.focal_px, synthetic.focal_px,
                                 synthetic.principal_x_px,
                                 synthetic.principal_y_px};
-  if (synthetic.model == SyntheticCameraModel::kFisheye) {
-    camera.SetModelIdFromName("OPENCV_FISHEYE");
+  const bool is_fisheye = synthetic.model == SyntheticCameraModel::kFisheye;
+  if (is_fisheye) {
     for (int i = 0; i < 4; ++i) params.push_back(synthetic.fisheye_coeffs[i]);
-  } else {
-    camera.SetModelIdFromName("PINHOLE");
   }
-  camera.SetParams(params);
-  return camera;
+  return MakeCamera(camera_id,
+                    *CameraModelId(is_fisheye ? "OPENCV_FISHEYE" : "PINHOLE"),
+                    synthetic.width, synthetic.height, params,
+                    /*has_prior_focal_length=*/true);
 }
 
-colmap::FeatureMatches ConvertMatches(
-    const std::vector<FeatureMatch>& matches) {
-  colmap::FeatureMatches converted;
-  converted.reserve(matches.size());
-  for (const FeatureMatch& match : matches) {
-    converted.emplace_back(match.point2D_idx1, match.point2D_idx2);
-  }
-  return converted;
-}
-
-void WriteImages(const SyntheticWorld& world, colmap::Database* database) {
+void WriteImages(const SyntheticWorld& world, DatabaseWriter* database) {
   for (const SyntheticImage& synthetic : world.images) {
-    colmap::Image image;
-    image.SetImageId(synthetic.image_id);
-    image.SetName(synthetic.name);
-    image.SetCameraId(1 + synthetic.camera_index);
-    database->WriteImage(image, true);
-    colmap::FeatureKeypoints keypoints;
-    for (const Eigen::Vector2d& keypoint : synthetic.keypoints) {
-      keypoints.emplace_back(keypoint.x(), keypoint.y());
-    }
-    database->WriteKeypoints(synthetic.image_id, keypoints);
+    DatabaseImage image;
+    image.image_id = synthetic.image_id;
+    image.camera_id = 1 + synthetic.camera_index;
+    image.name = synthetic.name;
+    database->WriteImage(image);
+    database->WriteKeypoints(synthetic.image_id, synthetic.keypoints);
   }
 }
 
-void WritePairs(const SyntheticWorld& world, colmap::Database* database) {
+void WritePairs(const SyntheticWorld& world, DatabaseWriter* database) {
   for (const SyntheticPair& pair : world.pairs) {
-    database->WriteMatches(pair.image_id1, pair.image_id2,
-                           ConvertMatches(pair.raw_matches));
-    colmap::TwoViewGeometry geometry;
-    geometry.config = colmap::TwoViewGeometry::CALIBRATED;
-    geometry.inlier_matches = ConvertMatches(pair.inlier_matches);
-    const Eigen::Quaterniond& rotation = pair.cam2_from_cam1.rotation;
-    geometry.qvec << rotation.w(), rotation.x(), rotation.y(), rotation.z();
-    geometry.tvec = pair.cam2_from_cam1.translation;
-    geometry.E = Hat(geometry.tvec) * rotation.toRotationMatrix();
-    database->WriteTwoViewGeometry(pair.image_id1, pair.image_id2, geometry);
+    const ImagePair images(pair.image_id1, pair.image_id2);
+    database->WriteMatches(images, pair.raw_matches);
+    database->WriteTwoViewGeometry(images, pair.inlier_matches,
+                                   pair.cam2_from_cam1);
   }
 }
 
@@ -265,12 +242,9 @@ Status WriteSyntheticDatabase(const SyntheticWorld& world,
   Status status = WriteTextFile(temporary, "");
   if (!status.ok()) return status;
   {
-    colmap::Database database(temporary);
-    colmap::DatabaseTransaction transaction(&database);
+    DatabaseWriter database(temporary);
     for (size_t i = 0; i < NumCameras(world); ++i) {
-      colmap::Camera camera = ConvertCamera(world.camera);
-      camera.SetCameraId(1 + i);
-      database.WriteCamera(camera, true);
+      database.WriteCamera(ConvertCamera(1 + i, world.camera));
     }
     WriteImages(world, &database);
     WritePairs(world, &database);

@@ -221,10 +221,10 @@ double ComputeReprojectionRmse(const colmap::Reconstruction& reconstruction) {
   double sum_squares = 0.0;
   for (const auto& [point3D_id, point] : points) {
     const double error_px =
-        point->HasError() ? point->Error()
+        point->HasError() ? ErrorOf(*point)
                           : ComputeReprojectionError(reconstruction, *point);
-    num_observations += point->Track().Length();
-    sum_squares += error_px * error_px * point->Track().Length();
+    num_observations += TrackOf(*point).Length();
+    sum_squares += error_px * error_px * TrackOf(*point).Length();
   }
   return num_observations > 0 ? std::sqrt(sum_squares / num_observations) : 0.0;
 }

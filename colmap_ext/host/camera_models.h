@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -9,13 +10,27 @@
 
 namespace adasfm {
 
-// Camera models that newer COLMAPs have and the linked library has not.
+// Camera models by their numbers, which are the same in all versions, and those
+// that newer COLMAPs have and the linked library has not.
 
 bool IsNewerCameraModel(int model_id);
+
+// None for a model that the linked library lacks.
+std::optional<int> CameraModelNumParams(int model_id);
 
 // COLMAP's name of any model up to version 4.2, as "PINHOLE"; "number N" for
 // another.
 std::string CameraModelName(int model_id);
+
+// None for a name that the linked library does not know.
+std::optional<int> CameraModelId(const std::string& name);
+
+// The names of a model's parameters, comma-separated, in their order.
+std::string CameraModelParamsInfo(int model_id);
+
+// Of a lens without distortion, the principal point in the middle; px.
+std::vector<double> InitialCameraParams(int model_id, double focal_length_px,
+                                        size_t width_px, size_t height_px);
 
 // Replaces a model that the linked library lacks by one that it has with
 // exactly the same projection: FISHEYE and SIMPLE_FISHEYE (equidistant) by

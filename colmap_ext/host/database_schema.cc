@@ -2,7 +2,6 @@
 #include "colmap_ext/host/database_schema.h"
 
 #include <algorithm>
-#include <filesystem>
 #include <map>
 
 namespace adasfm {
@@ -54,25 +53,6 @@ std::vector<std::string> FindNewerTables(SqliteConnection* database) {
     if (database->HasTable(table)) tables.push_back(table);
   }
   return tables;
-}
-
-Status CheckLibraryOpens(const std::string& database_path) {
-  std::error_code error;
-  const uintmax_t size = std::filesystem::file_size(database_path, error);
-  if (error || size == 0) return Status::Ok();
-  try {
-    SqliteConnection database(database_path, SqliteConnection::Mode::kRead);
-    const std::vector<std::string> tables = FindNewerTables(&database);
-    if (tables.empty()) return Status::Ok();
-    return Status::Error(
-        database_path + " was written by a newer COLMAP (it has the table " +
-        tables.front() +
-        "), and this program extracts and matches with COLMAP 3.8's library, "
-        "which would damage it; set ADASFM_HOST_COLMAP to the COLMAP that "
-        "made it");
-  } catch (const SqliteError& sqlite_error) {
-    return Status::Error(database_path + ": " + sqlite_error.what());
-  }
 }
 
 bool StoresMissingAsNull(SqliteConnection* database) {

@@ -21,9 +21,8 @@ bool HasColumn(SqliteConnection* database, const std::string& table,
 // since 3.6 writes.
 Status CheckColumns(const std::string& path, SqliteConnection* database);
 
-// The tables of a newer COLMAP than the library that we are linked with; empty
-// for a database of COLMAP 3.8 and earlier. The library must not open a file
-// that has any: it would stamp its version and end the process.
+// The tables of a COLMAP newer than 3.8. The library of 3.8 must not open a
+// file that has any: it would stamp its version and end the process.
 std::vector<std::string> FindNewerTables(SqliteConnection* database);
 
 // An error for a file that the linked library must not open. A file that does

@@ -3,6 +3,7 @@
 
 #include <Eigen/Core>
 #include <memory>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -10,21 +11,20 @@
 #include "core/rigid3d.h"
 #include "core/types.h"
 
-namespace colmap {
-class DatabaseCache;
-class IncrementalMapper;
-}  // namespace colmap
-
 namespace adasfm {
 
-// COLMAP's IncrementalMapper on a part of a scene that is in memory already: a
-// DatabaseCache is filled with the part's cameras, images and matches instead
-// of being read from the database.
+// A keypoint that another one is matched with.
+struct MatchedKeypoint {
+  image_t image_id = kInvalidImageId;
+  point2D_t point2D_idx = 0;
+};
+
+// COLMAP's mapper on a part of a scene that is in memory already, instead of on
+// a database: its registration by P3P, its triangulation and its filters.
 //
-// Images may also be registered at the reconstruction itself, with any pose.
-// COLMAP keeps counters of its own registrations, which decide about intrinsics
-// (never changed here) and are what its FilterImages and AdjustLocalBundle
-// check: those two are not offered.
+// COLMAP counts, for every image, the points that it could see. So between
+// Begin and End all images and points are registered, added and removed here,
+// and not at the reconstruction itself.
 //
 // RegisterNextImage prints a report on std::cout. Different objects may be used
 // by different threads. Results do not depend on threads: COLMAP seeds each
@@ -48,11 +48,24 @@ class HostMapper {
   void Begin();
   // Leaves the reconstruction with its registered images only.
   void End();
-  // Frees the matches, which only registration and triangulation need. From
-  // here on FilterPoints alone may be called.
+  // Frees the matches, which only registration by P3P and triangulation need.
+  // From here on images and points may be registered, removed and filtered.
   void ReleaseMatches();
 
-  const colmap::CorrespondenceGraph& Graph() const;
+  void FindMatches(image_t image_id, point2D_t point2D_idx,
+                   std::vector<MatchedKeypoint>* matches) const;
+  // Of the keypoints, those matched with one that sees a point.
+  size_t NumVisiblePoints(image_t image_id) const;
+
+  // Registers an image with this pose; one that is registered moves there.
+  void Register(image_t image_id, const Rigid3d& cam_from_world);
+  // Takes away a registered image's observations, and with it the points that
+  // fewer than two images see then.
+  void Deregister(image_t image_id);
+  colmap::point3D_t AddPoint(const Eigen::Vector3d& xyz_in_world,
+                             const colmap::Track& track,
+                             const Eigen::Matrix<uint8_t, 3, 1>& color =
+                                 Eigen::Matrix<uint8_t, 3, 1>::Zero());
 
   // The unregistered images that see this many points, most points first; those
   // that failed to register before come after the others.
@@ -68,11 +81,14 @@ class HostMapper {
   void CompleteAndMergeTracks(double max_reproj_error_px);
   // Removes observations beyond the error, then points below the angle.
   void FilterPoints(double max_reproj_error_px, double min_angle_deg);
+  // The same for the points that these images see.
+  void FilterPointsInImages(double max_reproj_error_px, double min_angle_deg,
+                            const std::set<image_t>& image_ids);
 
  private:
+  struct Host;
   colmap::Reconstruction& reconstruction_;
-  std::unique_ptr<colmap::DatabaseCache> cache_;
-  std::unique_ptr<colmap::IncrementalMapper> mapper_;
+  std::unique_ptr<Host> host_;
 };
 
 // Keypoints of one image (pixels) and the points that they see (world).

@@ -13,6 +13,9 @@ namespace adasfm {
 // Two views by the host's estimators, whose signatures differ between its
 // versions.
 
+// COLMAP's number of a verified pair of calibrated cameras.
+inline constexpr int kCalibratedConfiguration = 2;
+
 // Whether a row of this configuration (TwoViewGeometry::ConfigurationType) is a
 // verified pair.
 bool IsVerifiedConfiguration(int config);

@@ -2,4 +2,8 @@
 #pragma once
 
 // COLMAP's camera models as types; apart from colmap.h, as they bring Ceres.
+#ifdef ADASFM_HOST_V4
+#include "colmap_ext/host/v4/visit_camera_model.h"
+#else
 #include "colmap_ext/host/v3/visit_camera_model.h"
+#endif

@@ -26,7 +26,7 @@ Directions ComputeDirections(const SceneData& data, image_t image_id) {
   directions.reserve(image.keypoints.size());
   for (const Eigen::Vector2d& keypoint : image.keypoints) {
     directions.push_back(
-        camera.ImageToWorld(keypoint).homogeneous().normalized());
+        PlaneFromPixel(camera, keypoint).homogeneous().normalized());
   }
   return directions;
 }
@@ -141,7 +141,7 @@ std::vector<InitialPair> FindInitialPairs(const InitialPairOptions& options,
   std::vector<Candidate> candidates;
   std::set<image_t> free_images;
   for (const image_t image_id : scene.images) {
-    if (!scene.reconstruction.IsImageRegistered(image_id)) {
+    if (!IsRegistered(scene.reconstruction, image_id)) {
       free_images.insert(image_id);
     }
   }

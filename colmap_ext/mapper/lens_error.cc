@@ -30,15 +30,15 @@ std::map<camera_t, std::vector<Residual>> CollectResiduals(
   const std::map<image_t, Rigid3d> poses = CamsFromWorld(reconstruction);
   std::map<camera_t, std::vector<Residual>> residuals;
   for (const auto& [point_id, point] : reconstruction.Points3D()) {
-    if (point.Track().Length() < kMinTrackLength) continue;
-    for (const colmap::TrackElement& element : point.Track().Elements()) {
+    if (TrackOf(point).Length() < kMinTrackLength) continue;
+    for (const colmap::TrackElement& element : TrackOf(point).Elements()) {
       const colmap::Image& image = reconstruction.Image(element.image_id);
       const colmap::Camera& camera = reconstruction.Camera(image.CameraId());
-      const Eigen::Vector3d in_cam = poses.at(element.image_id) * point.XYZ();
+      const Eigen::Vector3d in_cam = poses.at(element.image_id) * XyzOf(point);
       if (!(in_cam.z() > 0.0)) continue;
-      const Eigen::Vector2d keypoint = image.Point2D(element.point2D_idx).XY();
+      const Eigen::Vector2d keypoint = XyOf(image.Point2D(element.point2D_idx));
       const Eigen::Vector2d error =
-          keypoint - camera.WorldToImage(in_cam.hnormalized());
+          keypoint - PixelFromPlane(camera, in_cam.hnormalized());
       const Eigen::Vector2d from_center =
           keypoint -
           Eigen::Vector2d(camera.PrincipalPointX(), camera.PrincipalPointY());

@@ -57,16 +57,6 @@ class LocalMapper {
   }
 
  private:
-  std::set<image_t> RegisteredImages() const {
-    return {reconstruction_.RegImageIds().begin(),
-            reconstruction_.RegImageIds().end()};
-  }
-
-  void Register(image_t image_id, const Rigid3d& cam_from_world) {
-    SetCamFromWorld(cam_from_world, &reconstruction_.Image(image_id));
-    reconstruction_.RegisterImage(image_id);
-  }
-
   void Triangulate(image_t image_id) {
     scene_->mapper.TriangulateImage(image_id,
                                     options_.min_triangulation_angle_deg);
@@ -76,18 +66,18 @@ class LocalMapper {
     for (const InitialPair& pair : FindInitialPairs(
              options_.initial_pair, *scene_, kMaxNumInitialTrials)) {
       const Rigid3d local_from_coarse = FindLocalFromCoarse(pair.image_id1);
-      Register(pair.image_id1,
-               pair.cam1_from_world * local_from_coarse.Inverse());
-      Register(pair.image_id2,
-               pair.cam2_from_world * local_from_coarse.Inverse());
+      scene_->mapper.Register(
+          pair.image_id1, pair.cam1_from_world * local_from_coarse.Inverse());
+      scene_->mapper.Register(
+          pair.image_id2, pair.cam2_from_world * local_from_coarse.Inverse());
       Triangulate(pair.image_id1);
       adjuster_.AdjustPair(pair.image_id1, pair.image_id2);
       if (reconstruction_.Image(pair.image_id1).NumPoints3D() >=
           kMinNumInitialPoints) {
         return true;
       }
-      reconstruction_.DeRegisterImage(pair.image_id2);
-      reconstruction_.DeRegisterImage(pair.image_id1);
+      scene_->mapper.Deregister(pair.image_id2);
+      scene_->mapper.Deregister(pair.image_id1);
     }
     return false;
   }
@@ -99,7 +89,7 @@ class LocalMapper {
         scene_->coarse->at(image_id).TargetOriginInSource();
     double best_distance = 0.0;
     image_t nearest = kInvalidImageId;
-    for (const image_t other : RegisteredImages()) {
+    for (const image_t other : RegisteredImages(reconstruction_)) {
       const auto coarse = scene_->coarse->find(other);
       if (coarse == scene_->coarse->end()) continue;
       const double distance =
@@ -125,8 +115,7 @@ class LocalMapper {
     for (const image_t image_id : scene_->mapper.FindNextImages(
              options_.registration.min_num_visible_points)) {
       if (batch_.size() == max_size) break;
-      const size_t num_visible =
-          reconstruction_.Image(image_id).NumVisiblePoints3D();
+      const size_t num_visible = scene_->mapper.NumVisiblePoints(image_id);
       size_t& num_visible_at_failure = num_visible_at_failure_[image_id];
       if (num_visible < 1.2 * num_visible_at_failure) continue;
       const RegisteredBy registered_by =
@@ -160,13 +149,13 @@ class LocalMapper {
     while (grew) {
       grew = false;
       for (const image_t image_id : scene_->images) {
-        if (reconstruction_.IsImageRegistered(image_id) ||
+        if (IsRegistered(reconstruction_, image_id) ||
             !HasConfirmedNeighbor(image_id)) {
           continue;
         }
         const auto pose = ComputeGlobalCandidate(*scene_, image_id);
         if (!pose) continue;
-        Register(image_id, *pose);
+        scene_->mapper.Register(image_id, *pose);
         result_.prior_only_images.insert(image_id);
         grew = true;
       }
@@ -184,7 +173,7 @@ class LocalMapper {
           prior.image_id1 == image_id ? prior.image_id2 : prior.image_id1;
       const auto coarse1 = scene_->coarse->find(prior.image_id1);
       const auto coarse2 = scene_->coarse->find(prior.image_id2);
-      if (reconstruction_.IsImageRegistered(other) &&
+      if (IsRegistered(reconstruction_, other) &&
           coarse1 != scene_->coarse->end() &&
           coarse2 != scene_->coarse->end() &&
           IsSupportedByPrior(
@@ -200,7 +189,8 @@ class LocalMapper {
     adjuster_.AdjustAll(15);
     // Retriangulate takes only pairs that share few points: 12,218 points in
     // place of 12,429 on kitti01-51.
-    for (const image_t image_id : RegisteredImages()) Triangulate(image_id);
+    for (const image_t image_id : RegisteredImages(reconstruction_))
+      Triangulate(image_id);
     adjuster_.AdjustAll(15);
     for (auto it = result_.prior_only_images.begin();
          it != result_.prior_only_images.end();) {

@@ -36,8 +36,8 @@ std::vector<PartPoint> CollectPoints(const AlignPartsResult& aligned,
     for (const colmap::point3D_t id : ids) {
       const colmap::Point3D& point3D = points3D.at(id);
       PartPoint point;
-      point.xyz_in_world = aligned.world_from_parts[k] * point3D.XYZ();
-      for (const auto& element : point3D.Track().Elements()) {
+      point.xyz_in_world = aligned.world_from_parts[k] * XyzOf(point3D);
+      for (const auto& element : TrackOf(point3D).Elements()) {
         point.observations.emplace_back(element.image_id, element.point2D_idx);
       }
       std::sort(point.observations.begin(), point.observations.end());
@@ -86,11 +86,6 @@ class Merger {
   }
 
  private:
-  void Register(image_t image_id, const Rigid3d& cam_from_world) {
-    SetCamFromWorld(cam_from_world, &scene_.reconstruction.Image(image_id));
-    scene_.reconstruction.RegisterImage(image_id);
-  }
-
   void RegisterByParts() {
     // The most points with which a part has registered the image; 0 where only
     // priors did.
@@ -112,10 +107,11 @@ class Merger {
     }
     for (const auto& [image_id, choice] : best) {
       const auto& [num_points, k] = choice;
-      Register(image_id,
-               TransformCamFromWorld(
-                   aligned_.world_from_parts[k],
-                   CamFromWorld(parts_[k].reconstruction.Image(image_id))));
+      scene_.mapper.Register(
+          image_id,
+          TransformCamFromWorld(
+              aligned_.world_from_parts[k],
+              CamFromWorld(parts_[k].reconstruction.Image(image_id))));
       if (num_points == 0) summary_.coarse_images.insert(image_id);
     }
   }
@@ -128,22 +124,22 @@ class Merger {
       grew = false;
       for (const auto& [image_id, coarse_pose] : *scene_.coarse) {
         if (!scene_.images.count(image_id) ||
-            scene_.reconstruction.IsImageRegistered(image_id)) {
+            IsRegistered(scene_.reconstruction, image_id)) {
           continue;
         }
         const auto pose = ComputeGlobalCandidate(scene_, image_id);
         if (!pose) continue;
-        Register(image_id, *pose);
+        scene_.mapper.Register(image_id, *pose);
         summary_.coarse_images.insert(image_id);
         grew = true;
       }
     }
     for (const auto& [image_id, coarse_pose] : *scene_.coarse) {
       if (!scene_.images.count(image_id) ||
-          scene_.reconstruction.IsImageRegistered(image_id)) {
+          IsRegistered(scene_.reconstruction, image_id)) {
         continue;
       }
-      Register(image_id, coarse_pose);
+      scene_.mapper.Register(image_id, coarse_pose);
       summary_.coarse_images.insert(image_id);
     }
   }
@@ -174,9 +170,9 @@ class Merger {
     const colmap::Image& image = scene_.reconstruction.Image(observation.first);
     const Eigen::Vector3d point_in_cam = CamFromWorld(image) * xyz;
     if (point_in_cam.z() < 1e-6) return std::numeric_limits<double>::max();
-    return (scene_.reconstruction.Camera(image.CameraId())
-                .WorldToImage(point_in_cam.hnormalized()) -
-            image.Point2D(observation.second).XY())
+    return (PixelFromPlane(scene_.reconstruction.Camera(image.CameraId()),
+                           point_in_cam.hnormalized()) -
+            XyOf(image.Point2D(observation.second)))
         .norm();
   }
 
@@ -199,7 +195,7 @@ class Merger {
     }
     colmap::Track track;
     for (const Observation& observation : observations) {
-      if (scene_.reconstruction.IsImageRegistered(observation.first) &&
+      if (IsRegistered(scene_.reconstruction, observation.first) &&
           !scene_.reconstruction.Image(observation.first)
                .Point2D(observation.second)
                .HasPoint3D() &&
@@ -208,7 +204,7 @@ class Merger {
       }
     }
     if (track.Length() < 2) return;
-    scene_.reconstruction.AddPoint3D(best_xyz, track);
+    scene_.mapper.AddPoint(best_xyz, track);
     ++summary_.num_points;
     summary_.num_merged_points += static_cast<int>(group.size()) - 1;
   }

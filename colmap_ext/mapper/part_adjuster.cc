@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "colmap_ext/bundle_adjustment/balance_priors.h"
+#include "colmap_ext/host/pose_conversion.h"
 
 namespace adasfm {
 namespace {
@@ -51,8 +52,7 @@ std::set<image_t> PartAdjuster::FindConstantImages(
   std::map<image_t, int> num_matches;
   for (const image_t image_id : batch) {
     for (const auto& [neighbor, count] : scene_.neighbors.at(image_id)) {
-      if (reconstruction_.IsImageRegistered(neighbor) &&
-          !batch.count(neighbor)) {
+      if (IsRegistered(reconstruction_, neighbor) && !batch.count(neighbor)) {
         num_matches[neighbor] += count;
       }
     }
@@ -102,17 +102,15 @@ void PartAdjuster::AdjustImages(const std::set<image_t>& images,
 void PartAdjuster::AdjustAll(int max_num_iterations) {
   ++num_global_adjustments_;
   scene_.mapper.CompleteAndMergeTracks(options_.filter_max_reproj_error_px);
-  AdjustImages({reconstruction_.RegImageIds().begin(),
-                reconstruction_.RegImageIds().end()},
-               {}, max_num_iterations);
+  AdjustImages(RegisteredImages(reconstruction_), {}, max_num_iterations);
   scene_.mapper.FilterPoints(options_.filter_max_reproj_error_px,
                              options_.min_triangulation_angle_deg);
 }
 
 void PartAdjuster::Filter(const std::set<image_t>& images) {
-  reconstruction_.FilterPoints3DInImages(options_.filter_max_reproj_error_px,
-                                         options_.min_triangulation_angle_deg,
-                                         {images.begin(), images.end()});
+  scene_.mapper.FilterPointsInImages(options_.filter_max_reproj_error_px,
+                                     options_.min_triangulation_angle_deg,
+                                     images);
 }
 
 }  // namespace adasfm

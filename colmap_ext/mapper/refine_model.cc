@@ -68,11 +68,6 @@ class ModelRefiner {
   }
 
  private:
-  std::set<image_t> RegisteredImages() const {
-    return {reconstruction_.RegImageIds().begin(),
-            reconstruction_.RegImageIds().end()};
-  }
-
   // Adjustments take much memory of their own.
   void ReleaseMatches() {
     scene_.mapper.ReleaseMatches();
@@ -90,7 +85,7 @@ class ModelRefiner {
   // COLMAP's Retriangulate, pair by pair, gives the same model but takes 5 %
   // more of the mapper's time on kitti07-160.
   void TriangulateWeakImages() {
-    for (const image_t image_id : RegisteredImages()) {
+    for (const image_t image_id : RegisteredImages(reconstruction_)) {
       const colmap::Image& image = reconstruction_.Image(image_id);
       if (2 * image.NumPoints3D() < image.NumPoints2D()) {
         scene_.mapper.TriangulateImage(image_id,
@@ -101,7 +96,7 @@ class ModelRefiner {
 
   // For images on few points, the coarse motion to registered neighbours.
   void AddCoarseEdges(std::vector<PosePriorEdge>* edges) const {
-    for (const image_t image_id : RegisteredImages()) {
+    for (const image_t image_id : RegisteredImages(reconstruction_)) {
       const auto coarse = scene_.coarse->find(image_id);
       if (coarse == scene_.coarse->end() ||
           reconstruction_.Image(image_id).NumPoints3D() >=
@@ -115,7 +110,7 @@ class ModelRefiner {
            scene_.neighbors.at(image_id)) {
         const auto coarse_neighbor = scene_.coarse->find(neighbor);
         if (coarse_neighbor == scene_.coarse->end() ||
-            !reconstruction_.IsImageRegistered(neighbor)) {
+            !IsRegistered(reconstruction_, neighbor)) {
           continue;
         }
         PosePriorEdge edge;
@@ -148,7 +143,7 @@ class ModelRefiner {
 
   std::vector<PosePriorEdge> FindPriors() const {
     if (!local_.use_priors_in_adjustment) return {};
-    return FindPriorEdges(scene_, RegisteredImages());
+    return FindPriorEdges(scene_, RegisteredImages(reconstruction_));
   }
 
   // Until parts and gaps are in place, priors are off for other reasons than
@@ -166,7 +161,7 @@ class ModelRefiner {
               std::vector<PosePriorEdge> priors, double* keypoint_sigma_factor,
               bool is_tentative = false) {
     PriorBundleAdjustmentProblem problem;
-    problem.images = RegisteredImages();
+    problem.images = RegisteredImages(reconstruction_);
     problem.priors = std::move(priors);
     AddCoarseEdges(&problem.priors);
     // Frames of a rig become rigid once its parts and gaps are in place.
@@ -227,8 +222,8 @@ class ModelRefiner {
       for (const size_t i : indices) {
         const RelativePosePrior& prior = scene_.priors[i];
         if (prior.flags & kPriorWheelSlip ||
-            !reconstruction_.IsImageRegistered(prior.image_id1) ||
-            !reconstruction_.IsImageRegistered(prior.image_id2)) {
+            !IsRegistered(reconstruction_, prior.image_id1) ||
+            !IsRegistered(reconstruction_, prior.image_id2)) {
           continue;
         }
         ++num_usable;
@@ -246,13 +241,12 @@ class ModelRefiner {
     if (!local_.use_priors_in_adjustment) return false;
     const std::set<image_t> images = FindContradictedImages();
     for (const image_t image_id : images) {
-      reconstruction_.DeRegisterImage(image_id);
+      scene_.mapper.Deregister(image_id);
     }
     for (const image_t image_id : images) {
       const auto pose = ComputeGlobalCandidate(scene_, image_id);
-      SetCamFromWorld(pose ? *pose : scene_.coarse->at(image_id),
-                      &reconstruction_.Image(image_id));
-      reconstruction_.RegisterImage(image_id);
+      scene_.mapper.Register(image_id,
+                             pose ? *pose : scene_.coarse->at(image_id));
     }
     summary_.num_images_put_back = static_cast<int>(images.size());
     return !images.empty();
@@ -260,13 +254,13 @@ class ModelRefiner {
 
   // A coarse pose that neither points nor priors confirm is only a guess.
   void LeaveOutUnsupportedImages() {
-    for (const image_t image_id : RegisteredImages()) {
+    for (const image_t image_id : RegisteredImages(reconstruction_)) {
       if (scene_.priors_of_image.count(image_id) > 0 ||
           reconstruction_.Image(image_id).NumPoints3D() >=
               kMinNumPointsToKeep) {
         continue;
       }
-      reconstruction_.DeRegisterImage(image_id);
+      scene_.mapper.Deregister(image_id);
       ++summary_.num_images_left_out;
     }
   }
@@ -298,8 +292,7 @@ void RefineModel(const RefineModelOptions& options,
 void RegisterAtCoarsePoses(MapperScene* scene) {
   for (const auto& [image_id, cam_from_world] : *scene->coarse) {
     if (scene->images.count(image_id) == 0) continue;
-    SetCamFromWorld(cam_from_world, &scene->reconstruction.Image(image_id));
-    scene->reconstruction.RegisterImage(image_id);
+    scene->mapper.Register(image_id, cam_from_world);
   }
 }
 

@@ -41,7 +41,7 @@ std::vector<image_t> FindRegisteredNeighbors(const MapperScene& scene,
   std::set<image_t> seen;
   for (const image_t candidate : candidates) {
     if (neighbors.size() == kMaxNumNeighbors) break;
-    if (scene.reconstruction.IsImageRegistered(candidate) &&
+    if (IsRegistered(scene.reconstruction, candidate) &&
         scene.coarse->count(candidate) && seen.insert(candidate).second) {
       neighbors.push_back(candidate);
     }
@@ -97,20 +97,21 @@ PointsInImage CollectPoints(const MapperScene& scene, image_t image_id) {
   PointsInImage points;
   const colmap::Image& image = scene.reconstruction.Image(image_id);
   std::vector<colmap::point3D_t> seen;
+  std::vector<MatchedKeypoint> matches;
   for (point2D_t idx = 0; idx < image.NumPoints2D(); ++idx) {
     seen.clear();
-    for (const auto& match :
-         scene.mapper.Graph().FindCorrespondences(image_id, idx)) {
+    scene.mapper.FindMatches(image_id, idx, &matches);
+    for (const MatchedKeypoint& match : matches) {
       const colmap::Point2D& other =
           scene.reconstruction.Image(match.image_id).Point2D(match.point2D_idx);
-      if (!other.HasPoint3D() || std::find(seen.begin(), seen.end(),
-                                           other.Point3DId()) != seen.end()) {
+      if (!other.HasPoint3D() ||
+          std::find(seen.begin(), seen.end(), PointIdOf(other)) != seen.end()) {
         continue;
       }
-      seen.push_back(other.Point3DId());
-      points.pixels.push_back(image.Point2D(idx).XY());
+      seen.push_back(PointIdOf(other));
+      points.pixels.push_back(XyOf(image.Point2D(idx)));
       points.points_in_world.push_back(
-          scene.reconstruction.Point3D(other.Point3DId()).XYZ());
+          XyzOf(scene.reconstruction.Point3D(PointIdOf(other))));
     }
   }
   return points;
@@ -128,7 +129,7 @@ std::vector<char> FindInliers(const PointsInImage& points,
         rotation * points.points_in_world[i] + cam_from_world.translation;
     if (point_in_cam.z() < 1e-6) continue;
     const Eigen::Vector2d pixel =
-        camera.WorldToImage(point_in_cam.hnormalized());
+        PixelFromPlane(camera, point_in_cam.hnormalized());
     mask[i] = (pixel - points.pixels[i]).norm() <= max_error_px;
   }
   return mask;
@@ -173,8 +174,8 @@ std::optional<Rigid3d> ComputeGlobalCandidate(const MapperScene& scene,
 
 RegisteredBy RegisterImage(const RegisterImageOptions& options,
                            image_t image_id, MapperScene* scene) {
-  colmap::Reconstruction& reconstruction = scene->reconstruction;
-  colmap::Image& image = reconstruction.Image(image_id);
+  const colmap::Reconstruction& reconstruction = scene->reconstruction;
+  const colmap::Image& image = reconstruction.Image(image_id);
   const colmap::Camera& camera = reconstruction.Camera(image.CameraId());
   const PointsInImage points = CollectPoints(*scene, image_id);
   const size_t min_num_inliers = static_cast<size_t>(
@@ -197,15 +198,14 @@ RegisteredBy RegisterImage(const RegisterImageOptions& options,
     if (num_inliers > num_coarse_inliers && num_inliers >= min_num_inliers) {
       return RegisteredBy::kP3p;
     }
-    reconstruction.DeRegisterImage(image_id);
+    scene->mapper.Deregister(image_id);
   }
   if (num_coarse_inliers <
       std::max<size_t>(options.min_num_visible_points, min_num_inliers)) {
     return RegisteredBy::kNone;
   }
   RefinePose(points, coarse_mask, camera, &*coarse);
-  SetCamFromWorld(*coarse, &image);
-  reconstruction.RegisterImage(image_id);
+  scene->mapper.Register(image_id, *coarse);
   return RegisteredBy::kGlobalPose;
 }
 

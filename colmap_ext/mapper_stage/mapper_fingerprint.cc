@@ -33,8 +33,8 @@ void AddScene(const SceneData& data, Hash* hash) {
   }
   for (const auto& [camera_id, camera] : data.cameras) {
     hash->Add(camera_id);
-    hash->Add(camera.ModelId());
-    for (const double parameter : camera.Params()) hash->Add(parameter);
+    hash->Add(ModelIdOf(camera));
+    for (const double parameter : ParamsOf(camera)) hash->Add(parameter);
   }
   for (const ScenePair& pair : data.pairs) {
     hash->Add(pair.image_id1);

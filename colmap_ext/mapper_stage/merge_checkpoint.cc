@@ -138,11 +138,10 @@ StatusOr<MergeCheckpoint> ReadMergeCheckpoint(
 
 void PutIntoScene(const colmap::Reconstruction& model, MapperScene* scene) {
   for (const auto& [camera_id, camera] : model.Cameras()) {
-    scene->reconstruction.Camera(camera_id).SetParams(camera.Params());
+    ParamsOf(&scene->reconstruction.Camera(camera_id)) = ParamsOf(camera);
   }
   for (const auto& [image_id, pose] : CamsFromWorld(model)) {
-    SetCamFromWorld(pose, &scene->reconstruction.Image(image_id));
-    scene->reconstruction.RegisterImage(image_id);
+    scene->mapper.Register(image_id, pose);
   }
   std::vector<colmap::point3D_t> point_ids;
   for (const auto& [point_id, point] : model.Points3D()) {
@@ -151,9 +150,9 @@ void PutIntoScene(const colmap::Reconstruction& model, MapperScene* scene) {
   std::sort(point_ids.begin(), point_ids.end());
   for (const colmap::point3D_t point_id : point_ids) {
     const colmap::Point3D& point = model.Point3D(point_id);
-    const colmap::point3D_t new_id = scene->reconstruction.AddPoint3D(
-        point.XYZ(), point.Track(), point.Color());
-    scene->reconstruction.Point3D(new_id).SetError(point.Error());
+    const colmap::point3D_t new_id =
+        scene->mapper.AddPoint(XyzOf(point), TrackOf(point), ColorOf(point));
+    SetError(ErrorOf(point), &scene->reconstruction.Point3D(new_id));
   }
 }
 

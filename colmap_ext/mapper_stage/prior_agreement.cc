@@ -42,7 +42,7 @@ PriorAgreement Summarize(const std::string& kind, std::vector<double> chi2) {
 }  // namespace
 
 bool IsHeldByPoints(const colmap::Reconstruction& model, image_t image_id) {
-  return model.ExistsImage(image_id) && model.IsImageRegistered(image_id) &&
+  return model.ExistsImage(image_id) && IsRegistered(model, image_id) &&
          static_cast<int>(model.Image(image_id).NumPoints3D()) >=
              kMinPointsOfImage;
 }

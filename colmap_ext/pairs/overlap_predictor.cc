@@ -41,8 +41,8 @@ bool IsShared(const Eigen::Vector3d& point_in_cam1,
   }
   const std::optional<Eigen::Vector2d> pixel =
       ProjectPoint(camera2, point_in_cam2);
-  return pixel && pixel->minCoeff() >= 0.0 && pixel->x() <= camera2.Width() &&
-         pixel->y() <= camera2.Height();
+  return pixel && pixel->minCoeff() >= 0.0 && pixel->x() <= WidthOf(camera2) &&
+         pixel->y() <= HeightOf(camera2);
 }
 
 }  // namespace
@@ -68,8 +68,9 @@ OverlapPredictor::View OverlapPredictor::BuildView(const colmap::Camera& camera,
   if (!HasUsableParams(camera)) return view;
   for (int row = 0; row < kNumRows; ++row) {
     for (int column = 0; column < kNumColumns; ++column) {
-      const Eigen::Vector2d pixel((column + 0.5) / kNumColumns * camera.Width(),
-                                  (row + 0.5) / kNumRows * camera.Height());
+      const Eigen::Vector2d pixel(
+          (column + 0.5) / kNumColumns * WidthOf(camera),
+          (row + 0.5) / kNumRows * HeightOf(camera));
       const std::optional<Bearing> ray = ComputeBearing(camera, pixel);
       if (!ray) continue;
       view.half_angle = std::max(

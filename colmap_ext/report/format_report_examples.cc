@@ -64,14 +64,14 @@ int ReadFlags(double shrink) {
 std::optional<Photo> ReadPhoto(const std::string& path,
                                const colmap::Camera& camera, int width_px) {
   std::error_code error;
-  if (!fs::is_regular_file(path, error) || camera.Width() == 0) {
+  if (!fs::is_regular_file(path, error) || WidthOf(camera) == 0) {
     return std::nullopt;
   }
   const SilentOpenCv silent;
   Photo photo;
   try {
-    const cv::Mat pixels = cv::imread(
-        path, ReadFlags(static_cast<double>(camera.Width()) / width_px));
+    const cv::Mat pixels =
+        cv::imread(path, ReadFlags(WidthOf(camera) / width_px));
     if (pixels.empty()) return std::nullopt;
     const double height_px =
         static_cast<double>(width_px) * pixels.rows / pixels.cols;
@@ -81,7 +81,7 @@ std::optional<Photo> ReadPhoto(const std::string& path,
   } catch (const cv::Exception&) {
     return std::nullopt;
   }
-  photo.scale = static_cast<double>(width_px) / camera.Width();
+  photo.scale = width_px / WidthOf(camera);
   return photo;
 }
 
@@ -207,7 +207,7 @@ class ExampleReader {
     const auto camera = cameras_.find(camera_id->second);
     if (camera == cameras_.end()) return std::nullopt;
     // Of tall photos two stand side by side.
-    const bool is_tall = camera->second.Height() > camera->second.Width();
+    const bool is_tall = HeightOf(camera->second) > WidthOf(camera->second);
     return ReadPhoto((fs::path(options_.image_path) / image.name).string(),
                      camera->second,
                      is_tall ? options_.width_px / 2 : options_.width_px);

@@ -27,9 +27,9 @@ Histogram MeasureReprojection(const colmap::Reconstruction& model) {
     for (const colmap::Point2D& point2D : image.Points2D()) {
       if (!point2D.HasPoint3D()) continue;
       const std::optional<Eigen::Vector2d> projected = ProjectPoint(
-          camera, cam_from_world * model.Point3D(point2D.Point3DId()).XYZ());
+          camera, cam_from_world * XyzOf(model.Point3D(PointIdOf(point2D))));
       if (!projected) continue;
-      errors.Add((*projected - point2D.XY()).norm());
+      errors.Add((*projected - XyOf(point2D)).norm());
     }
   }
   return errors;

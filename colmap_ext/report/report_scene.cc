@@ -254,10 +254,10 @@ nlohmann::json PointsToJson(const colmap::Reconstruction& reconstruction,
   for (size_t i = 0; i < count; ++i) {
     const colmap::Point3D& point =
         reconstruction.Point3D(ids[i * ids.size() / count]);
-    Append(scene.level_from_world * point.XYZ(), &positions);
+    Append(scene.level_from_world * XyzOf(point), &positions);
     for (int k = 0; k < 3; ++k) {
-      colors.push_back(point.Color(k));
-      any_color = any_color || point.Color(k) != 0;
+      colors.push_back(ColorOf(point)(k));
+      any_color = any_color || ColorOf(point)(k) != 0;
     }
   }
   nlohmann::json json = {{"count", count}, {"xyz", PackFloats(positions)}};

@@ -48,7 +48,7 @@ void TransformReconstruction(const Sim3d& new_from_old,
   }
   for (const colmap::point3D_t point_id : reconstruction->Point3DIds()) {
     colmap::Point3D& point = reconstruction->Point3D(point_id);
-    point.SetXYZ(new_from_old * point.XYZ());
+    SetXyz(new_from_old * XyzOf(point), &point);
   }
 }
 

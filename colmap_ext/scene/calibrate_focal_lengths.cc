@@ -56,20 +56,20 @@ struct Lens {
 // Where the first coefficient of distortion stands when it is unknown: nobody
 // has given one. Not for FOV, where zero is no lens.
 std::optional<size_t> FindUnknownDistortion(const colmap::Camera& camera) {
-  const std::vector<size_t>& indices = camera.ExtraParamsIdxs();
+  const auto& indices = camera.ExtraParamsIdxs();
   if (indices.empty() || camera.ModelName() == "FOV") return std::nullopt;
   for (const size_t index : indices) {
-    if (camera.Params(index) != 0.0) return std::nullopt;
+    if (ParamsOf(camera)[index] != 0.0) return std::nullopt;
   }
-  return indices.front();
+  return indices[0];
 }
 
 colmap::Camera WithLens(colmap::Camera camera, const Lens& lens) {
   if (const auto index = FindUnknownDistortion(camera)) {
-    camera.Params(*index) = lens.distortion;
+    ParamsOf(&camera)[*index] = lens.distortion;
   }
   for (const size_t index : camera.FocalLengthIdxs()) {
-    camera.Params(index) *= std::exp(lens.log_factor);
+    ParamsOf(&camera)[index] *= std::exp(lens.log_factor);
   }
   return camera;
 }
@@ -289,7 +289,7 @@ std::vector<CalibratedFocalLength> CalibrateFocalLengths(
   std::vector<CalibratedFocalLength> calibrated;
   if (!options.enabled) return calibrated;
   for (auto& [camera_id, camera] : scene->cameras) {
-    if (camera.HasPriorFocalLength()) continue;
+    if (HasPriorFocalLength(camera)) continue;
     const std::vector<PairPoints> pairs =
         SelectPairs(options, *scene, camera_id);
     if (pairs.size() < kMinNumPairs) continue;

@@ -44,7 +44,7 @@ std::map<image_t, std::vector<Bearing>> ComputeModelBearings(
     Work item;
     item.camera = &reconstruction.Camera(image.CameraId());
     for (const colmap::Point2D& point : image.Points2D()) {
-      item.keypoints.push_back(point.XY());
+      item.keypoints.push_back(XyOf(point));
     }
     item.bearings = &bearings[image_id];
     work.push_back(std::move(item));

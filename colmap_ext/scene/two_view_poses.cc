@@ -40,9 +40,9 @@ std::optional<Rigid3d> EstimateFromMatches(const TwoViewPoseOptions& options,
   std::vector<Eigen::Vector2d> points1, points2;
   for (const FeatureMatch& match : pair.inlier_matches) {
     const Eigen::Vector2d point1 =
-        camera1.ImageToWorld(image1.keypoints.at(match.point2D_idx1));
+        PlaneFromPixel(camera1, image1.keypoints.at(match.point2D_idx1));
     const Eigen::Vector2d point2 =
-        camera2.ImageToWorld(image2.keypoints.at(match.point2D_idx2));
+        PlaneFromPixel(camera2, image2.keypoints.at(match.point2D_idx2));
     if (!point1.allFinite() || !point2.allFinite()) continue;
     points1.push_back(point1);
     points2.push_back(point2);

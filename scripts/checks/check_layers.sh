@@ -36,7 +36,8 @@ global                         core global/...
 colmap_ext/io                  core
 colmap_ext/matching            core
 colmap_ext/host/v3             core global/view_graph global/two_view colmap_ext/io colmap_ext/matching
-colmap_ext/host                colmap_ext/host/v3 core global/view_graph global/two_view colmap_ext/io colmap_ext/matching
+colmap_ext/host/v4             core colmap_ext/io colmap_ext/matching
+colmap_ext/host                colmap_ext/host/v3 colmap_ext/host/v4 core global/view_graph global/two_view colmap_ext/io colmap_ext/matching
 colmap_ext/features            core colmap_ext/host
 colmap_ext/database            core colmap_ext/io colmap_ext/host global/calibration
 colmap_ext/bundle_adjustment   core colmap_ext/host

@@ -30,6 +30,11 @@ bool IsNewerCameraModel(int model_id) {
   return NewerModels().count(model_id) > 0;
 }
 
+std::optional<int> CameraModelNumParams(int model_id) {
+  if (!colmap::ExistsCameraModelWithId(model_id)) return std::nullopt;
+  return static_cast<int>(colmap::CameraModelNumParams(model_id));
+}
+
 std::string CameraModelName(int model_id) {
   if (colmap::ExistsCameraModelWithId(model_id)) {
     return colmap::CameraModelIdToName(model_id);
@@ -37,6 +42,21 @@ std::string CameraModelName(int model_id) {
   const auto found = NewerModels().find(model_id);
   return found == NewerModels().end() ? "number " + std::to_string(model_id)
                                       : found->second;
+}
+
+std::optional<int> CameraModelId(const std::string& name) {
+  if (!colmap::ExistsCameraModelWithName(name)) return std::nullopt;
+  return colmap::CameraModelNameToId(name);
+}
+
+std::string CameraModelParamsInfo(int model_id) {
+  return colmap::CameraModelParamsInfo(model_id);
+}
+
+std::vector<double> InitialCameraParams(int model_id, double focal_length_px,
+                                        size_t width_px, size_t height_px) {
+  return colmap::CameraModelInitializeParams(model_id, focal_length_px,
+                                             width_px, height_px);
 }
 
 void ConvertCameraModel(int* model_id, std::vector<double>* params) {

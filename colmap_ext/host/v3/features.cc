@@ -43,13 +43,6 @@ std::vector<std::string> ImagesWithoutFeatures(const std::string& path,
   return names;
 }
 
-Status MissingRows(const std::string& database_path, const std::string& what,
-                   const std::string& count, const std::string& log_name) {
-  return Status::Error(database_path + ": " + what + " " + count +
-                       "; see logs/" + log_name +
-                       ", make sure that the disk has room, and run again");
-}
-
 // Waits for a thread of the host; when the progress callback throws, the thread
 // is asked to stop and waited for.
 void WaitFor(colmap::Thread* thread, const std::function<void()>& report) {
@@ -130,50 +123,6 @@ Status ExtractFeatures(const FeatureOptions& options,
              static_cast<double>(count) / num_images);
   });
   return Status::Ok();
-}
-
-Status CheckFeatures(const std::string& database_path) {
-  try {
-    SqliteConnection database(database_path, SqliteConnection::Mode::kRead);
-    SqliteStatement statement(
-        &database,
-        "SELECT COUNT(*), MIN(name), (SELECT COUNT(*) FROM images) FROM images "
-        "WHERE image_id NOT IN (SELECT image_id FROM keypoints) OR "
-        "image_id NOT IN (SELECT image_id FROM descriptors)");
-    if (!statement.Step() || statement.Int(0) == 0) return Status::Ok();
-    return MissingRows(database_path, "the features of",
-                       std::to_string(statement.Int(0)) + " of " +
-                           std::to_string(statement.Int(2)) +
-                           " images are missing (the first one is " +
-                           statement.Text(1) + ")",
-                       "features.log");
-  } catch (const SqliteError& error) {
-    return Status::Error(database_path + ": " + error.what());
-  }
-}
-
-Status CheckMatches(const std::string& database_path,
-                    const std::vector<ImagePair>& pairs) {
-  try {
-    SqliteConnection database(database_path, SqliteConnection::Mode::kRead);
-    SqliteStatement statement(
-        &database,
-        "SELECT 1 FROM matches JOIN two_view_geometries USING (pair_id) "
-        "WHERE pair_id = ?");
-    size_t num_missing = 0;
-    for (const ImagePair& pair : pairs) {
-      statement.Reset();
-      statement.BindInt(1, PairIdFromImagePair(pair));
-      if (!statement.Step()) ++num_missing;
-    }
-    if (num_missing == 0) return Status::Ok();
-    return MissingRows(database_path, "the matches of",
-                       std::to_string(num_missing) + " of " +
-                           std::to_string(pairs.size()) + " pairs are missing",
-                       "matching.log");
-  } catch (const SqliteError& error) {
-    return Status::Error(database_path + ": " + error.what());
-  }
 }
 
 }  // namespace adasfm

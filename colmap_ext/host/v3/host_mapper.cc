@@ -12,14 +12,27 @@
 
 namespace adasfm {
 
+struct HostMapper::Host {
+  const colmap::CorrespondenceGraph& Graph() const {
+    return std::as_const(cache).CorrespondenceGraph();
+  }
+
+  // Filled with the part's cameras, images and matches instead of being read
+  // from the database.
+  colmap::DatabaseCache cache;
+  // Its counters of registrations decide about intrinsics, which are never
+  // changed here, and are what its FilterImages and AdjustLocalBundle check:
+  // those two are not used.
+  colmap::IncrementalMapper mapper{&cache};
+};
+
 HostMapper::HostMapper(colmap::Reconstruction* reconstruction)
-    : reconstruction_(*reconstruction),
-      cache_(std::make_unique<colmap::DatabaseCache>()) {}
+    : reconstruction_(*reconstruction), host_(std::make_unique<Host>()) {}
 
 HostMapper::~HostMapper() = default;
 
 void HostMapper::AddCamera(const colmap::Camera& camera) {
-  cache_->AddCamera(camera);
+  host_->cache.AddCamera(camera);
 }
 
 void HostMapper::AddImage(image_t image_id, const std::string& name,
@@ -30,7 +43,7 @@ void HostMapper::AddImage(image_t image_id, const std::string& name,
   image.SetName(name);
   image.SetCameraId(camera_id);
   image.SetPoints2D(keypoints);
-  cache_->AddImage(std::move(image));
+  host_->cache.AddImage(std::move(image));
 }
 
 void HostMapper::AddMatches(image_t image_id1, image_t image_id2,
@@ -43,23 +56,22 @@ void HostMapper::AddMatches(image_t image_id1, image_t image_id2,
   // The cache is ours and not const; COLMAP 3.8 lets only its own reading of a
   // database change the graph. The graph is not finalized: that drops images
   // without matches, which the mapper then asks for in vain.
-  const_cast<colmap::CorrespondenceGraph&>(Graph()).AddCorrespondences(
-      image_id1, image_id2, host_matches);
+  const_cast<colmap::CorrespondenceGraph&>(host_->Graph())
+      .AddCorrespondences(image_id1, image_id2, host_matches);
 }
 
 void HostMapper::Begin() {
-  mapper_ = std::make_unique<colmap::IncrementalMapper>(cache_.get());
-  mapper_->BeginReconstruction(&reconstruction_);
+  host_->mapper.BeginReconstruction(&reconstruction_);
   // The reconstruction has its own copy of the keypoints.
   for (const auto& [image_id, image] : reconstruction_.Images()) {
     // An assignment would keep the memory: COLMAP's images are never moved.
-    colmap::Image* copy = &cache_->Image(image_id);
+    colmap::Image* copy = &host_->cache.Image(image_id);
     std::destroy_at(copy);
     new (copy) colmap::Image();
   }
 }
 
-void HostMapper::End() { mapper_->EndReconstruction(/*discard=*/false); }
+void HostMapper::End() { host_->mapper.EndReconstruction(/*discard=*/false); }
 
 void HostMapper::ReleaseMatches() {
   // Takes its pointer to the graph from the reconstruction.
@@ -67,12 +79,35 @@ void HostMapper::ReleaseMatches() {
   for (const auto& [image_id, image] : reconstruction_.Images()) {
     reconstruction_.Image(image_id).TearDown();
   }
-  mapper_.reset();
-  cache_.reset();
+  host_.reset();
 }
 
-const colmap::CorrespondenceGraph& HostMapper::Graph() const {
-  return std::as_const(*cache_).CorrespondenceGraph();
+void HostMapper::FindMatches(image_t image_id, point2D_t point2D_idx,
+                             std::vector<MatchedKeypoint>* matches) const {
+  matches->clear();
+  for (const auto& match :
+       host_->Graph().FindCorrespondences(image_id, point2D_idx)) {
+    matches->push_back({match.image_id, match.point2D_idx});
+  }
+}
+
+size_t HostMapper::NumVisiblePoints(image_t image_id) const {
+  return reconstruction_.Image(image_id).NumVisiblePoints3D();
+}
+
+void HostMapper::Register(image_t image_id, const Rigid3d& cam_from_world) {
+  SetCamFromWorld(cam_from_world, &reconstruction_.Image(image_id));
+  reconstruction_.RegisterImage(image_id);
+}
+
+void HostMapper::Deregister(image_t image_id) {
+  reconstruction_.DeRegisterImage(image_id);
+}
+
+colmap::point3D_t HostMapper::AddPoint(
+    const Eigen::Vector3d& xyz_in_world, const colmap::Track& track,
+    const Eigen::Matrix<uint8_t, 3, 1>& color) {
+  return reconstruction_.AddPoint3D(xyz_in_world, track, color);
 }
 
 std::vector<image_t> HostMapper::FindNextImages(int min_num_visible_points) {
@@ -82,7 +117,7 @@ std::vector<image_t> HostMapper::FindNextImages(int min_num_visible_points) {
   options.abs_pose_min_num_inliers = min_num_visible_points;
   // The caller decides when to try again.
   options.max_reg_trials = std::numeric_limits<int>::max();
-  return mapper_->FindNextImages(options);
+  return host_->mapper.FindNextImages(options);
 }
 
 bool HostMapper::RegisterNextImage(image_t image_id, double max_reproj_error_px,
@@ -93,7 +128,7 @@ bool HostMapper::RegisterNextImage(image_t image_id, double max_reproj_error_px,
   options.abs_pose_refine_focal_length = false;
   options.abs_pose_refine_extra_params = false;
   options.num_threads = 1;
-  return mapper_->RegisterNextImage(options, image_id);
+  return host_->mapper.RegisterNextImage(options, image_id);
 }
 
 void HostMapper::TriangulateImage(image_t image_id, double min_angle_deg) {
@@ -102,20 +137,27 @@ void HostMapper::TriangulateImage(image_t image_id, double min_angle_deg) {
   // A straight drive has many tracks of two views; the adjustment weighs them,
   // and verified matches made them.
   options.ignore_two_view_tracks = false;
-  mapper_->TriangulateImage(options, image_id);
+  host_->mapper.TriangulateImage(options, image_id);
 }
 
 void HostMapper::CompleteAndMergeTracks(double max_reproj_error_px) {
   colmap::IncrementalTriangulator::Options options;
   options.complete_max_reproj_error = max_reproj_error_px;
   options.merge_max_reproj_error = max_reproj_error_px;
-  mapper_->CompleteTracks(options);
-  mapper_->MergeTracks(options);
+  host_->mapper.CompleteTracks(options);
+  host_->mapper.MergeTracks(options);
 }
 
 void HostMapper::FilterPoints(double max_reproj_error_px,
                               double min_angle_deg) {
   reconstruction_.FilterAllPoints3D(max_reproj_error_px, min_angle_deg);
+}
+
+void HostMapper::FilterPointsInImages(double max_reproj_error_px,
+                                      double min_angle_deg,
+                                      const std::set<image_t>& image_ids) {
+  reconstruction_.FilterPoints3DInImages(max_reproj_error_px, min_angle_deg,
+                                         {image_ids.begin(), image_ids.end()});
 }
 
 void RefinePose(const PointsInImage& points,

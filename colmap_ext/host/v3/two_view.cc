@@ -9,6 +9,9 @@
 
 namespace adasfm {
 
+static_assert(colmap::TwoViewGeometry::CALIBRATED == kCalibratedConfiguration,
+              "the number that databases have");
+
 bool IsVerifiedConfiguration(int config) {
   return config != colmap::TwoViewGeometry::UNDEFINED &&
          config != colmap::TwoViewGeometry::DEGENERATE &&

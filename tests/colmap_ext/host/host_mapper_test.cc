@@ -42,10 +42,8 @@ class HostMapperTest : public testing::Test {
     mapper->Begin();
   }
 
-  void RegisterAtTruth(image_t image_id, HostMapper* mapper,
-                       colmap::Reconstruction* model) const {
-    SetCamFromWorld(world_.true_poses.at(image_id), &model->Image(image_id));
-    model->RegisterImage(image_id);
+  void RegisterAtTruth(image_t image_id, HostMapper* mapper) const {
+    mapper->Register(image_id, world_.true_poses.at(image_id));
     mapper->TriangulateImage(image_id, 0.1);
   }
 
@@ -54,8 +52,8 @@ class HostMapperTest : public testing::Test {
     colmap::Reconstruction model;
     HostMapper mapper(&model);
     Fill(&mapper);
-    RegisterAtTruth(kFirst, &mapper, &model);
-    RegisterAtTruth(kSecond, &mapper, &model);
+    RegisterAtTruth(kFirst, &mapper);
+    RegisterAtTruth(kSecond, &mapper);
     for (bool grew = true; grew;) {
       grew = false;
       for (const image_t image_id : mapper.FindNextImages(15)) {
@@ -89,8 +87,8 @@ TEST_F(HostMapperTest, NextImagesSeeEnoughPointsMostFirst) {
   HostMapper mapper(&model);
   Fill(&mapper);
   EXPECT_TRUE(mapper.FindNextImages(1).empty());
-  RegisterAtTruth(kFirst, &mapper, &model);
-  RegisterAtTruth(kSecond, &mapper, &model);
+  RegisterAtTruth(kFirst, &mapper);
+  RegisterAtTruth(kSecond, &mapper);
   const std::vector<image_t> images = mapper.FindNextImages(10);
   ASSERT_GT(images.size(), 2);
   for (size_t i = 0; i < images.size(); ++i) {

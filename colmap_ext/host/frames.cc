@@ -160,9 +160,7 @@ bool WriteFrameFiles(const colmap::Reconstruction& model,
   ImagesOfFrame images_of_frame;
   std::map<uint32_t, uint32_t> rig_of_frame;
   std::map<uint32_t, std::set<camera_t>> cameras_of_rig;
-  const std::set<image_t> image_ids(model.RegImageIds().begin(),
-                                    model.RegImageIds().end());
-  for (const image_t image_id : image_ids) {
+  for (const image_t image_id : RegisteredImages(model)) {
     const auto frame = frames.frames.find(image_id);
     if (frame == frames.frames.end()) return false;
     images_of_frame[frame->second.frame_id].push_back(image_id);

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include <base/camera_models.h>
-
+#include <algorithm>
 #include <cstring>
 
 #include "colmap_ext/host/camera_models.h"
@@ -8,19 +7,21 @@
 
 namespace adasfm {
 
+// Of COLMAP's pair ids, in all its versions.
+static constexpr int64_t kPairIdFactor = 2147483647;
+
 [[noreturn]] static void ThrowRowError(int64_t row, const std::string& what) {
   throw SqliteError("table cameras, row " + std::to_string(row) + ": " + what);
 }
 
 int64_t PairIdFromImagePair(const ImagePair& pair) {
-  return colmap::Database::ImagePairToPairId(pair.image_id1, pair.image_id2);
+  const auto [smaller, larger] = std::minmax(pair.image_id1, pair.image_id2);
+  return kPairIdFactor * smaller + larger;
 }
 
 ImagePair ImagePairFromPairId(int64_t pair_id) {
-  image_t image_id1 = kInvalidImageId;
-  image_t image_id2 = kInvalidImageId;
-  colmap::Database::PairIdToImagePair(pair_id, &image_id1, &image_id2);
-  return ImagePair(image_id1, image_id2);
+  return ImagePair(static_cast<image_t>(pair_id / kPairIdFactor),
+                   static_cast<image_t>(pair_id % kPairIdFactor));
 }
 
 std::map<camera_t, colmap::Camera> ReadCameras(SqliteConnection* database) {
@@ -38,22 +39,18 @@ std::map<camera_t, colmap::Camera> ReadCameras(SqliteConnection* database) {
                   params.size() * sizeof(double));
     }
     ConvertCameraModel(&model_id, &params);
-    if (!colmap::ExistsCameraModelWithId(model_id)) {
+    const std::optional<int> num_params = CameraModelNumParams(model_id);
+    if (!num_params) {
       ThrowRowError(camera_id,
                     "unknown camera model " + CameraModelName(model_id));
     }
-    colmap::Camera camera;
-    camera.SetCameraId(camera_id);
-    camera.SetModelId(model_id);
-    camera.SetWidth(statement.Int(2));
-    camera.SetHeight(statement.Int(3));
-    camera.SetPriorFocalLength(statement.Int(5) != 0);
-    if (params.size() != camera.NumParams() ||
+    if (params.size() != *num_params ||
         statement.NumBytes(4) % sizeof(double) != 0) {
       ThrowRowError(camera_id, "wrong number of parameters");
     }
-    camera.SetParams(params);
-    cameras.emplace(camera_id, std::move(camera));
+    cameras.emplace(
+        camera_id, MakeCamera(camera_id, model_id, statement.Int(2),
+                              statement.Int(3), params, statement.Int(5) != 0));
   }
   return cameras;
 }

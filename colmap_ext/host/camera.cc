@@ -22,8 +22,8 @@ Eigen::Matrix2d ComputeProjectionJacobian(const colmap::Camera& camera,
   Eigen::Matrix2d jacobian;
   for (int i = 0; i < 2; ++i) {
     const Eigen::Vector2d step = kStep * Eigen::Vector2d::Unit(i);
-    jacobian.col(i) = (camera.WorldToImage(normalized + step) -
-                       camera.WorldToImage(normalized - step)) /
+    jacobian.col(i) = (PixelFromPlane(camera, normalized + step) -
+                       PixelFromPlane(camera, normalized - step)) /
                       (2.0 * kStep);
   }
   return jacobian;
@@ -32,8 +32,8 @@ Eigen::Matrix2d ComputeProjectionJacobian(const colmap::Camera& camera,
 }  // namespace
 
 bool HasUsableParams(const colmap::Camera& camera) {
-  const std::vector<double>& params = camera.Params();
-  const std::vector<size_t>& focal = camera.FocalLengthIdxs();
+  const std::vector<double>& params = ParamsOf(camera);
+  const auto& focal = camera.FocalLengthIdxs();
   return std::all_of(params.begin(), params.end(),
                      [](double value) { return std::isfinite(value); }) &&
          std::all_of(focal.begin(), focal.end(),
@@ -42,9 +42,9 @@ bool HasUsableParams(const colmap::Camera& camera) {
 
 std::optional<Bearing> ComputeBearing(const colmap::Camera& camera,
                                       const Eigen::Vector2d& pixel) {
-  const Eigen::Vector2d normalized = camera.ImageToWorld(pixel);
+  const Eigen::Vector2d normalized = PlaneFromPixel(camera, pixel);
   // Written so that NaN fails.
-  if (!((camera.WorldToImage(normalized) - pixel).norm() <=
+  if (!((PixelFromPlane(camera, normalized) - pixel).norm() <=
         kMaxRoundTripError_px)) {
     return std::nullopt;
   }
@@ -78,7 +78,7 @@ std::vector<Bearing> ComputeBearings(
 std::optional<Eigen::Vector2d> ProjectPoint(
     const colmap::Camera& camera, const Eigen::Vector3d& point_in_cam) {
   if (!(point_in_cam.z() > 0.0)) return std::nullopt;
-  return camera.WorldToImage(point_in_cam.hnormalized());
+  return PixelFromPlane(camera, point_in_cam.hnormalized());
 }
 
 }  // namespace adasfm

@@ -1,12 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "colmap_ext/host/model.h"
 
-#include <base/camera_models.h>
-
 #include <algorithm>
 #include <cstdint>
 #include <filesystem>
 #include <fstream>
+#include <optional>
 
 #include "colmap_ext/host/camera_models.h"
 
@@ -70,9 +69,9 @@ bool IsCamerasFile(const std::string& path) {
   if (!walker.Read(&count)) return false;
   for (uint64_t i = 0; i < count; ++i) {
     int32_t model_id = 0;
-    if (!walker.Skip(4) || !walker.Read(&model_id) ||
-        !colmap::ExistsCameraModelWithId(model_id) || !walker.Skip(16) ||
-        !walker.SkipArray(colmap::CameraModelNumParams(model_id), 8)) {
+    if (!walker.Skip(4) || !walker.Read(&model_id)) return false;
+    const std::optional<int> num_params = CameraModelNumParams(model_id);
+    if (!num_params || !walker.Skip(16) || !walker.SkipArray(*num_params, 8)) {
       return false;
     }
   }
@@ -88,8 +87,8 @@ std::string FindNewerCameraModel(const std::string& path) {
   int32_t model_id = 0;
   while (walker.Skip(4) && walker.Read(&model_id)) {
     if (IsNewerCameraModel(model_id)) return CameraModelName(model_id);
-    if (!colmap::ExistsCameraModelWithId(model_id) || !walker.Skip(16) ||
-        !walker.SkipArray(colmap::CameraModelNumParams(model_id), 8)) {
+    const std::optional<int> num_params = CameraModelNumParams(model_id);
+    if (!num_params || !walker.Skip(16) || !walker.SkipArray(*num_params, 8)) {
       break;
     }
   }

@@ -1,9 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include <estimators/two_view_geometry.h>
-
 #include <stdexcept>
 
 #include "colmap_ext/host/database.h"
+#include "colmap_ext/host/two_view.h"
 #include "core/so3.h"
 
 namespace adasfm {
@@ -36,7 +35,7 @@ void WriteTwoViewGeometry(const colmap::Camera& camera1,
   statement->BindInt(2, row.inlier_matches.size());
   statement->BindBlob(3, row.inlier_matches.data(),
                       row.inlier_matches.size() * sizeof(FeatureMatch));
-  statement->BindInt(4, colmap::TwoViewGeometry::CALIBRATED);
+  statement->BindInt(4, kCalibratedConfiguration);
   BindMatrix(statement, 5, F);
   BindMatrix(statement, 6, E);
   BindMatrix(statement, 7, qvec);

@@ -1,20 +1,22 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include <base/camera_models.h>
-#include <base/database.h>
-#include <util/bitmap.h>
-#include <util/misc.h>
-
 #include <algorithm>
 #include <exception>
 #include <filesystem>
 #include <map>
+#include <memory>
 #include <optional>
+#include <set>
+#include <sstream>
 #include <tuple>
 
 #include "colmap_ext/host/camera.h"
+#include "colmap_ext/host/camera_models.h"
+#include "colmap_ext/host/database.h"
 #include "colmap_ext/host/database_schema.h"
+#include "colmap_ext/host/database_writer.h"
 #include "colmap_ext/host/features.h"
 #include "colmap_ext/host/host_features.h"
+#include "colmap_ext/host/photo_header.h"
 #include "core/parallel.h"
 
 namespace adasfm {
@@ -25,116 +27,90 @@ constexpr size_t kReadBlockSize = 16;
 // COLMAP's guess for photos without EXIF.
 constexpr double kDefaultFocalLengthFactor = 1.2;
 
-struct PhotoHeader {
-  int width = 0;
-  int height = 0;
-  std::optional<double> focal_length_px;
-  // Latitude and longitude in degrees, altitude in m.
-  std::optional<Eigen::Vector3d> position;
-};
-
-std::optional<PhotoHeader> ReadPhotoHeader(const std::string& path) {
-  colmap::Bitmap bitmap;
-  if (!bitmap.Read(path, /*as_rgb=*/false)) return std::nullopt;
-  PhotoHeader header{bitmap.Width(), bitmap.Height(), std::nullopt,
-                     std::nullopt};
-  double focal_length_px = 0.0;
-  if (bitmap.ExifFocalLength(&focal_length_px) && focal_length_px > 0.0) {
-    header.focal_length_px = focal_length_px;
-  }
-  Eigen::Vector3d position;
-  if (bitmap.ExifLatitude(&position.x()) &&
-      bitmap.ExifLongitude(&position.y()) &&
-      bitmap.ExifAltitude(&position.z())) {
-    header.position = position;
-  }
-  return header;
-}
-
 bool ParseCameraParams(const FeatureOptions& options,
                        std::vector<double>* params) {
   if (options.camera_params.empty()) return true;
-  try {
-    *params = colmap::CSVToVector<double>(options.camera_params);
-  } catch (const std::exception&) {
-    return false;
+  params->clear();
+  std::istringstream text(options.camera_params);
+  for (std::string word; std::getline(text, word, ',');) {
+    try {
+      params->push_back(std::stod(word));
+    } catch (const std::exception&) {
+      return false;
+    }
   }
-  const int model_id = colmap::CameraModelNameToId(options.camera_model);
-  if (!colmap::CameraModelVerifyParams(model_id, *params)) return false;
-  colmap::Camera camera;
-  camera.SetModelId(model_id);
-  camera.SetParams(*params);
-  return HasUsableParams(camera);
+  const int model_id = CameraModelId(options.camera_model).value();
+  return params->size() == *CameraModelNumParams(model_id) &&
+         HasUsableParams(MakeCamera(0, model_id, 0, 0, *params, true));
 }
 
-colmap::Camera MakeCamera(const FeatureOptions& options,
-                          const PhotoHeader& header) {
-  colmap::Camera camera;
-  const bool has_prior =
-      !options.camera_params.empty() || header.focal_length_px.has_value();
-  camera.InitializeWithName(
-      options.camera_model,
-      header.focal_length_px.value_or(kDefaultFocalLengthFactor *
-                                      std::max(header.width, header.height)),
-      header.width, header.height);
-  if (!options.camera_params.empty()) {
-    std::vector<double> params;
-    ParseCameraParams(options, &params);
-    camera.SetParams(params);
-  }
-  camera.SetPriorFocalLength(has_prior);
-  return camera;
+colmap::Camera CameraOfPhoto(const FeatureOptions& options,
+                             const PhotoHeader& header) {
+  const int model_id = CameraModelId(options.camera_model).value();
+  std::vector<double> params =
+      InitialCameraParams(model_id,
+                          header.focal_length_px.value_or(
+                              kDefaultFocalLengthFactor *
+                              std::max(header.width_px, header.height_px)),
+                          header.width_px, header.height_px);
+  ParseCameraParams(options, &params);
+  return MakeCamera(
+      0, model_id, header.width_px, header.height_px, params,
+      !options.camera_params.empty() || header.focal_length_px.has_value());
 }
 
 // Writes images and finds which of them share a camera.
 class ImageWriter {
  public:
   ImageWriter(const FeatureOptions& options, const std::string& database_path)
-      : options_(options), database_(database_path) {
-    for (const colmap::Camera& camera : database_.ReadAllCameras()) {
-      Count(camera);
+      : options_(options), path_(database_path) {
+    // Creates the tables of a new database.
+    writer_ = std::make_unique<DatabaseWriter>(database_path);
+    writer_.reset();
+    SqliteConnection database(database_path, SqliteConnection::Mode::kRead);
+    const std::map<camera_t, colmap::Camera> cameras = ReadCameras(&database);
+    for (const auto& [camera_id, camera] : cameras) Count(camera);
+    for (const DatabaseImage& image : ReadImages(&database)) {
+      cameras_.emplace(Key(cameras.at(image.camera_id), image.name),
+                       image.camera_id);
+      names_.insert(image.name);
     }
-    for (const colmap::Image& image : database_.ReadAllImages()) {
-      cameras_.emplace(
-          Key(database_.ReadCamera(image.CameraId()), image.Name()),
-          image.CameraId());
-    }
-    result_.num_images = database_.NumImages();
+    result_.num_images = names_.size();
+    writer_ = std::make_unique<DatabaseWriter>(database_path);
   }
 
-  bool Exists(const std::string& name) const {
-    return database_.ExistsImageWithName(name);
-  }
+  bool Exists(const std::string& name) const { return names_.count(name) > 0; }
 
   Status Write(const std::string& name, const PhotoHeader& header) {
-    colmap::Camera camera = MakeCamera(options_, header);
+    const colmap::Camera camera = CameraOfPhoto(options_, header);
     if (options_.single_camera == 1 && !cameras_.empty() &&
         cameras_.count(Key(camera, name)) == 0) {
       return Status::Error("the photo " + name + " has " +
-                           std::to_string(header.width) + "x" +
-                           std::to_string(header.height) +
+                           std::to_string(header.width_px) + "x" +
+                           std::to_string(header.height_px) +
                            " pixels, others have other sizes; they cannot be "
                            "of one camera, use --single_camera -1");
     }
     const auto [entry, is_new] = cameras_.emplace(Key(camera, name), 0);
     const bool shares = options_.single_camera != 0 && !is_new;
     if (!shares) {
-      entry->second = database_.WriteCamera(camera);
+      entry->second = writer_->WriteNewCamera(camera);
       Count(camera);
     }
-    colmap::Image image;
-    image.SetName(name);
-    image.SetCameraId(entry->second);
-    // Where COLMAP's feature_extractor puts it.
-    if (header.position.has_value()) image.SetTvecPrior(*header.position);
-    database_.WriteImage(image);
+    writer_->WriteNewImage(name, entry->second, header.position);
+    names_.insert(name);
     ++result_.num_images;
     return Status::Ok();
   }
 
-  // COLMAP reports no failed write.
-  bool IsComplete() const {
-    return static_cast<int>(database_.NumImages()) == result_.num_images;
+  // What is written from now on is one transaction, what was before another.
+  void Commit() { writer_->Commit(); }
+
+  // COLMAP reports no failed write. The last thing to ask.
+  bool IsComplete() {
+    writer_.reset();
+    SqliteConnection database(path_, SqliteConnection::Mode::kRead);
+    return static_cast<int>(ReadImages(&database).size()) == result_.num_images;
   }
 
   ImageRegistration& Result() { return result_; }
@@ -142,31 +118,33 @@ class ImageWriter {
  private:
   // What photos of one camera have in common; the last one is the folder.
   using CameraKey =
-      std::tuple<size_t, size_t, std::vector<double>, bool, std::string>;
+      std::tuple<double, double, std::vector<double>, bool, std::string>;
 
   CameraKey Key(const colmap::Camera& camera, const std::string& name) const {
     // EXIF may differ in its last digits.
     if (options_.single_camera == 1) {
-      return {camera.Width(), camera.Height(), {}, false, ""};
+      return {WidthOf(camera), HeightOf(camera), {}, false, ""};
     }
     if (options_.single_camera == 2) {
-      return {camera.Width(),
-              camera.Height(),
+      return {WidthOf(camera),
+              HeightOf(camera),
               {},
               false,
               std::filesystem::path(name).parent_path().string()};
     }
-    return {camera.Width(), camera.Height(), camera.Params(),
-            camera.HasPriorFocalLength(), ""};
+    return {WidthOf(camera), HeightOf(camera), ParamsOf(camera),
+            HasPriorFocalLength(camera), ""};
   }
 
   void Count(const colmap::Camera& camera) {
     ++result_.num_cameras;
-    if (camera.HasPriorFocalLength()) ++result_.num_known_focal_lengths;
+    if (HasPriorFocalLength(camera)) ++result_.num_known_focal_lengths;
   }
 
   const FeatureOptions& options_;
-  colmap::Database database_;
+  std::string path_;
+  std::unique_ptr<DatabaseWriter> writer_;
+  std::set<std::string> names_;
   std::map<CameraKey, camera_t> cameras_;
   ImageRegistration result_;
 };
@@ -175,15 +153,14 @@ class ImageWriter {
 
 bool FeatureOptions::IsValid(std::string* error) const {
   std::vector<double> params;
-  if (!colmap::ExistsCameraModelWithName(camera_model)) {
+  const std::optional<int> model_id = CameraModelId(camera_model);
+  if (!model_id) {
     *error = "camera_model = " + camera_model +
              " must be one of COLMAP's, as PINHOLE or OPENCV_FISHEYE";
   } else if (!ParseCameraParams(*this, &params)) {
     *error = "camera_params = " + camera_params +
              " must be the parameters, and the focal length positive, of " +
-             camera_model + ": " +
-             colmap::CameraModelParamsInfo(
-                 colmap::CameraModelNameToId(camera_model));
+             camera_model + ": " + CameraModelParamsInfo(*model_id);
   } else if (single_camera < -1 || single_camera > 2) {
     *error = "single_camera = " + std::to_string(single_camera) +
              " must be -1, 0, 1 or 2";
@@ -241,6 +218,7 @@ StatusOr<ImageRegistration> RegisterImages(
       const Status status = writer.Write(name, *headers[i]);
       if (!status.ok()) return status;
     }
+    writer.Commit();
     progress("reading photo " + std::to_string(begin + count) + " of " +
                  std::to_string(names.size()),
              static_cast<double>(begin + count) / names.size());
