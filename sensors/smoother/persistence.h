@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <algorithm>
+
+namespace adasfm {
+
+// How much more residuals add up to over seconds than independent ones would:
+// the squares of their sums over blocks of time, over the sum of their squares.
+class Persistence {
+ public:
+  void Add(double dt_s, double residual) {
+    sum_ += residual;
+    square_sum_ += residual * residual;
+    seconds_ += dt_s;
+    if (seconds_ >= kBlockS) FinishBlock();
+  }
+  // Neighbours are missing: sums begin anew.
+  void FinishBlock() {
+    if (seconds_ == 0.0) return;
+    block_square_sum_ += sum_ * sum_;
+    num_blocks_ += std::min(1.0, seconds_ / kBlockS);
+    sum_ = seconds_ = 0.0;
+  }
+  // Few blocks tell little: 1 weighs as much as kPriorBlocks of them.
+  double Ratio() const {
+    if (square_sum_ <= 0.0) return 1.0;
+    return std::max(
+        1.0, (kPriorBlocks + num_blocks_ * block_square_sum_ / square_sum_) /
+                 (kPriorBlocks + num_blocks_));
+  }
+
+ private:
+  static constexpr double kBlockS = 4.0;
+  static constexpr double kPriorBlocks = 4.0;
+
+  double sum_ = 0.0;
+  double seconds_ = 0.0;
+  double square_sum_ = 0.0;
+  double block_square_sum_ = 0.0;
+  double num_blocks_ = 0.0;
+};
+
+}  // namespace adasfm
