@@ -118,7 +118,7 @@ TEST_F(HostMapperTest, FiltersAlikeWithoutMatches) {
     HostMapper mapper(&model);
     Fill(&mapper);
     for (const image_t image_id : {kFirst, kSecond}) {
-      RegisterAtTruth(image_id, &mapper, &model);
+      RegisterAtTruth(image_id, &mapper);
     }
     const size_t num_before = model.NumPoints3D();
     if (releases) mapper.ReleaseMatches();
