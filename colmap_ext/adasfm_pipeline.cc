@@ -199,17 +199,16 @@ StatusOr<PriorImport> ImportPriors(const PriorImportOptions& options,
                                    const PriorImportPaths& paths,
                                    const std::string& summary_path) {
   std::vector<std::string> warnings;
-  Status status = CheckMemory(EstimateImportMemoryBytes(paths),
-                              options.max_memory_gb,
-                              "AdaSfmPriors.max_memory_gb", &warnings);
+  Status status =
+      CheckMemory(EstimateImportMemoryBytes(paths), options.max_memory_gb,
+                  "AdaSfmPriors.max_memory_gb", &warnings);
   if (!status.ok()) return status;
   StatusOr<PriorImport> import = ComputePriorImport(paths, options);
   if (!import.ok()) return import;
   import->warnings.insert(import->warnings.begin(), warnings.begin(),
                           warnings.end());
   // The database comes last: an error before leaves it as it was.
-  status =
-      WriteTextFile(summary_path, PriorImportToJson(*import) + "\n");
+  status = WriteTextFile(summary_path, PriorImportToJson(*import) + "\n");
   if (status.ok()) {
     status = WritePriorTables(paths.database_path, import->tables);
   }

@@ -31,8 +31,8 @@ struct ReducedPriorRows {
 // problem's residuals name them first.
 struct ReducedSystem {
   // Keypoints, and what is neither keypoint nor prior between two images: what
-  // is believed of shared errors and mounts, positions. The lower triangle, with
-  // zeros where the priors' rows would add.
+  // is believed of shared errors and mounts, positions. The lower triangle,
+  // with zeros where the priors' rows would add.
   Eigen::SparseMatrix<double> rest;
   Eigen::VectorXd rest_gradient;
   std::vector<ReducedPriorRows> priors;

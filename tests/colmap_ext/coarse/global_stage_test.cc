@@ -408,8 +408,9 @@ TEST(RunGlobalStageTest, ReportsEveryStep) {
   for (const StepReport& step : result.steps) {
     EXPECT_NE(json.find("\"" + step.name + "\""), std::string::npos);
   }
-  for (const char* figure : {"pairs_agree", "pair_agreement", "least_pair_agreement",
-                             "rotation_optimality", "max_track_bytes"}) {
+  for (const char* figure :
+       {"pairs_agree", "pair_agreement", "least_pair_agreement",
+        "rotation_optimality", "max_track_bytes"}) {
     EXPECT_NE(json.find("\"" + std::string(figure) + "\""), std::string::npos)
         << figure;
   }

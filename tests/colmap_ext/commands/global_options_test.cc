@@ -34,6 +34,7 @@ const std::vector<OptionCase>& Cases() {
       OPTION("min_triangulation_angle_deg", 4,
              structure.triangulation.min_triangulation_angle_deg),
       OPTION("max_epipolar_error_px", 3, refinement.max_epipolar_error_px),
+      OPTION("max_memory_gb", 2, max_memory_gb),
       OPTION("num_threads", 1, num_threads),
       OPTION("min_num_inliers", 20, poses.min_num_inliers),
       OPTION("num_rotation_rounds", 1, poses.num_rotation_rounds),
