@@ -242,8 +242,10 @@ CameraMountReport CorrectCameraMount(
   report.sigma_rad =
       std::sqrt(axis.dot(covariance.topLeftCorner<3, 3>() * axis));
   const Eigen::Vector3d known = KeepKnown(options, turns, covariance);
+  // Where the mount's share is below what stands out of the floor, the finding
+  // is the direction of driving, which the adjustments have an unknown for.
   if (report.chi2 < options.min_num_sigmas * options.min_num_sigmas ||
-      known.norm() == 0.0) {
+      known.norm() < options.min_num_sigmas * floor_rad) {
     return report;
   }
   report.turn_rad = known;

@@ -218,6 +218,12 @@ TEST(CorrectCameraMount, SharesTheBlameWithTheDirectionOfDriving) {
       const double error = report.turn_rad.normalized().dot(
           report.turn_rad - DegToRad(1.0) * options.mount_deg);
       num_failures += std::abs(error) > 3.0 * report.sigma_rad;
+      // A direction that is wrong is no reason to report a tiny turn.
+      const CameraMountOptions limits;
+      EXPECT_TRUE(!report.corrected ||
+                  RadToDeg(report.turn_rad.norm()) >=
+                      limits.min_num_sigmas * limits.min_sigma_deg)
+          << "seed " << seed;
     }
     EXPECT_LE(num_failures, 3) << "mount " << mount_sigma_deg;
   }
