@@ -11,6 +11,7 @@
 #include "colmap_ext/commands/progress_display.h"
 #include "colmap_ext/commands/registry.h"
 #include "colmap_ext/datasets/write_synthetic_world.h"
+#include "colmap_ext/io/folder_lock.h"
 #include "colmap_ext/io/output_files.h"
 #include "core/check_options.h"
 #include "synthetic/render_world.h"
@@ -221,7 +222,11 @@ Status RunAdasfmSynthesizer(int argc, char** argv) {
   if (!status.ok() || command.HelpShown()) return status;
   status = command.Check([&options] { return Translate(&options); });
   if (status.ok()) status = PrepareOutputFolder(options.output_path);
-  if (status.ok()) status = CheckWorldFolder(options.output_path);
+  if (!status.ok()) return status;
+  const auto lock =
+      FolderLock::Acquire(options.output_path, FolderLock::Mode::kExclusive);
+  if (!lock.ok()) return lock.status();
+  status = CheckWorldFolder(options.output_path);
   if (!status.ok()) return status;
 
   SyntheticWorld world;

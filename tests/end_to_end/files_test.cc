@@ -190,6 +190,17 @@ TEST_F(FilesTest, SecondRunIsToldWhoHasTheFolder) {
 }
 
 // The models of before stay when the database cannot be written.
+// Two at once would write one database file.
+TEST_F(FilesTest, ASecondWorldKeepsOutOfTheFirstOnesFolder) {
+  const std::string folder = folder_.File("world");
+  std::filesystem::create_directory(folder);
+  const auto held = FolderLock::Acquire(folder, FolderLock::Mode::kExclusive);
+  ASSERT_TRUE(held.ok());
+  ExpectError("adasfm_synthesizer --num_images 20 --output_path " + folder,
+              "is in use by");
+  EXPECT_FALSE(std::filesystem::exists(folder + "/database.db"));
+}
+
 TEST_F(FilesTest, LockedDatabaseLeavesTheModels) {
   ASSERT_EQ(Call(Global("g")).ExitCode(), 0);
   const std::string summary = ReadBytes(folder_.File("g/summary.json"));
