@@ -66,7 +66,7 @@ void SummarizeFusion(const OdometryFusionProblem& problem,
     summary->wheel_scale = fused.wheel_scale;
     summary->wheel_scale_sigma = fused.wheel_scale_sigma;
     summary->wheel_persistence = problem.wheel_persistence;
-    // White noise leaves errors of less than 0.2 % and a second.
+    // Where the wheels' errors do not persist, lengths err independently.
     if (problem.wheel_persistence > 1.0) {
       summary->length_drift_ratio = fused.speed_sigma_ratio;
     }

@@ -235,9 +235,9 @@ StatusOr<GlobalStageResult> RunGlobalStage(
     result.steps.push_back(
         {"structure", watch.Seconds(), DescribeModel(result.models.back())});
   }
+  MeasurePairAgreements(options, scene, correspondences.bearings, &result);
 
   // 2.8 Match refinement.
-  MeasurePairAgreements(options, scene, correspondences.bearings, &result);
   correspondences.matches.clear();
   ReleaseFreedMemory();
   if (options.refinement.enabled) {

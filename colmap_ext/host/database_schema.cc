@@ -2,6 +2,7 @@
 #include "colmap_ext/host/database_schema.h"
 
 #include <algorithm>
+#include <filesystem>
 #include <map>
 
 namespace adasfm {
@@ -53,6 +54,20 @@ std::vector<std::string> FindNewerTables(SqliteConnection* database) {
     if (database->HasTable(table)) tables.push_back(table);
   }
   return tables;
+}
+
+Status CheckLibraryOpens(const std::string& database_path) {
+  std::error_code error;
+  const uintmax_t size = std::filesystem::file_size(database_path, error);
+  if (error || size == 0) return Status::Ok();
+  try {
+    SqliteConnection database(database_path, SqliteConnection::Mode::kRead);
+    const std::string reason = WhyLibraryMustNotOpen(&database);
+    return reason.empty() ? Status::Ok()
+                          : Status::Error(database_path + reason);
+  } catch (const SqliteError& sqlite_error) {
+    return Status::Error(database_path + ": " + sqlite_error.what());
+  }
 }
 
 bool StoresMissingAsNull(SqliteConnection* database) {

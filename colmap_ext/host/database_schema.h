@@ -25,6 +25,10 @@ Status CheckColumns(const std::string& path, SqliteConnection* database);
 // file that has any: it would stamp its version and end the process.
 std::vector<std::string> FindNewerTables(SqliteConnection* database);
 
+// Why the linked library must not open the file, to follow its name; empty when
+// it may. The answer of each host/vN.
+std::string WhyLibraryMustNotOpen(SqliteConnection* database);
+
 // An error for a file that the linked library must not open. A file that does
 // not exist yet, or is empty, may be opened. Changes nothing.
 Status CheckLibraryOpens(const std::string& database_path);

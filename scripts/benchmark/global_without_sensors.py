@@ -76,7 +76,7 @@ def run_world(name, seed, args):
     run_ours(folder, args, record)
     run_host(folder, args, record)
   except Failed as error:
-    record['error'] = str(error).split(', see ')[0]
+    record['error'] = str(error)
   if not args.keep:
     shutil.rmtree(folder)
   return record

@@ -163,7 +163,7 @@ def run_world(name, seed, args):
   try:
     run_commands(WORLDS[name], folder, args, record)
   except Failed as error:
-    record['error'] = str(error).split(', see ')[0]
+    record['error'] = str(error)
   if not args.keep:
     shutil.rmtree(folder)
   return record

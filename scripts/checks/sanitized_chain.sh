@@ -7,7 +7,7 @@
 #   scripts/checks/sanitized_chain.sh run COLMAP      only the chain
 #
 # address: AddressSanitizer and UBSan; thread: ThreadSanitizer. The first build of
-# 54 rooms takes tens of CPU minutes. COLMAP and the system's libraries are not
+# 54 rooms takes long. COLMAP and the system's libraries are not
 # instrumented, so ThreadSanitizer knows nothing of how these synchronise:
 # tsan.supp beside this file names what of theirs is passed over.
 # COLMAP_DIR names COLMAP's CMake package (scripts/setup.sh says where it lies).

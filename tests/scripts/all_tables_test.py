@@ -15,6 +15,7 @@ SCRIPTS = os.path.join(os.path.dirname(os.path.abspath(__file__)), '..', '..',
 sys.path.insert(0, SCRIPTS)
 
 import all as all_tables  # noqa: E402
+from benchmarking import process  # noqa: E402
 from benchmarking.figures import run_table  # noqa: E402
 from benchmarking.ledger import (Ledger, MixedVersions,  # noqa: E402
                                  hash_sources, make_stamp)
@@ -221,7 +222,7 @@ class AllTest(Folder):
       for method, models in self.RUNS.items():
         made = record(name, method, models)
         if (name, method) == ('blackout-250', 'mapper'):
-          made = record(name, method, [], error='mapper ended with 1, see x')
+          made = record(name, method, [], error='mapper ended with 1')
         ledger.run('%s %s 0' % (name, method), lambda: [made])
     return ledger
 
@@ -232,6 +233,13 @@ class AllTest(Folder):
          '--colmap', self.path('colmap'), '--colmap4', self.path('colmap4'),
          '--docs_root', self.folder, '--figures_path', self.path('figures')],
         capture_output=True, text=True)
+
+  def test_failures_name_no_folder_of_this_machine(self):
+    with self.assertRaises(process.Failed) as caught:
+      process.run([sys.executable, '-c', 'raise SystemExit(3)'],
+                  self.path('run.log'))
+    self.assertIn('ended with 3', str(caught.exception))
+    self.assertNotIn(self.folder, str(caught.exception))
 
   def test_tables_of_what_is_done(self):
     self.fill(make_stamp(all_tables.ROOT))

@@ -78,7 +78,7 @@ def detail_row(name, heading, record):
   times = '%.1f | %.1f | %d' % (record['seconds'], record['cpu_seconds'],
                                 record['peak_mib'])
   if not record.get('models'):
-    why = record.get('error', '').split(', see ')[0]
+    why = record.get('error', '')
     return '| %s | %s | - | - | no model%s | %s |' % (
         name, heading, why and ': ' + why, times)
   models = record['models']

@@ -48,6 +48,6 @@ def run(arguments, log_path, timeout=None, environment=None):
   if killed.is_set():
     raise Failed('%s took more than %g s' % (arguments[1], timeout), usage)
   if process.returncode != 0:
-    raise Failed('%s ended with %d, see %s' %
-                 (arguments[1], process.returncode, log_path), usage)
+    # Without the log's path, which tables and figures would keep.
+    raise Failed('%s ended with %d' % (arguments[1], process.returncode), usage)
   return usage

@@ -3,6 +3,9 @@
 
 #include <gtest/gtest.h>
 
+#include <functional>
+#include <utility>
+
 #include "tests/testing/colmap_ext/bundle_world_problem.h"
 
 namespace adasfm {
@@ -134,30 +137,42 @@ std::vector<PosePriorEdge> DriftingPriors(const BundleWorldOptions& options,
   return edges;
 }
 
-TEST(SharedErrorsTest, DirectionsThatErrTogetherDoNotOutvoteVision) {
+// The centres' errors with the options and with others, summed over six worlds.
+std::pair<double, double> CompareErrors(
+    const std::function<std::vector<PosePriorEdge>(const BundleWorldOptions&,
+                                                   Random*)>& make_priors,
+    const SharedErrorOptions& first, const SharedErrorOptions& second) {
   BundleWorldOptions world;
   world.num_images = 200;
   world.num_keypoints_per_image = 150;
   world.pixel_noise_px = 0.3;
-  double with_drift = 0.0;
-  double without_drift = 0.0;
+  std::pair<double, double> errors_m;
   for (const uint64_t seed : {1, 2, 3, 4, 5, 6}) {
     world.seed = seed;
     Random random(seed);
     const colmap::Reconstruction given = BuildBundleWorld(world);
     PriorBundleAdjustmentProblem problem = ProblemOfAll(given);
-    problem.priors = DriftingPriors(world, &random);
+    problem.priors = make_priors(world, &random);
     PriorBundleAdjustmentOptions options = ConvergeFully();
     options.keypoint_sigma_px = world.pixel_noise_px;
-    colmap::Reconstruction with = given;
-    ASSERT_TRUE(AdjustBundle(options, problem, &with).success);
-    options.shared_errors.direction_drift_time_s = 0.0;
-    colmap::Reconstruction without = given;
-    ASSERT_TRUE(AdjustBundle(options, problem, &without).success);
-    with_drift += AlignedCenterError(world, with);
-    without_drift += AlignedCenterError(world, without);
+    const auto error_m = [&](const SharedErrorOptions& shared_errors) {
+      options.shared_errors = shared_errors;
+      colmap::Reconstruction adjusted = given;
+      EXPECT_TRUE(AdjustBundle(options, problem, &adjusted).success);
+      return AlignedCenterError(world, adjusted);
+    };
+    errors_m.first += error_m(first);
+    errors_m.second += error_m(second);
   }
-  EXPECT_LT(with_drift, 0.8 * without_drift);
+  return errors_m;
+}
+
+TEST(SharedErrorsTest, DirectionsThatErrTogetherDoNotOutvoteVision) {
+  SharedErrorOptions without;
+  without.direction_drift_time_s = 0.0;
+  const auto [with_m, without_m] =
+      CompareErrors(DriftingPriors, SharedErrorOptions(), without);
+  EXPECT_LT(with_m, 0.8 * without_m);
 }
 
 // Wheels on gravel: the length of each motion errs by what the one before it
@@ -188,29 +203,14 @@ std::vector<PosePriorEdge> LengthDriftPriors(const BundleWorldOptions& options,
 
 TEST(SharedErrorsTest, LengthsThatErrTogetherDoNotOutvoteVision) {
   constexpr double kRatio = 0.02;
-  BundleWorldOptions world;
-  world.num_images = 200;
-  world.num_keypoints_per_image = 150;
-  world.pixel_noise_px = 0.3;
-  double with_drift = 0.0;
-  double without_drift = 0.0;
-  for (const uint64_t seed : {1, 2, 3, 4, 5, 6}) {
-    world.seed = seed;
-    Random random(seed);
-    const colmap::Reconstruction given = BuildBundleWorld(world);
-    PriorBundleAdjustmentProblem problem = ProblemOfAll(given);
-    problem.priors = LengthDriftPriors(world, kRatio, &random);
-    PriorBundleAdjustmentOptions options = ConvergeFully();
-    options.keypoint_sigma_px = world.pixel_noise_px;
-    colmap::Reconstruction without = given;
-    ASSERT_TRUE(AdjustBundle(options, problem, &without).success);
-    options.shared_errors.length_drift_ratio = kRatio;
-    colmap::Reconstruction with = given;
-    ASSERT_TRUE(AdjustBundle(options, problem, &with).success);
-    with_drift += AlignedCenterError(world, with);
-    without_drift += AlignedCenterError(world, without);
-  }
-  EXPECT_LT(with_drift, 0.8 * without_drift);
+  const auto priors = [](const BundleWorldOptions& world, Random* random) {
+    return LengthDriftPriors(world, kRatio, random);
+  };
+  SharedErrorOptions with;
+  with.length_drift_ratio = kRatio;
+  const auto [with_m, without_m] =
+      CompareErrors(priors, with, SharedErrorOptions());
+  EXPECT_LT(with_m, 0.8 * without_m);
 }
 
 }  // namespace
