@@ -1,0 +1,37 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <vector>
+
+#include "sensors/smoother/chain_elimination.h"
+#include "sensors/smoother/odometry_factors.h"
+
+namespace adasfm {
+
+// The smoother's least-squares problem with the present values of its unknowns
+// (states, globals) and what each link's sensors count for.
+struct ChainProblem {
+  // Begins with the problem's initial states. Keeps references to both.
+  ChainProblem(const OdometryFusionProblem& problem,
+               const OdometryFusionOptions& options);
+
+  size_t NumLinks() const { return problem.links.size(); }
+  LinkResiduals Residuals(size_t k) const;
+  // The normal equations of link k.
+  LinkEquations Equations(size_t k) const;
+  // Those of the priors of the first state and of the globals.
+  ChainMessage FirstMessage() const;
+  // Half of the squares of all residuals.
+  double Cost() const;
+
+  const OdometryFusionProblem& problem;
+  const OdometryFusionOptions& options;
+  std::vector<LinkWeights> weights;  // one a link
+  std::vector<ChainState> states;    // one more
+  ChainGlobals globals;
+
+ private:
+  Eigen::Vector3d InitialStep(size_t k) const;
+};
+
+}  // namespace adasfm
