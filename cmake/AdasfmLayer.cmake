@@ -4,7 +4,7 @@
 function(adasfm_target_options target)
   target_compile_features(${target} PUBLIC cxx_std_17)
   set_target_properties(${target} PROPERTIES CXX_EXTENSIONS OFF)
-  target_compile_options(${target} PRIVATE -Wall -Wextra -Wno-sign-compare)
+  target_compile_options(${target} PRIVATE -Wall -Wextra)
   if(ADASFM_WERROR)
     target_compile_options(${target} PRIVATE -Werror)
   endif()

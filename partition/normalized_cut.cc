@@ -116,10 +116,10 @@ bool RepairOnePart(const ImageAdjacency& adjacency, size_t min_size,
   return false;
 }
 
-size_t MaxSize(const std::vector<Part>& parts) {
+int MaxSize(const std::vector<Part>& parts) {
   size_t size = 0;
   for (const Part& part : parts) size = std::max(size, part.size());
-  return size;
+  return static_cast<int>(size);
 }
 
 std::vector<Part> CutComponent(const NormalizedCutOptions& options,
@@ -162,7 +162,8 @@ std::vector<std::vector<image_t>> ComputeNormalizedCut(
   const auto components = FindConnectedComponents(adjacency, graph.images);
   std::vector<std::vector<image_t>> parts;
   for (const std::vector<image_t>& component : components) {
-    if (!parts.empty() && component.size() < options.min_part_size) continue;
+    const int size = static_cast<int>(component.size());
+    if (!parts.empty() && size < options.min_part_size) continue;
     for (const Part& part : CutComponent(options, adjacency, component)) {
       parts.emplace_back(part.begin(), part.end());
     }

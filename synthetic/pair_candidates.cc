@@ -135,7 +135,7 @@ std::vector<PairCandidate> FindSequentialPairs(const SyntheticWorld& world) {
 std::vector<PairCandidate> AddSecondCamera(
     const SyntheticWorld& world, std::vector<PairCandidate> candidates) {
   const int num_frames = world.options.num_images;
-  if (world.images.size() == num_frames) return candidates;
+  if (static_cast<int>(world.images.size()) == num_frames) return candidates;
   const size_t num_of_first = candidates.size();
   for (size_t k = 0; k < num_of_first; ++k) {
     const int first = candidates[k].first;

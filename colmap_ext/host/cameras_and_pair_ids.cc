@@ -44,7 +44,7 @@ std::map<camera_t, colmap::Camera> ReadCameras(SqliteConnection* database) {
       ThrowRowError(camera_id,
                     "unknown camera model " + CameraModelName(model_id));
     }
-    if (params.size() != *num_params ||
+    if (static_cast<int>(params.size()) != *num_params ||
         statement.NumBytes(4) % sizeof(double) != 0) {
       ThrowRowError(camera_id, "wrong number of parameters");
     }

@@ -40,7 +40,7 @@ bool ParseCameraParams(const FeatureOptions& options,
     }
   }
   const int model_id = CameraModelId(options.camera_model).value();
-  return params->size() == *CameraModelNumParams(model_id) &&
+  return static_cast<int>(params->size()) == *CameraModelNumParams(model_id) &&
          HasUsableParams(MakeCamera(0, model_id, 0, 0, *params, true));
 }
 

@@ -195,8 +195,9 @@ class LocalMapper {
     for (auto it = result_.prior_only_images.begin();
          it != result_.prior_only_images.end();) {
       // Points reached it after all.
-      const bool has_points = reconstruction_.Image(*it).NumPoints3D() >=
-                              options_.registration.min_num_visible_points;
+      const int num_points = reconstruction_.Image(*it).NumPoints3D();
+      const bool has_points =
+          num_points >= options_.registration.min_num_visible_points;
       it = has_points ? result_.prior_only_images.erase(it) : std::next(it);
     }
   }

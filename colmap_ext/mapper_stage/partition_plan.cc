@@ -51,7 +51,8 @@ PartitionPlan BuildPartitionPlan(const PartitionPlanOptions& options,
                                  const CoarsePoseMap& coarse) {
   const ImageGraph graph = BuildImageGraph(data, coarse);
   PartitionPlan plan;
-  if (graph.images.size() <= options.max_num_images_undivided) {
+  const int num_images = static_cast<int>(graph.images.size());
+  if (num_images <= options.max_num_images_undivided) {
     plan.parts.emplace_back(graph.images.begin(), graph.images.end());
   } else {
     plan.parts = ExpandByFloodFill(options.flood_fill, graph,

@@ -101,7 +101,7 @@ OdometryPairs PredictPairs(const PairSelectionOptions& options,
       }
     }
     std::sort(partners[i].begin(), partners[i].end());
-    if (partners[i].size() > options.num_similar_images) {
+    if (static_cast<int>(partners[i].size()) > options.num_similar_images) {
       partners[i].resize(options.num_similar_images);
     }
   });

@@ -45,7 +45,7 @@ StatusOr<std::map<int, camera_t>> FindCameraIds(
   const bool have_folders = std::all_of(
       scene.images.begin(), scene.images.end(), [&](const auto& entry) {
         const int index = CameraIndexOfName(entry.second.name);
-        return index >= 0 && index < num_cameras;
+        return index >= 0 && index < static_cast<int>(num_cameras);
       });
   if (!have_folders) {
     if (used.size() == num_cameras) {

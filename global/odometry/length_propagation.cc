@@ -112,7 +112,7 @@ std::vector<LengthPropagation::Observation> LengthPropagation::ObserveEdge(
                    [](const Candidate& a, const Candidate& b) {
                      return a.first.weight > b.first.weight;
                    });
-  if (candidates.size() > options_.max_num_matches) {
+  if (static_cast<int>(candidates.size()) > options_.max_num_matches) {
     candidates.resize(options_.max_num_matches);
   }
   std::vector<Observation> observations;
@@ -247,7 +247,7 @@ void LengthPropagation::PredictDepths(int keypoint) {
 // The logarithm of a length and its sigma.
 bool LengthPropagation::LearnLength(std::vector<WeightedValue>* values,
                                     EdgeLength* log_length) const {
-  if (values->size() < options_.min_num_shared) return false;
+  if (static_cast<int>(values->size()) < options_.min_num_shared) return false;
   log_length->length = WeightedMedian(values);
   for (WeightedValue& value : *values) {
     value.value = std::abs(value.value - log_length->length);

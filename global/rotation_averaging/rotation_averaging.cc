@@ -148,8 +148,10 @@ void RepairNodes(const RotationAveragingOptions& options,
       num_contradicting[node] += contradicts;
     }
   }
-  for (size_t node = 0; node < rotations->size(); ++node) {
-    if (2 * num_contradicting[node] <= edges_of[node].size()) continue;
+  const int num_nodes = static_cast<int>(rotations->size());
+  for (int node = 0; node < num_nodes; ++node) {
+    const int num_edges = static_cast<int>(edges_of[node].size());
+    if (2 * num_contradicting[node] <= num_edges) continue;
     double best_cost = NodeCost(options, edges, edges_of[node], node,
                                 (*rotations)[node], *rotations);
     for (const int e : edges_of[node]) {

@@ -98,7 +98,8 @@ void RefinePair(const MatchRefinementOptions& options,
   pair->matches = KeepBestPerKeypoint(
       FindFittingMatches(options.max_epipolar_error_px, pair->cam2_from_cam1,
                          bearings1, bearings2, candidates));
-  pair->removed = pair->matches.size() < options.min_num_matches;
+  pair->removed =
+      static_cast<int>(pair->matches.size()) < options.min_num_matches;
 }
 
 }  // namespace

@@ -148,13 +148,16 @@ std::optional<Eigen::Vector3d> RefinePoint(const std::vector<Ray>& rays,
 
 std::optional<TriangulatedTrack> TriangulateTrack(
     const TrackTriangulationOptions& options, const std::vector<Ray>& rays) {
-  if (rays.size() < options.min_track_length) return std::nullopt;
+  const auto is_short = [&options](size_t length) {
+    return static_cast<int>(length) < options.min_track_length;
+  };
+  if (is_short(rays.size())) return std::nullopt;
   std::vector<int> agreeing = FindConsensus(rays, options.max_reproj_error_px);
-  if (agreeing.size() < options.min_track_length) return std::nullopt;
+  if (is_short(agreeing.size())) return std::nullopt;
   const auto point = RefinePoint(rays, agreeing);
   if (!point.has_value()) return std::nullopt;
   agreeing = FindAgreeing(rays, *point, options.max_reproj_error_px);
-  if (agreeing.size() < options.min_track_length) return std::nullopt;
+  if (is_short(agreeing.size())) return std::nullopt;
   const double angle_deg = RadToDeg(MaxAngleRad(rays, agreeing));
   if (angle_deg < options.min_triangulation_angle_deg) return std::nullopt;
 
