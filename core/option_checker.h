@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <cmath>
+#include <initializer_list>
 #include <sstream>
 #include <string>
 #include <utility>
@@ -9,34 +11,61 @@ namespace adasfm {
 
 // Checks the options of one group. The first rule that does not hold gives the
 // message "GROUP.NAME = VALUE RULE": the option as the user types it, what it
-// is and what it should be. A rule is false of a value that is no number.
+// is and what it should be; without the group where the commands name it
+// otherwise, and say so before the message. A rule is false of a value that is
+// no number, and all but Require's are of an infinite one.
 class OptionChecker {
  public:
-  OptionChecker(std::string group, std::string* error)
-      : group_(std::move(group)), error_(*error) {}
+  using NamedValues = std::initializer_list<std::pair<const char*, double>>;
+
+  explicit OptionChecker(std::string* error) : error_(*error) {}
+  OptionChecker(const std::string& group, std::string* error)
+      : prefix_(group + "."), error_(*error) {}
 
   OptionChecker& Require(bool holds, const std::string& name, double value,
                          const std::string& rule) {
     if (!all_hold_ || holds) return *this;
     all_hold_ = false;
     std::ostringstream message;
-    message << group_ << "." << name << " = " << value << " " << rule;
+    message << prefix_ << name << " = " << value << " " << rule;
     error_ = message.str();
     return *this;
   }
   OptionChecker& Positive(const std::string& name, double value) {
-    return Require(value > 0.0, name, value, "must be positive");
+    return RequireFinite(value > 0.0, name, value, "must be positive");
+  }
+  OptionChecker& Positive(const NamedValues& values) {
+    for (const auto& [name, value] : values) Positive(name, value);
+    return *this;
+  }
+  OptionChecker& NotNegative(const NamedValues& values) {
+    for (const auto& [name, value] : values) {
+      RequireFinite(value >= 0.0, name, value, "must not be negative");
+    }
+    return *this;
   }
   OptionChecker& AtLeast(double min, const std::string& name, double value) {
-    std::ostringstream rule;
-    rule << "must be at least " << min;
-    return Require(value >= min, name, value, rule.str());
+    return RequireFinite(value >= min, name, value, "must be at least ", min);
+  }
+  OptionChecker& Within(double min, double max, const std::string& name,
+                        double value) {
+    return RequireFinite(value >= min && value <= max, name, value,
+                         "must be from ", min, " to ", max);
   }
 
   bool AllHold() const { return all_hold_; }
 
  private:
-  const std::string group_;
+  template <typename... Text>
+  OptionChecker& RequireFinite(bool holds, const std::string& name,
+                               double value, const Text&... rule) {
+    if (std::isinf(value)) return Require(false, name, value, "must be finite");
+    std::ostringstream text;
+    (text << ... << rule);
+    return Require(holds, name, value, text.str());
+  }
+
+  const std::string prefix_;
   std::string& error_;
   bool all_hold_ = true;
 };

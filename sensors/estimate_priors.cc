@@ -6,47 +6,26 @@
 #include <optional>
 #include <stdexcept>
 
+#include "core/option_checker.h"
 #include "core/so3.h"
-#include "sensors/bridged_holes.h"
-#include "sensors/calibration_check/check_against_vision.h"
-#include "sensors/calibration_check/clock_jump.h"
+#include "sensors/build_fusion_problem.h"
 #include "sensors/calibration_check/wheel_clock.h"
 #include "sensors/check_logs.h"
 #include "sensors/io/format_figures.h"
 #include "sensors/noise_figures.h"
 #include "sensors/select_images.h"
-#include "sensors/smoother/build_odometry_links.h"
 #include "sensors/smoother/compose_prior.h"
-#include "sensors/smoother/initial_odometry.h"
+#include "sensors/use_vision.h"
 #include "sensors/visual_links.h"
 
 namespace adasfm {
 namespace {
 
-// Noise figures are corrected this often at most, within this factor of the
-// stated ones, and for as long as they change by more than estimates of some
-// hundred residuals err.
+// Noise figures are corrected this often at most, for as long as they change by
+// more than estimates of some hundred residuals err.
 constexpr int kMaxNumCorrections = 6;
-constexpr double kMaxNoiseFactor = 5.0;
-// Slip is a share of the speed, which no figure of the log's noise states: on
-// gravel wheels err by 40 times theirs. Sums over seconds vary by as much more.
-constexpr double kMaxWheelNoiseFactor = 100.0;
-constexpr double kMaxWheelPersistence = 100.0;
-constexpr double kMinNoiseChange = 1.2;
 // The smoother finds a delay of the wheels that is within its prior.
 constexpr double kMaxDelaySigmas = 2.0;
-// Below it gyroscope and pictures have nothing in common, as logs of another
-// drive; a stabilised video keeps the slow turns.
-constexpr double kMinSameMotionCorrelation = 0.4;
-
-// Moves a factor by another, within limits; whether it moved enough to matter.
-bool Correct(double by, double min_factor, double max_factor, double* factor) {
-  const double corrected = std::clamp(*factor * by, min_factor, max_factor);
-  const double change = corrected / *factor;
-  if (std::max(change, 1.0 / change) < kMinNoiseChange) return false;
-  *factor = corrected;
-  return true;
-}
 
 // The time between the images errs, and with it the turn. About all axes alike:
 // rows that are exposed one after another also tilt and skew the picture (a
@@ -74,36 +53,23 @@ class PriorEstimator {
  private:
   void SelectLogs(const SensorLogs& logs);
   Status FindImagesInLogs();
-  Status CheckVision();
-  void CorrectTimeShift(const VisionCheck& check);
-  // What the IMU says is of no use; the other logs stay.
-  Status LeaveOutImu(const VisionCheck& check);
   void CorrectWheelClock();
+  // The images' times on the IMU's clock.
+  std::vector<timestamp_t> ImageTimesOfImu() const;
   Status CheckMotion();
-  void UndoFilter(const VisionCheck& check);
   void Fuse();
-  void BuildProblem();
-  // The smoother's residuals against the noise figures; whether these changed.
-  bool CorrectNoise();
   void BuildPriors();
   void FillSummary();
   Status CheckWheelScale();
-  ImuBias FirstBias() const;
 
   const SensorCalibration& stated_;
   // With the noise figures in use.
   SensorCalibration calibration_;
   const PriorEstimationOptions& options_;
   MotionLogs logs_;
-  timestamp_t timeshift_ns_ = 0;
   std::vector<ImageStamp> all_images_;
   std::vector<ImageStamp> images_;  // inside the logs
-  // What vision saw; empty when it contradicts the gyroscope.
-  std::vector<TimedRotation> rotations_;
-  bool has_visual_bias_ = false;
-  Eigen::Vector3d visual_bias_ = Eigen::Vector3d::Zero();
-  double visual_bias_sigma_ = 0.0;
-  double wheel_persistence_ = 1.0;  // OdometryFusionProblem's
+  VisionUse vision_;
   OdometryTimeline timeline_;
   OdometryFusionProblem problem_;
   OdometryFusionResult fused_;
@@ -137,92 +103,11 @@ void PriorEstimator::SelectLogs(const SensorLogs& logs) {
 }
 
 Status PriorEstimator::FindImagesInLogs() {
-  StatusOr<std::vector<ImageStamp>> images =
-      SelectImages(all_images_, timeshift_ns_, logs_.StartNs(), logs_.EndNs());
+  StatusOr<std::vector<ImageStamp>> images = SelectImages(
+      all_images_, vision_.timeshift_ns, logs_.StartNs(), logs_.EndNs());
   if (!images.ok()) return images.status();
   images_ = std::move(images).value();
   return Status::Ok();
-}
-
-Status PriorEstimator::CheckVision() {
-  if (logs_.imu.empty() || rotations_.empty()) return Status::Ok();
-  VisionCheck check = CheckAgainstVision(rotations_, logs_.imu, calibration_,
-                                         VisionCheckOptions());
-  if (check.contradiction_is_time_shift) {
-    const std::string jump = FindClockJump(rotations_, logs_.imu, calibration_,
-                                           VisionCheckOptions());
-    check.contradiction_is_time_shift = jump.empty();
-    if (!jump.empty()) check.contradiction = jump;
-  }
-  SensorSummary& summary = estimate_.summary;
-  if (!check.is_conclusive) {
-    summary.warnings.push_back(
-        "the gyroscope cannot be checked against vision: too little turning, "
-        "or two-view rotations too few or too poor");
-    return Status::Ok();
-  }
-  summary.visual_timeshift_correction_s = check.time_shift_correction_s;
-  summary.unexplained_rotation = check.unexplained;
-  if (check.contradiction_is_motion && options_.check_against_vision) {
-    return LeaveOutImu(check);
-  }
-  const bool may_correct =
-      check.contradiction.empty() || check.contradiction_is_time_shift;
-  if (may_correct &&
-      (options_.estimate_time_shift == 1 ||
-       (options_.estimate_time_shift == -1 && check.is_clock_shift))) {
-    CorrectTimeShift(check);
-  } else if (!check.contradiction.empty()) {
-    if (options_.check_against_vision) {
-      return Status::Error(check.contradiction);
-    }
-    summary.warnings.push_back(check.contradiction);
-    rotations_.clear();
-    return Status::Ok();
-  }
-  has_visual_bias_ = options_.use_visual_rotations;
-  // Before any data the bias is zero, with a sigma of its own.
-  const double visual_variance = std::pow(options_.visual_bias_sigma, 2) +
-                                 std::pow(check.gyroscope_bias_sigma, 2);
-  const double prior_variance =
-      std::pow(options_.fusion.gyroscope_bias_sigma, 2);
-  const double share = prior_variance / (prior_variance + visual_variance);
-  visual_bias_ = share * check.gyroscope_bias;
-  visual_bias_sigma_ = std::sqrt((1.0 - share) * prior_variance);
-  if (options_.undo_gyroscope_filter) UndoFilter(check);
-  return Status::Ok();
-}
-
-void PriorEstimator::CorrectTimeShift(const VisionCheck& check) {
-  SensorSummary& summary = estimate_.summary;
-  timeshift_ns_ += NsFromSeconds(check.time_shift_correction_s);
-  summary.timeshift_was_corrected = true;
-  if (options_.estimate_time_shift == 1) return;
-  summary.warnings.push_back(FormatFigures(
-      "vision shows that images and IMU differ by %+.4f s more than "
-      "timeshift_cam_imu says, and the priors were made with that: write "
-      "timeshift_cam_imu: %.4f into the calibration",
-      check.time_shift_correction_s, SecondsFromNs(timeshift_ns_)));
-}
-
-Status PriorEstimator::LeaveOutImu(const VisionCheck& check) {
-  if (!(logs_.wheel.empty() && logs_.odometry.empty()) &&
-      check.shifted_correlation < kMinSameMotionCorrelation) {
-    return Status::Error(
-        "vision and gyroscope contradict each other: check T_cam_imu, the "
-        "clocks and whether logs and images belong together (" +
-        check.contradiction + ")");
-  }
-  SensorSummary& summary = estimate_.summary;
-  summary.imu_was_left_out = true;
-  summary.warnings.push_back(
-      check.contradiction +
-      ". The IMU is left out: a video that the camera stabilised turns "
-      "otherwise than the camera; switch the stabilisation off "
-      "(--force 1 uses the IMU all the same)");
-  logs_.imu.clear();
-  rotations_.clear();
-  return logs_.IsEmpty() ? Status::Ok() : FindImagesInLogs();
 }
 
 void PriorEstimator::CorrectWheelClock() {
@@ -245,13 +130,18 @@ void PriorEstimator::CorrectWheelClock() {
       *shift_s, 0.0));
 }
 
-Status PriorEstimator::CheckMotion() {
-  SensorSummary& summary = estimate_.summary;
+std::vector<timestamp_t> PriorEstimator::ImageTimesOfImu() const {
   std::vector<timestamp_t> times_ns;
   for (const ImageStamp& image : images_) {
-    times_ns.push_back(image.timestamp_ns + timeshift_ns_);
+    times_ns.push_back(image.timestamp_ns + vision_.timeshift_ns);
   }
-  const Status status = CheckCoverage(times_ns, logs_, &summary.warnings);
+  return times_ns;
+}
+
+Status PriorEstimator::CheckMotion() {
+  SensorSummary& summary = estimate_.summary;
+  const Status status =
+      CheckCoverage(ImageTimesOfImu(), logs_, &summary.warnings);
   if (!status.ok()) return status;
   const std::string contradiction =
       FindContradiction(logs_, calibration_, &summary.warnings);
@@ -262,123 +152,29 @@ Status PriorEstimator::CheckMotion() {
   return Status::Ok();
 }
 
-void PriorEstimator::UndoFilter(const VisionCheck& check) {
-  if (check.filter.lag_s == 0.0) return;
-  // Of the clock in use.
-  GyroscopeFilter filter = check.filter;
-  filter.delay_s += calibration_.timeshift_cam_imu_s +
-                    check.time_shift_correction_s -
-                    SecondsFromNs(timeshift_ns_);
-  UndoGyroscopeFilter(filter, &logs_.imu);
-  estimate_.summary.gyroscope_lag_s = filter.lag_s;
-  estimate_.summary.gyroscope_delay_s = filter.delay_s;
-}
-
-ImuBias PriorEstimator::FirstBias() const {
-  ImuBias bias;
-  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
-  double time = 0.0;
-  for (const OdometryLink& link : problem_.links) {
-    if (link.standstill == StandstillKind::kNone) continue;
-    sum += LogSo3(link.imu.delta_rotation);
-    time += link.dt_s;
-  }
-  if (time > 0.5) {
-    bias.gyroscope = sum / time;
-  } else if (has_visual_bias_) {
-    bias.gyroscope = visual_bias_;
-  }
-  return bias;
-}
-
-void PriorEstimator::BuildProblem() {
-  OdometryLinkOptions link_options;
-  link_options.max_imu_gap_s = options_.max_imu_gap_s;
-  link_options.max_wheel_gap_s = options_.max_wheel_gap_s;
-  link_options.max_link_s = options_.max_link_s;
-  link_options.max_lead_s = options_.max_lead_s;
-  link_options.lateral_speed_noise = options_.fusion.lateral_speed_noise;
-  link_options.vertical_speed_noise = options_.fusion.vertical_speed_noise;
-  std::vector<timestamp_t> times;
-  for (const ImageStamp& image : images_) {
-    times.push_back(image.timestamp_ns + timeshift_ns_);
-  }
-  problem_ = OdometryFusionProblem();
-  timeline_ = BuildTimeline(times, logs_, link_options);
-  problem_.imu_from_wheel = calibration_.imu_from_wheel;
-  problem_.imu_noise = calibration_.imu_noise;
-  problem_.wheel_persistence = wheel_persistence_;
-  problem_.links = BuildOdometryLinks(timeline_.times_ns, logs_, calibration_,
-                                      ImuBias(), link_options);
-  const ImuBias bias = FirstBias();
-  if (bias.gyroscope != Eigen::Vector3d::Zero()) {
-    // Preintegrated about the right bias, first-order corrections stay small.
-    problem_.links = BuildOdometryLinks(timeline_.times_ns, logs_, calibration_,
-                                        bias, link_options);
-  }
-  AddHoleUncertainty(logs_, timeline_.times_ns,
-                     calibration_.imu_from_wheel.rotation, &problem_.links);
-  if (options_.use_visual_rotations) {
-    const VisualLinks visual = AddVisualRotations(
-        rotations_, timeshift_ns_, calibration_.cam_from_imu.rotation,
-        timeline_, &problem_);
-    estimate_.summary.num_visual_links = visual.num_links;
-    estimate_.summary.visual_sigma_deg = RadToDeg(visual.sigma_rad);
-  }
-  // What the links hold already must not count twice.
-  if (has_visual_bias_ && estimate_.summary.num_visual_links == 0) {
-    problem_.prior_gyroscope_bias = visual_bias_;
-    problem_.prior_gyroscope_bias_sigma = visual_bias_sigma_;
-  }
-  problem_.initial_states =
-      EstimateInitialOdometry(problem_.links, problem_.imu_from_wheel,
-                              options_.fusion.gravity_m_s2, bias);
-}
-
-bool PriorEstimator::CorrectNoise() {
-  NoiseCheck speed = fused_.wheel_speed_check;
-  NoiseCheck yaw = fused_.wheel_yaw_check;
-  SensorSummary& summary = estimate_.summary;
-  if (calibration_.wheel_type == WheelType::kDifferential ||
-      calibration_.wheel_type == WheelType::kTicks) {
-    // One figure for the speed of a wheel.
-    speed.chi2 += yaw.chi2;
-    speed.redundancy += yaw.redundancy;
-    yaw = NoiseCheck();
-  }
-  // A smaller figure than the stated one is not believed: what wheels err by is
-  // more than the noise of their readings.
-  bool any = Correct(speed.Factor(), 1.0, kMaxWheelNoiseFactor,
-                     &summary.wheel_speed_noise_factor);
-  any |= Correct(yaw.Factor(), 1.0, kMaxNoiseFactor,
-                 &summary.wheel_yaw_noise_factor);
-  double persistence = std::sqrt(wheel_persistence_);
-  any |= Correct(std::sqrt(fused_.wheel_persistence / wheel_persistence_), 1.0,
-                 std::sqrt(kMaxWheelPersistence), &persistence);
-  wheel_persistence_ = persistence * persistence;
-  double accelerometer = calibration_.imu_noise.accelerometer_noise_density /
-                         stated_.imu_noise.accelerometer_noise_density;
-  any |= Correct(fused_.accelerometer_check.Factor(), 1.0, kMaxNoiseFactor,
-                 &accelerometer);
-  calibration_.imu_noise.accelerometer_noise_density =
-      accelerometer * stated_.imu_noise.accelerometer_noise_density;
-  calibration_.wheel_speed_noise =
-      summary.wheel_speed_noise_factor * stated_.wheel_speed_noise;
-  calibration_.wheel_yaw_rate_noise =
-      summary.wheel_yaw_noise_factor * stated_.wheel_yaw_rate_noise;
-  return any;
-}
-
 void PriorEstimator::Fuse() {
+  const std::vector<timestamp_t> times_ns = ImageTimesOfImu();
+  SensorSummary& summary = estimate_.summary;
+  double wheel_persistence = 1.0;
   for (int i = 0; i <= kMaxNumCorrections; ++i) {
-    BuildProblem();
+    FusionInput input =
+        BuildFusionProblem(options_, calibration_, times_ns, logs_, vision_);
+    timeline_ = std::move(input.timeline);
+    problem_ = std::move(input.problem);
+    problem_.wheel_persistence = wheel_persistence;
+    summary.num_visual_links = input.visual_links.num_links;
+    summary.visual_sigma_deg = RadToDeg(input.visual_links.sigma_rad);
     fused_ = FuseOdometry(problem_, options_.fusion);
-    if (i == kMaxNumCorrections || !CorrectNoise()) break;
+    if (i == kMaxNumCorrections ||
+        !CorrectNoiseFigures(stated_, fused_, &calibration_, &wheel_persistence,
+                             &summary)) {
+      break;
+    }
   }
-  estimate_.summary.gyroscope_noise_factor =
+  summary.gyroscope_noise_factor =
       calibration_.imu_noise.gyroscope_noise_density /
       stated_.imu_noise.gyroscope_noise_density;
-  estimate_.summary.accelerometer_noise_factor =
+  summary.accelerometer_noise_factor =
       calibration_.imu_noise.accelerometer_noise_density /
       stated_.imu_noise.accelerometer_noise_density;
 }
@@ -414,14 +210,14 @@ void PriorEstimator::FillSummary() {
   summary.num_priors = static_cast<int>(estimate_.priors.size());
   summary.prior_ratio = static_cast<double>(summary.num_priors) /
                         std::max<size_t>(1, all_images_.size() - 1);
-  summary.timeshift_cam_imu_s = SecondsFromNs(timeshift_ns_);
+  summary.timeshift_cam_imu_s = SecondsFromNs(vision_.timeshift_ns);
   const auto first = estimate_.gravity_in_cam.find(images_[0].image_id);
   if (first != estimate_.gravity_in_cam.end()) {
     summary.first_gravity_in_cam = first->second;
   }
   SummarizeFusion(problem_, fused_, logs_, &summary);
   PredictDrift(problem_, !logs_.imu.empty(), &summary);
-  summary.wheel_slips = ListWheelSlips(fused_, timeline_, timeshift_ns_);
+  summary.wheel_slips = ListWheelSlips(fused_, timeline_, vision_.timeshift_ns);
 }
 
 Status PriorEstimator::CheckWheelScale() {
@@ -444,7 +240,7 @@ StatusOr<PriorEstimate> PriorEstimator::Run(
         "no sensor log: give an IMU or a wheel log, and its section in the "
         "calibration");
   }
-  timeshift_ns_ = NsFromSeconds(calibration_.timeshift_cam_imu_s);
+  vision_.timeshift_ns = NsFromSeconds(calibration_.timeshift_cam_imu_s);
   // 1. Images inside the logs.
   StatusOr<std::vector<ImageStamp>> ordered = OrderImages(images);
   if (!ordered.ok()) return ordered.status();
@@ -456,17 +252,16 @@ StatusOr<PriorEstimate> PriorEstimator::Run(
   for (const ImageStamp& image : all_images_) {
     times_ns[image.image_id] = image.timestamp_ns;
   }
-  rotations_ = ComputeTimedRotations(rotations, times_ns);
-  const timestamp_t calibrated_shift = timeshift_ns_;
-  status = CheckVision();
-  if (status.ok() && timeshift_ns_ != calibrated_shift) {
-    status = FindImagesInLogs();
-  }
+  vision_.rotations = ComputeTimedRotations(rotations, times_ns);
+  status =
+      UseVision(calibration_, options_, &logs_, &vision_, &estimate_.summary);
   if (!status.ok()) return status;
   if (logs_.IsEmpty()) {
     estimate_.summary.num_images = static_cast<int>(all_images_.size());
     return std::move(estimate_);
   }
+  status = FindImagesInLogs();
+  if (!status.ok()) return status;
   // The other sensors against each other.
   CorrectWheelClock();
   status = CheckMotion();
@@ -482,6 +277,20 @@ StatusOr<PriorEstimate> PriorEstimator::Run(
 }
 
 }  // namespace
+
+bool PriorEstimationOptions::IsValid(std::string* error) const {
+  return OptionChecker("AdaSfmPriors", error)
+             .Positive({{"max_imu_gap_s", max_imu_gap_s},
+                        {"max_wheel_gap_s", max_wheel_gap_s},
+                        {"max_link_s", max_link_s},
+                        {"visual_bias_sigma_rad_s", visual_bias_sigma}})
+             .NotNegative({{"max_lead_s", max_lead_s}})
+             .Require(estimate_time_shift >= -1 && estimate_time_shift <= 1,
+                      "estimate_time_shift", estimate_time_shift,
+                      "must be -1, 0 or 1")
+             .AllHold() &&
+         fusion.IsValid(error);
+}
 
 StatusOr<PriorEstimate> EstimatePriors(
     const std::vector<ImageStamp>& images, const SensorLogs& logs,

@@ -20,6 +20,15 @@ constexpr double kMinFactor = 1.2;
 // A figure this much too small is another sensor's, or in another unit.
 constexpr double kWrongFactor = 5.0;
 
+// The smoother's residuals move a figure by no more than this, and by more than
+// estimates of some hundred residuals err.
+constexpr double kMaxNoiseFactor = 5.0;
+// Slip is a share of the speed, which no figure of the log's noise states: on
+// gravel wheels err by 40 times theirs. Sums over seconds vary by as much more.
+constexpr double kMaxWheelNoiseFactor = 100.0;
+constexpr double kMaxWheelPersistence = 100.0;
+constexpr double kMinNoiseChange = 1.2;
+
 // The readings of one quantity, in order of time.
 struct Readings {
   std::vector<timestamp_t> times_ns;
@@ -102,6 +111,16 @@ void Raise(const char* name, double shown, double min_factor, double* figure,
   *figure = shown;
 }
 
+// Moves a factor by another, up to max_factor; whether it moved enough to
+// matter.
+bool MoveFactor(double by, double max_factor, double* factor) {
+  const double corrected = std::clamp(*factor * by, 1.0, max_factor);
+  const double change = corrected / *factor;
+  if (std::max(change, 1.0 / change) < kMinNoiseChange) return false;
+  *factor = corrected;
+  return true;
+}
+
 }  // namespace
 
 void RaiseNoiseFigures(const MotionLogs& logs, SensorCalibration* calibration,
@@ -128,6 +147,40 @@ void RaiseNoiseFigures(const MotionLogs& logs, SensorCalibration* calibration,
   Raise("speed_noise",
         std::sqrt(num_wheels / speeds.PeriodS()) * LeastDensity(speeds),
         kWrongFactor, &calibration->wheel_speed_noise, warnings);
+}
+
+bool CorrectNoiseFigures(const SensorCalibration& stated,
+                         const OdometryFusionResult& fused,
+                         SensorCalibration* in_use, double* wheel_persistence,
+                         SensorSummary* summary) {
+  NoiseCheck speed = fused.wheel_speed_check;
+  NoiseCheck yaw = fused.wheel_yaw_check;
+  if (stated.wheel_type == WheelType::kDifferential ||
+      stated.wheel_type == WheelType::kTicks) {
+    // One figure for the speed of a wheel.
+    speed.chi2 += yaw.chi2;
+    speed.redundancy += yaw.redundancy;
+    yaw = NoiseCheck();
+  }
+  bool any = MoveFactor(speed.Factor(), kMaxWheelNoiseFactor,
+                        &summary->wheel_speed_noise_factor);
+  any |= MoveFactor(yaw.Factor(), kMaxNoiseFactor,
+                    &summary->wheel_yaw_noise_factor);
+  double persistence = std::sqrt(*wheel_persistence);
+  any |= MoveFactor(std::sqrt(fused.wheel_persistence / *wheel_persistence),
+                    std::sqrt(kMaxWheelPersistence), &persistence);
+  *wheel_persistence = persistence * persistence;
+  double accelerometer = in_use->imu_noise.accelerometer_noise_density /
+                         stated.imu_noise.accelerometer_noise_density;
+  any |= MoveFactor(fused.accelerometer_check.Factor(), kMaxNoiseFactor,
+                    &accelerometer);
+  in_use->imu_noise.accelerometer_noise_density =
+      accelerometer * stated.imu_noise.accelerometer_noise_density;
+  in_use->wheel_speed_noise =
+      summary->wheel_speed_noise_factor * stated.wheel_speed_noise;
+  in_use->wheel_yaw_rate_noise =
+      summary->wheel_yaw_noise_factor * stated.wheel_yaw_rate_noise;
+  return any;
 }
 
 }  // namespace adasfm

@@ -5,7 +5,9 @@
 #include <vector>
 
 #include "sensors/io/calibration.h"
+#include "sensors/sensor_summary.h"
 #include "sensors/smoother/motion_logs.h"
+#include "sensors/smoother/odometry_fusion.h"
 
 namespace adasfm {
 
@@ -27,5 +29,15 @@ namespace adasfm {
 // A log of fewer than eight stretches changes nothing.
 void RaiseNoiseFigures(const MotionLogs& logs, SensorCalibration* calibration,
                        std::vector<std::string>* warnings);
+
+// Moves the noise figures in use to what the smoother's residuals show, within
+// limits and never below the stated ones: what wheels err by is more than the
+// noise of their readings. wheel_persistence: OdometryFusionProblem's, of
+// `fused` and then of the next problem. The wheels' factors are the summary's.
+// Returns whether a figure moved enough to smooth again.
+bool CorrectNoiseFigures(const SensorCalibration& stated,
+                         const OdometryFusionResult& fused,
+                         SensorCalibration* in_use, double* wheel_persistence,
+                         SensorSummary* summary);
 
 }  // namespace adasfm

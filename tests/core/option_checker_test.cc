@@ -25,6 +25,16 @@ TEST(OptionChecker, NamesTheFirstOptionThatBreaksItsRule) {
                    .Require(false, "ratio", 1.5, "must be in [0, 1]")
                    .AllHold());
   EXPECT_EQ(error, "AdaSfmGroup.ratio = 1.5 must be in [0, 1]");
+  EXPECT_FALSE(OptionChecker(&error)
+                   .Positive({{"size_m", 0.5}, {"length_m", 2.0}})
+                   .NotNegative({{"gap_s", 0.0}, {"time_s", -1.0}})
+                   .AllHold());
+  EXPECT_EQ(error, "time_s = -1 must not be negative");
+  EXPECT_FALSE(OptionChecker(&error)
+                   .Within(0, 1, "ratio", 1.0)
+                   .Within(0, 0.5, "share", 0.75)
+                   .AllHold());
+  EXPECT_EQ(error, "share = 0.75 must be from 0 to 0.5");
 }
 
 TEST(OptionChecker, RefusesWhatIsNoNumber) {
@@ -32,6 +42,11 @@ TEST(OptionChecker, RefusesWhatIsNoNumber) {
   std::string error;
   EXPECT_FALSE(OptionChecker("G", &error).Positive("a", nan).AllHold());
   EXPECT_FALSE(OptionChecker("G", &error).AtLeast(0, "a", nan).AllHold());
+  EXPECT_FALSE(OptionChecker("G", &error).NotNegative({{"a", nan}}).AllHold());
+  EXPECT_FALSE(OptionChecker("G", &error).Within(0, 1, "a", nan).AllHold());
+  const double infinity = std::numeric_limits<double>::infinity();
+  EXPECT_FALSE(OptionChecker("G", &error).Positive("a", infinity).AllHold());
+  EXPECT_EQ(error, "G.a = inf must be finite");
 }
 
 }  // namespace

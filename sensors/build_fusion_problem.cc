@@ -1,0 +1,75 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "sensors/build_fusion_problem.h"
+
+#include "core/so3.h"
+#include "sensors/bridged_holes.h"
+#include "sensors/smoother/initial_odometry.h"
+
+namespace adasfm {
+namespace {
+
+// The mean rate at standstills, else what vision says.
+ImuBias FirstBias(const std::vector<OdometryLink>& links,
+                  const VisionUse& vision) {
+  ImuBias bias;
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  double time = 0.0;
+  for (const OdometryLink& link : links) {
+    if (link.standstill == StandstillKind::kNone) continue;
+    sum += LogSo3(link.imu.delta_rotation);
+    time += link.dt_s;
+  }
+  if (time > 0.5) {
+    bias.gyroscope = sum / time;
+  } else if (vision.has_bias) {
+    bias.gyroscope = vision.bias;
+  }
+  return bias;
+}
+
+}  // namespace
+
+FusionInput BuildFusionProblem(const PriorEstimationOptions& options,
+                               const SensorCalibration& calibration,
+                               const std::vector<timestamp_t>& times_ns,
+                               const MotionLogs& logs,
+                               const VisionUse& vision) {
+  FusionInput input;
+  OdometryTimeline& timeline = input.timeline;
+  OdometryFusionProblem& problem = input.problem;
+  OdometryLinkOptions link_options;
+  link_options.max_imu_gap_s = options.max_imu_gap_s;
+  link_options.max_wheel_gap_s = options.max_wheel_gap_s;
+  link_options.max_link_s = options.max_link_s;
+  link_options.max_lead_s = options.max_lead_s;
+  link_options.lateral_speed_noise = options.fusion.lateral_speed_noise;
+  link_options.vertical_speed_noise = options.fusion.vertical_speed_noise;
+  timeline = BuildTimeline(times_ns, logs, link_options);
+  problem.imu_from_wheel = calibration.imu_from_wheel;
+  problem.imu_noise = calibration.imu_noise;
+  problem.links = BuildOdometryLinks(timeline.times_ns, logs, calibration,
+                                     ImuBias(), link_options);
+  const ImuBias bias = FirstBias(problem.links, vision);
+  if (bias.gyroscope != Eigen::Vector3d::Zero()) {
+    // Preintegrated about the right bias, first-order corrections stay small.
+    problem.links = BuildOdometryLinks(timeline.times_ns, logs, calibration,
+                                       bias, link_options);
+  }
+  AddHoleUncertainty(logs, timeline.times_ns,
+                     calibration.imu_from_wheel.rotation, &problem.links);
+  if (options.use_visual_rotations) {
+    input.visual_links = AddVisualRotations(
+        vision.rotations, vision.timeshift_ns,
+        calibration.cam_from_imu.rotation, timeline, &problem);
+  }
+  // What the links hold already must not count twice.
+  if (vision.has_bias && input.visual_links.num_links == 0) {
+    problem.prior_gyroscope_bias = vision.bias;
+    problem.prior_gyroscope_bias_sigma = vision.bias_sigma;
+  }
+  problem.initial_states = EstimateInitialOdometry(
+      problem.links, problem.imu_from_wheel, options.fusion.gravity_m_s2, bias);
+  return input;
+}
+
+}  // namespace adasfm

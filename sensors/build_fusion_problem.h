@@ -1,0 +1,28 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <vector>
+
+#include "sensors/estimate_priors.h"
+#include "sensors/smoother/build_odometry_links.h"
+#include "sensors/smoother/motion_logs.h"
+#include "sensors/use_vision.h"
+#include "sensors/visual_links.h"
+
+namespace adasfm {
+
+struct FusionInput {
+  OdometryTimeline timeline;
+  OdometryFusionProblem problem;
+  VisualLinks visual_links;
+};
+
+// Preintegrates the logs between the images, with states between images far
+// apart: the smoother's problem and where it begins. times_ns: of the images,
+// ascending, on the IMU's clock.
+FusionInput BuildFusionProblem(const PriorEstimationOptions& options,
+                               const SensorCalibration& calibration,
+                               const std::vector<timestamp_t>& times_ns,
+                               const MotionLogs& logs, const VisionUse& vision);
+
+}  // namespace adasfm

@@ -1,0 +1,36 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <Eigen/Core>
+#include <vector>
+
+#include "core/status.h"
+#include "sensors/calibration_check/check_against_vision.h"
+#include "sensors/estimate_priors.h"
+#include "sensors/smoother/motion_logs.h"
+
+namespace adasfm {
+
+// What vision tells the smoother.
+struct VisionUse {
+  // None when they contradict the gyroscope.
+  std::vector<TimedRotation> rotations;
+  // IMU time = camera time + shift; begins as the calibration's.
+  timestamp_t timeshift_ns = 0;
+  // The gyroscope's bias at the start with 1 sigma, rad/s.
+  bool has_bias = false;
+  Eigen::Vector3d bias = Eigen::Vector3d::Zero();
+  double bias_sigma = 0.0;
+};
+
+// Compares the two-view rotations with the gyroscope
+// (calibration_check/check_against_vision.h) and acts on it: moves the time
+// shift, undoes a filter of the log, clears an IMU that saw another motion than
+// the camera (a stabilised video; the other logs stay), or takes no rotations.
+// The options say what of it is allowed. Error: a contradiction that is none of
+// these.
+Status UseVision(const SensorCalibration& calibration,
+                 const PriorEstimationOptions& options, MotionLogs* logs,
+                 VisionUse* vision, SensorSummary* summary);
+
+}  // namespace adasfm
