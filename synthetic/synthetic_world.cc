@@ -1,9 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "synthetic/synthetic_world.h"
 
-#include <algorithm>
-#include <cmath>
-#include <sstream>
 #include <stdexcept>
 
 #include "core/so3.h"
@@ -175,101 +172,7 @@ void AddSecondCamera(SyntheticWorld* world) {
   }
 }
 
-// Reports the first rule that is broken.
-template <typename T>
-bool Require(bool is_valid, const char* name, const T& value,
-             const std::string& rule, std::string* error) {
-  if (is_valid) return true;
-  std::ostringstream message;
-  message << "SyntheticWorldOptions: " << name << " = " << value
-          << ", but it must be " << rule;
-  *error = message.str();
-  return false;
-}
-
 }  // namespace
-
-bool SyntheticWorldOptions::IsValid(std::string* error) const {
-  const auto positive = [error](double value, const char* name) {
-    return Require(std::isfinite(value) && value > 0.0, name, value,
-                   "above zero", error);
-  };
-  const auto not_negative = [error](double value, const char* name) {
-    return Require(std::isfinite(value) && value >= 0.0, name, value,
-                   "zero or more", error);
-  };
-  const auto share = [error](double value, const char* name) {
-    return Require(value >= 0.0 && value <= 0.9, name, value, "in [0, 0.9]",
-                   error);
-  };
-  return Require(num_images >= 2, "num_images", num_images, "at least 2",
-                 error) &&
-         Require(image_width >= 64 && image_height >= 64, "image size",
-                 std::min(image_width, image_height), "at least 64 px",
-                 error) &&
-         positive(spacing_m, "spacing_m") &&
-         not_negative(stereo_baseline_m, "stereo_baseline_m") &&
-         not_negative(image_interval_s, "image_interval_s") &&
-         positive(num_keypoints_per_image, "num_keypoints_per_image") &&
-         not_negative(pixel_noise_px, "pixel_noise_px") &&
-         share(outlier_match_ratio, "outlier_match_ratio") &&
-         positive(street_num_blocks, "street_num_blocks") &&
-         Require(floor_height_m >= 2.5 && floor_height_m <= 6.0,
-                 "floor_height_m", floor_height_m, "from 2.5 to 6", error) &&
-         positive(lane_spacing_m, "lane_spacing_m") &&
-         Require(lane_length_m >= 4.0 * lane_spacing_m, "lane_length_m",
-                 lane_length_m, "at least four times lane_spacing_m", error) &&
-         not_negative(num_stops, "num_stops") &&
-         positive(stop_duration_s, "stop_duration_s") &&
-         not_negative(num_spins, "num_spins") &&
-         Require(spin_duration_s >= 2.0, "spin_duration_s", spin_duration_s,
-                 "at least 2 s", error) &&
-         Require(rolling_shutter_s >= 0.0 && rolling_shutter_s <= 0.1,
-                 "rolling_shutter_s", rolling_shutter_s, "from 0 to 0.1",
-                 error) &&
-         share(moving_keypoint_ratio, "moving_keypoint_ratio") &&
-         positive(num_sequential_neighbors, "num_sequential_neighbors") &&
-         share(alias_pair_ratio, "alias_pair_ratio") &&
-         share(spurious_pair_ratio, "spurious_pair_ratio") &&
-         share(alias_pair_ratio + spurious_pair_ratio,
-               "alias_pair_ratio + spurious_pair_ratio") &&
-         share(rotation_outlier_ratio, "rotation_outlier_ratio") &&
-         not_negative(blackout_num_keypoints, "blackout_num_keypoints") &&
-         not_negative(num_blackouts, "num_blackouts") &&
-         positive(blackout_num_images, "blackout_num_images") &&
-         Require(2 * int64_t{num_blackouts} * blackout_num_images <= num_images,
-                 "num_blackouts", num_blackouts,
-                 "at most " +
-                     std::to_string(num_images / (2 * blackout_num_images)) +
-                     ": half of the images keep their texture",
-                 error) &&
-         positive(imu_rate_hz, "imu_rate_hz") &&
-         positive(wheel_rate_hz, "wheel_rate_hz") &&
-         not_negative(imu_noise.gyroscope_noise_density,
-                      "gyroscope_noise_density") &&
-         not_negative(imu_noise.gyroscope_random_walk,
-                      "gyroscope_random_walk") &&
-         not_negative(imu_noise.accelerometer_noise_density,
-                      "accelerometer_noise_density") &&
-         not_negative(imu_noise.accelerometer_random_walk,
-                      "accelerometer_random_walk") &&
-         not_negative(gyro_bias_sigma, "gyro_bias_sigma") &&
-         not_negative(accel_bias_sigma, "accel_bias_sigma") &&
-         not_negative(wheel_speed_noise, "wheel_speed_noise") &&
-         positive(wheel_scale, "wheel_scale") &&
-         not_negative(num_wheel_slips, "num_wheel_slips") &&
-         Require(wheel_slip_sigma >= 0.0 && wheel_slip_sigma <= 0.5,
-                 "wheel_slip_sigma", wheel_slip_sigma, "from 0 to 0.5",
-                 error) &&
-         Require(std::isfinite(gyro_drift), "gyro_drift", gyro_drift,
-                 "a number", error) &&
-         not_negative(gnss_rate_hz, "gnss_rate_hz") &&
-         not_negative(gnss_noise_m, "gnss_noise_m") &&
-         not_negative(num_gnss_jumps, "num_gnss_jumps") &&
-         not_negative(standstill_s, "standstill_s") &&
-         Require(std::abs(timeshift_cam_imu_s) < 1e6, "timeshift_cam_imu_s",
-                 timeshift_cam_imu_s, "within a million seconds", error);
-}
 
 SyntheticWorld BuildSyntheticWorld(const SyntheticWorldOptions& options) {
   std::string error;
