@@ -1,0 +1,122 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <gtest/gtest.h>
+
+#include "global/estimate_coarse_poses.h"
+#include "tests/testing/global/coarse_problem.h"
+#include "tests/testing/matchers.h"
+
+namespace adasfm {
+namespace {
+
+TEST(EstimateCoarsePosesWithoutSensors, WorksOnCleanAndFisheyeWorlds) {
+  for (const auto model :
+       {SyntheticCameraModel::kPinhole, SyntheticCameraModel::kFisheye}) {
+    SyntheticWorldOptions options;
+    options.num_images = 80;
+    options.camera_model = model;
+    const CoarseProblem problem = BuildCoarseProblem(options);
+    const CoarsePoses result = EstimateCoarsePoses(
+        CoarsePoseOptions(), problem.graph, problem.correspondences, {});
+    ASSERT_FALSE(result.components.empty());
+    const CoarseComponent& component = result.components.front();
+    EXPECT_EQ(component.cams_from_world.size(), 80);
+    EXPECT_FALSE(component.metric);
+    EXPECT_TRUE(component.positions_converged);
+    const AlignedErrors errors = ComputeAlignedErrors(
+        component.cams_from_world, problem.truth, AlignmentOptions());
+    // 120 m of road before any bundle adjustment: 2 %.
+    EXPECT_LT(errors.rmse_m, 2.4);
+  }
+}
+
+// One wrong match of wide parallax among many true ones must not set an edge's
+// length, and with it the scale of half of the road.
+TEST(EstimateCoarsePosesWithoutSensors, KeepsTheScaleAlongLongRoads) {
+  for (uint64_t seed = 1; seed <= 3; ++seed) {
+    SyntheticWorldOptions options;
+    options.num_images = 160;
+    options.seed = seed;
+    options.trajectory = SyntheticTrajectory::kStraight;
+    const CoarseProblem problem = BuildCoarseProblem(options);
+    const CoarsePoses result = EstimateCoarsePoses(
+        CoarsePoseOptions(), problem.graph, problem.correspondences, {});
+    ASSERT_EQ(result.components.size(), 1) << "seed " << seed;
+    EXPECT_TRUE(result.components[0].positions_converged);
+    // 240 m of road: 1.5 %.
+    EXPECT_LT(ComputeAlignedErrors(result.components[0].cams_from_world,
+                                   problem.truth, AlignmentOptions())
+                  .rmse_m,
+              3.6)
+        << "seed " << seed;
+  }
+}
+
+// The order of capture is odometry enough.
+TEST(EstimateCoarsePosesWithoutSensors, LookAlikesDoNotFoldSequences) {
+  for (uint64_t seed = 1; seed <= 3; ++seed) {
+    SyntheticWorldOptions options = AliasedWorld(seed);
+    options.num_blackouts = 0;
+    const CoarseProblem problem = Shuffle(BuildCoarseProblem(options), seed);
+    const CoarsePoses result = EstimateCoarsePoses(
+        CoarsePoseOptions(), problem.graph, problem.correspondences, {});
+    ASSERT_EQ(result.components.size(), 1) << "seed " << seed;
+    const CoarseComponent& component = result.components[0];
+    EXPECT_TRUE(component.positions_converged) << "seed " << seed;
+    const KeptPairs kept = CountKeptPairs(problem, result.graph);
+    EXPECT_EQ(kept.num_aliases, 0) << "seed " << seed;
+    EXPECT_GT(kept.share_of_true, 0.97) << "seed " << seed;
+    // 240 m of road before any bundle adjustment: 1.5 %.
+    EXPECT_LT(ComputeAlignedErrors(component.cams_from_world, problem.truth,
+                                   AlignmentOptions())
+                  .rmse_m,
+              3.6)
+        << "seed " << seed;
+  }
+}
+
+// Look-alike places do not join what a blackout separates: each part is a
+// model.
+TEST(EstimateCoarsePosesWithoutSensors, BlackoutsSplitSequences) {
+  for (uint64_t seed = 1; seed <= 3; ++seed) {
+    const CoarseProblem problem =
+        Shuffle(BuildCoarseProblem(AliasedWorld(seed)), 1);
+    const CoarsePoses result = EstimateCoarsePoses(
+        CoarsePoseOptions(), problem.graph, problem.correspondences, {});
+    size_t num_images = 0;
+    for (const CoarseComponent& component : result.components) {
+      num_images += component.cams_from_world.size();
+      EXPECT_TRUE(component.positions_converged) << "seed " << seed;
+      // 240 m of road before any bundle adjustment: 1.5 %.
+      EXPECT_LT(ComputeAlignedErrors(component.cams_from_world, problem.truth,
+                                     AlignmentOptions())
+                    .rmse_m,
+                3.6)
+          << "seed " << seed;
+    }
+    // The blackout of 12 images has no pairs.
+    EXPECT_GE(num_images, problem.graph.images.size() - 12);
+    EXPECT_EQ(CountKeptPairs(problem, result.graph).num_aliases, 0);
+  }
+}
+
+// Photos in any order lose nothing by it.
+TEST(EstimateCoarsePosesWithoutSensors, UnorderedImagesAreNoSequence) {
+  for (uint64_t seed = 1; seed <= 3; ++seed) {
+    SyntheticWorldOptions options;
+    options.num_images = 60;
+    options.seed = seed;
+    CoarseProblem problem = Shuffle(BuildCoarseProblem(options), seed);
+    problem.graph.capture_ranks.clear();
+    const CoarsePoses result = EstimateCoarsePoses(
+        CoarsePoseOptions(), problem.graph, problem.correspondences, {});
+    ASSERT_EQ(result.components.size(), 1) << "seed " << seed;
+    for (const ViewGraphEdge& edge : result.graph.edges) {
+      EXPECT_NE(edge.removal, EdgeRemoval::kOdometryPose);
+      EXPECT_NE(edge.removal, EdgeRemoval::kOdometry);
+      EXPECT_NE(edge.removal, EdgeRemoval::kFalseLoop);
+    }
+  }
+}
+
+}  // namespace
+}  // namespace adasfm
