@@ -63,7 +63,7 @@ Status CheckGlobalPaths(const GlobalStageOptions& options,
     return Status::Error("the database " + database_path +
                          " is not writable; change its permissions or use "
                          "--AdaSfmGlobal.refine_matches 0 "
-                         "--AdaSfmGlobal.correct_camera_mount 0");
+                         "--AdaSfmGlobal.correct_camera_imu_rotation 0");
   }
   if (options.write_pose_priors) status = CheckHasPosePriorTable(database_path);
   if (status.ok()) status = PrepareOutputFolder(output_path);

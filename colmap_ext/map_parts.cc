@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Stage 3 of adasfm_pipeline.h.
 #include <algorithm>
+#include <cstdlib>
 #include <fstream>
 #include <memory>
 #include <nlohmann/json.hpp>
@@ -23,6 +24,7 @@
 #include "colmap_ext/scene/georeference.h"
 #include "colmap_ext/stage_memory.h"
 #include "core/check_options.h"
+#include "core/option_checker.h"
 #include "core/sqlite.h"
 
 namespace adasfm {
@@ -261,16 +263,13 @@ Status AssessAndWrite(const MapRequest& request, const CoarseModels& coarse,
 }  // namespace
 
 bool MapOptions::IsValid(std::string* error) const {
-  const std::pair<const char*, int> choices[] = {
-      {"refine_focal_length", refine_focal_length},
-      {"refine_extra_params", refine_extra_params}};
-  for (const auto& [name, value] : choices) {
-    if (value >= -1 && value <= 1) continue;
-    *error = std::string("AdaSfmMapper.") + name + " = " +
-             std::to_string(value) + " must be -1, 0 or 1";
-    return false;
-  }
-  return stage.IsValid(error);
+  return OptionChecker("AdaSfmMapper", error)
+             .Require(std::abs(refine_focal_length) <= 1, "refine_focal_length",
+                      refine_focal_length, "must be -1, 0 or 1")
+             .Require(std::abs(refine_extra_params) <= 1, "refine_extra_params",
+                      refine_extra_params, "must be -1, 0 or 1")
+             .AllHold() &&
+         stage.IsValid(error);
 }
 
 StatusOr<MapReport> MapParts(const MapOptions& options,

@@ -4,6 +4,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include "core/option_checker.h"
 #include "global/coarse_pose_estimator.h"
 
 namespace adasfm {
@@ -31,27 +32,14 @@ void CoarsePoseEstimator::EndStep(const std::string& name,
 }
 
 bool CoarsePoseOptions::IsValid(std::string* error) const {
-  if (!(max_rotation_discrepancy_deg > 0.0)) {
-    *error = "max_rotation_discrepancy_deg = " +
-             std::to_string(max_rotation_discrepancy_deg) + " must be > 0";
-    return false;
-  }
-  if (min_num_inliers < 0) {
-    *error = "min_num_inliers = " + std::to_string(min_num_inliers) +
-             " must be >= 0";
-    return false;
-  }
-  if (!(min_sequence_ratio >= 0.0 && min_sequence_ratio <= 1.0)) {
-    *error = "min_sequence_ratio = " + std::to_string(min_sequence_ratio) +
-             " must be in [0, 1]";
-    return false;
-  }
-  if (!(min_known_length_m >= 0.0)) {
-    *error = "min_known_length_m = " + std::to_string(min_known_length_m) +
-             " must be >= 0";
-    return false;
-  }
-  return chain.IsValid(error) && camera_mount.IsValid(error) &&
+  return OptionChecker(error)
+             .Positive({{"max_rotation_discrepancy_deg",
+                         max_rotation_discrepancy_deg}})
+             .AtLeast(0, "min_num_inliers", min_num_inliers)
+             .Within(0, 1, "min_sequence_ratio", min_sequence_ratio)
+             .NotNegative({{"min_known_length_m", min_known_length_m}})
+             .AllHold() &&
+         chain.IsValid(error) && camera_mount.IsValid(error) &&
          relative_poses.IsValid(error) && lengths.IsValid(error) &&
          visual_steps.IsValid(error) && loops.IsValid(error) &&
          rotations.IsValid(error) && translations.IsValid(error) &&

@@ -6,6 +6,8 @@
 #include <set>
 #include <sstream>
 
+#include "core/option_checker.h"
+
 namespace adasfm {
 namespace {
 
@@ -157,17 +159,11 @@ class PriorBuilder {
 }  // namespace
 
 bool PositionPriorOptions::IsValid(std::string* error) const {
-  const std::pair<const char*, double> values[] = {
-      {"max_fix_gap_s", max_fix_gap_s},
-      {"max_image_gap_s", max_image_gap_s},
-      {"correlation_time_s", correlation_time_s}};
-  for (const auto& [name, value] : values) {
-    if (value >= 0.0 && std::isfinite(value)) continue;
-    *error = std::string("AdaSfmGnss.") + name + " = " + std::to_string(value) +
-             " must not be negative";
-    return false;
-  }
-  return true;
+  return OptionChecker("AdaSfmGnss", error)
+      .NotNegative({{"max_fix_gap_s", max_fix_gap_s},
+                    {"max_image_gap_s", max_image_gap_s},
+                    {"correlation_time_s", correlation_time_s}})
+      .AllHold();
 }
 
 StatusOr<PositionPriors> ComputePositionPriors(

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "core/first_not_before.h"
+#include "core/option_checker.h"
 #include "core/so3.h"
 
 namespace adasfm {
@@ -28,17 +29,11 @@ Rigid3d Interpolate(const OdometryPose& before, const OdometryPose& after,
 }  // namespace
 
 bool TrajectoryPriorOptions::IsValid(std::string* error) const {
-  const std::pair<const char*, double> values[] = {
-      {"sigma_m_per_m", sigma_m_per_m},
-      {"sigma_deg_per_m", sigma_deg_per_m},
-      {"max_gap_s", max_gap_s}};
-  for (const auto& [name, value] : values) {
-    if (value > 0.0 && std::isfinite(value)) continue;
-    *error = std::string("AdaSfmTrajectory.") + name + " = " +
-             std::to_string(value) + " must be positive";
-    return false;
-  }
-  return true;
+  return OptionChecker("AdaSfmTrajectory", error)
+      .Positive({{"sigma_m_per_m", sigma_m_per_m},
+                 {"sigma_deg_per_m", sigma_deg_per_m},
+                 {"max_gap_s", max_gap_s}})
+      .AllHold();
 }
 
 std::map<image_t, Rigid3d> InterpolateTrajectory(

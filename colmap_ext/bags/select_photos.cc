@@ -5,6 +5,7 @@
 #include <cmath>
 #include <vector>
 
+#include "core/option_checker.h"
 #include "core/so3.h"
 
 namespace adasfm {
@@ -73,16 +74,10 @@ const Way& WayAt(const std::vector<Way>& ways, timestamp_t time_ns) {
 }  // namespace
 
 bool PhotoSelectionOptions::IsValid(std::string* error) const {
-  if (image_step < 1) {
-    *error = "image_step = " + std::to_string(image_step) + " must be positive";
-    return false;
-  }
-  if (!(image_distance_m >= 0.0) || !std::isfinite(image_distance_m)) {
-    *error = "image_distance_m = " + std::to_string(image_distance_m) +
-             " must not be negative";
-    return false;
-  }
-  return true;
+  return OptionChecker(error)
+      .AtLeast(1, "image_step", image_step)
+      .NotNegative({{"image_distance_m", image_distance_m}})
+      .AllHold();
 }
 
 StatusOr<std::set<timestamp_t>> SelectPhotos(

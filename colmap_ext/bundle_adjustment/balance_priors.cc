@@ -12,6 +12,7 @@
 #include "colmap_ext/bundle_adjustment/linear_adjustment.h"
 #include "colmap_ext/bundle_adjustment/prior_components.h"
 #include "colmap_ext/bundle_adjustment/reduced_system.h"
+#include "core/option_checker.h"
 
 namespace adasfm {
 namespace {
@@ -222,17 +223,11 @@ class BalancedAdjustment {
 }  // namespace
 
 bool PriorBalanceOptions::IsValid(std::string* error) const {
-  if (!(max_mean_square >= 1.0)) {
-    *error = "max_mean_square is " + std::to_string(max_mean_square) +
-             ", but honest priors need at least 1";
-    return false;
-  }
-  if (!(max_sigma_factor >= 1.0)) {
-    *error = "max_sigma_factor is " + std::to_string(max_sigma_factor) +
-             ", but must be at least 1";
-    return false;
-  }
-  return true;
+  // Honest priors have a mean square of 1.
+  return OptionChecker(error)
+      .AtLeast(1, "max_mean_square", max_mean_square)
+      .AtLeast(1, "max_sigma_factor", max_sigma_factor)
+      .AllHold();
 }
 
 double ComputePriorMeanSquare(const std::vector<PosePriorEdge>& priors,

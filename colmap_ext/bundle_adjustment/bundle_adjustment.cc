@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <sstream>
 #include <stdexcept>
 #include <unordered_map>
 
@@ -12,6 +11,7 @@
 #include "colmap_ext/bundle_adjustment/position_priors.h"
 #include "colmap_ext/bundle_adjustment/reduced_system.h"
 #include "core/median.h"
+#include "core/option_checker.h"
 #include "core/parallel.h"
 
 namespace adasfm {
@@ -28,14 +28,6 @@ constexpr double kMaxDirectionSigmaRad = 0.5;
 constexpr double kMinLengthM = 1e-9;
 // Problems with fewer residuals are solved faster by one thread.
 constexpr int kMinNumResidualsForThreads = 20000;
-
-bool CheckPositive(const char* name, double value, std::string* error) {
-  if (std::isfinite(value) && value > 0.0) return true;
-  std::ostringstream message;
-  message << name << " is " << value << ", but must be positive";
-  *error = message.str();
-  return false;
-}
 
 bool HasLengths(const std::vector<PosePriorEdge>& priors) {
   return std::any_of(priors.begin(), priors.end(), [](const auto& edge) {
@@ -210,32 +202,19 @@ double MedianDirectionSigma(const std::vector<PosePriorEdge>& edges) {
 }
 
 bool PriorBundleAdjustmentOptions::IsValid(std::string* error) const {
-  if (!shared_errors.IsValid(error)) return false;
-  if (!CheckPositive("keypoint_sigma_px", keypoint_sigma_px, error) ||
-      !CheckPositive("prior_loss_scale", prior_loss_scale, error) ||
-      !CheckPositive("position_loss_scale", position_loss_scale, error)) {
-    return false;
-  }
-  if (!std::isfinite(reproj_loss_scale_px)) {
-    *error = "reproj_loss_scale_px must be finite";
-    return false;
-  }
-  if (max_num_iterations < 1) {
-    *error = "max_num_iterations is " + std::to_string(max_num_iterations) +
-             ", but must be at least 1";
-    return false;
-  }
-  if (!(function_tolerance >= 0.0)) {
-    *error = "function_tolerance must not be negative";
-    return false;
-  }
-  if (max_num_images_sparse < max_num_images_dense) {
-    *error = "max_num_images_sparse is " +
-             std::to_string(max_num_images_sparse) +
-             ", but must not be less than max_num_images_dense";
-    return false;
-  }
-  return true;
+  return OptionChecker(error)
+             .Positive({{"keypoint_sigma_px", keypoint_sigma_px},
+                        {"prior_loss_scale", prior_loss_scale},
+                        {"position_loss_scale", position_loss_scale}})
+             .Require(std::isfinite(reproj_loss_scale_px),
+                      "reproj_loss_scale_px", reproj_loss_scale_px,
+                      "must be finite")
+             .AtLeast(1, "max_num_iterations", max_num_iterations)
+             .NotNegative({{"function_tolerance", function_tolerance}})
+             .AtLeast(max_num_images_dense, "max_num_images_sparse",
+                      max_num_images_sparse)
+             .AllHold() &&
+         shared_errors.IsValid(error);
 }
 
 PriorBundleAdjustmentSummary AdjustBundle(

@@ -1,32 +1,24 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "colmap_ext/bundle_adjustment/shared_errors.h"
 
-#include <cmath>
-
+#include "core/option_checker.h"
 #include "core/so3.h"
 
 namespace adasfm {
 
 bool SharedErrorOptions::IsValid(std::string* error) const {
-  const auto check = [error](const char* name, double value, bool may_be_zero) {
-    if (std::isfinite(value) && (value > 0.0 || (may_be_zero && value == 0.0)))
-      return true;
-    *error = std::string(name) + " is " + std::to_string(value) +
-             ", but must be " + (may_be_zero ? "at least 0" : "positive");
-    return false;
-  };
-  return check("gyroscope_bias_sigma_rad_s", gyroscope_bias_sigma_rad_s,
-               true) &&
-         check("gyroscope_random_walk_rad_s_sqrt_s",
-               gyroscope_random_walk_rad_s_sqrt_s, true) &&
-         check("gyroscope_window_s", gyroscope_window_s, false) &&
-         check("extrinsic_rotation_sigma_rad", extrinsic_rotation_sigma_rad,
-               true) &&
-         check("driving_direction_sigma_rad", driving_direction_sigma_rad,
-               true) &&
-         check("direction_drift_time_s", direction_drift_time_s, true) &&
-         check("direction_window_s", direction_window_s, false) &&
-         check("length_drift_ratio", length_drift_ratio, true);
+  return OptionChecker(error)
+      .NotNegative(
+          {{"gyroscope_bias_sigma_rad_s", gyroscope_bias_sigma_rad_s},
+           {"gyroscope_random_walk_rad_s_sqrt_s",
+            gyroscope_random_walk_rad_s_sqrt_s},
+           {"extrinsic_rotation_sigma_rad", extrinsic_rotation_sigma_rad},
+           {"driving_direction_sigma_rad", driving_direction_sigma_rad},
+           {"direction_drift_time_s", direction_drift_time_s},
+           {"length_drift_ratio", length_drift_ratio}})
+      .Positive({{"gyroscope_window_s", gyroscope_window_s},
+                 {"direction_window_s", direction_window_s}})
+      .AllHold();
 }
 
 Eigen::Matrix3d CameraFromMiddle(const Eigen::Quaterniond& cam2_from_cam1) {

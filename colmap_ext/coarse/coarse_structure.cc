@@ -10,6 +10,7 @@
 #include "colmap_ext/scene/align_to_gravity.h"
 #include "colmap_ext/scene/georeference.h"
 #include "colmap_ext/scene/scene_bearings.h"
+#include "core/option_checker.h"
 #include "core/release_memory.h"
 
 namespace adasfm {
@@ -232,38 +233,18 @@ void RepeatWithFreeFocalLength(
 }  // namespace
 
 bool CoarseStructureOptions::IsValid(std::string* error) const {
-  if (!tracks.IsValid(error) || !triangulation.IsValid(error) ||
-      !bundle.IsValid(error) || !balance.IsValid(error) ||
-      !keyframes.IsValid(error)) {
-    return false;
-  }
-  if (num_rounds < 1) {
-    *error = "num_rounds is " + std::to_string(num_rounds) +
-             ", but must be at least 1";
-    return false;
-  }
-  if (!(min_angle_floor_deg > 0.0)) {
-    *error = "min_angle_floor_deg is " + std::to_string(min_angle_floor_deg) +
-             ", but must be positive";
-    return false;
-  }
-  if (!(early_function_tolerance >= 0.0)) {
-    *error = "early_function_tolerance is " +
-             std::to_string(early_function_tolerance) +
-             ", but must not be negative";
-    return false;
-  }
-  if (min_num_points_per_image < 0) {
-    *error = "min_num_points_per_image must not be negative";
-    return false;
-  }
-  if (!(final_max_reproj_error_px > 0.0)) {
-    *error = "final_max_reproj_error_px is " +
-             std::to_string(final_max_reproj_error_px) +
-             ", but must be positive";
-    return false;
-  }
-  return true;
+  return OptionChecker(error)
+             .AtLeast(1, "num_rounds", num_rounds)
+             .Positive(
+                 {{"min_angle_floor_deg", min_angle_floor_deg},
+                  {"final_max_reproj_error_px", final_max_reproj_error_px}})
+             .NotNegative(
+                 {{"early_function_tolerance", early_function_tolerance}})
+             .AtLeast(0, "min_num_points_per_image", min_num_points_per_image)
+             .AllHold() &&
+         tracks.IsValid(error) && triangulation.IsValid(error) &&
+         bundle.IsValid(error) && balance.IsValid(error) &&
+         keyframes.IsValid(error);
 }
 
 CoarseModel BuildCoarseModel(

@@ -69,7 +69,7 @@ std::string DescribeSplitJoin(const SceneData& scene,
        << scene.images.at(join.image_id2).name
        << " agree, but neither sensors nor a second place confirm it, and "
           "look-alike places do the same: both stay apart "
-          "(--AdaSfmGlobal.split_unverified_joins 0 joins them)";
+          "(--AdaSfmGlobal.split_unconfirmed_closures 0 joins them)";
   return text.str();
 }
 

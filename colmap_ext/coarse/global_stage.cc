@@ -162,13 +162,8 @@ std::string DescribeMatches(const GlobalStageResult& result) {
 }  // namespace
 
 bool GlobalStageOptions::IsValid(std::string* error) const {
-  if (!(pose_prior_sigma > 0.0)) {
-    *error =
-        "AdaSfmGlobal.pose_prior_sigma = " + std::to_string(pose_prior_sigma) +
-        " must be positive";
-    return false;
-  }
   return OptionChecker("AdaSfmGlobal", error)
+             .Positive("pose_prior_sigma", pose_prior_sigma)
              .Require(max_memory_gb > 0.0 || max_memory_gb == -1.0,
                       "max_memory_gb", max_memory_gb, "must be positive, or -1")
              .AllHold() &&

@@ -30,95 +30,111 @@ struct SynthesizerOptions {
   SyntheticWorldOptions world;
 };
 
-void AddOptions(SynthesizerOptions* options, CommandOptions* command) {
+void AddDriveOptions(SynthesizerOptions* options, CommandOptions* command) {
+  const auto add = [command](const char* name, auto* value, const char* help) {
+    command->AddDefault(name, value, help);
+  };
   SyntheticWorldOptions* world = &options->world;
+  add("num_images", &world->num_images, "images of the drive, of each camera");
+  add("stereo_baseline", &world->stereo_baseline_m,
+      "above 0: a second camera so far to the right of the "
+      "first, with images at the same times [m]");
+  add("seed", &world->seed, "equal seeds give equal worlds");
+  add("spacing", &world->spacing_m, "mean distance between images [m]");
+  add("image_interval", &world->image_interval_s,
+      "mean time between images under way; 0: that of 8 m/s, "
+      "within 0.05 to 0.4 s [s]");
+  add("trajectory", &options->trajectory,
+      "town (bends and revisits), straight, parallel (streets "
+      "that look alike, up and down), floors (of a car park, "
+      "which look alike) or lanes (of a mower)");
+  add("street_blocks", &world->street_num_blocks,
+      "parallel: length of a street [60 m]");
+  add("floor_height", &world->floor_height_m,
+      "floors: height from one to the next [m]");
+  add("lane_spacing", &world->lane_spacing_m,
+      "lanes: distance between neighbouring ones [m]");
+  add("lane_length", &world->lane_length_m, "lanes: length of each [m]");
+  add("stops", &world->num_stops, "stops under way; images go on");
+  add("stop_duration", &world->stop_duration_s, "duration of a stop [s]");
+  add("spins", &world->num_spins, "turns by 360 deg on the spot; images go on");
+  add("spin_duration", &world->spin_duration_s, "duration of such a turn [s]");
+}
+
+void AddImageOptions(SynthesizerOptions* options, CommandOptions* command) {
+  const auto add = [command](const char* name, auto* value, const char* help) {
+    command->AddDefault(name, value, help);
+  };
+  SyntheticWorldOptions* world = &options->world;
+  add("camera_model", &options->camera_model,
+      "camera of the drive: PINHOLE or OPENCV_FISHEYE");
+  add("image_width", &world->image_width, "width of an image [px]");
+  add("image_height", &world->image_height, "height of an image [px]");
+  add("num_keypoints", &world->num_keypoints_per_image,
+      "keypoints per image of the database");
+  add("pixel_noise", &world->pixel_noise_px,
+      "noise of keypoints, 1 sigma [px]");
+  add("rolling_shutter", &world->rolling_shutter_s,
+      "time from the first to the last row of an image; 0: "
+      "global shutter [s]");
+  add("moving_ratio", &world->moving_keypoint_ratio,
+      "share of keypoints on cars that drive ahead");
+  add("outlier_ratio", &world->outlier_match_ratio,
+      "share of raw matches that are wrong");
+  add("num_blackouts", &world->num_blackouts, "intervals without texture");
+  add("blackout_images", &world->blackout_num_images,
+      "images of each such interval");
+  add("blackout_keypoints", &world->blackout_num_keypoints,
+      "keypoints at most of such an image");
+}
+
+void AddPairOptions(SyntheticWorldOptions* world, CommandOptions* command) {
+  const auto add = [command](const char* name, auto* value, const char* help) {
+    command->AddDefault(name, value, help);
+  };
+  add("num_neighbors", &world->num_sequential_neighbors,
+      "images matched with so many of the next ones");
+  add("alias_ratio", &world->alias_pair_ratio,
+      "share of pairs that join look-alike places");
+  add("spurious_ratio", &world->spurious_pair_ratio,
+      "share of pairs that join images with nothing in common "
+      "by 15 to 25 matches");
+  add("rotation_outliers", &world->rotation_outlier_ratio,
+      "share of true pairs whose rotation is wrong");
+}
+
+void AddSensorOptions(SyntheticWorldOptions* world, CommandOptions* command) {
+  const auto add = [command](const char* name, auto* value, const char* help) {
+    command->AddDefault(name, value, help);
+  };
+  add("wheel_slips", &world->num_wheel_slips,
+      "intervals in which the wheels slip");
+  add("wheel_slip_noise", &world->wheel_slip_sigma,
+      "gravel: random slip of each wheel over a second, 1 "
+      "sigma, as a share of its speed; not declared");
+  add("gyro_drift", &world->gyro_drift,
+      "growth of the gyroscope's bias about the vertical, not "
+      "declared [rad/s^2]");
+  add("gnss_rate", &world->gnss_rate_hz,
+      "positions of a receiver, in gnss.csv; 0: none [Hz]");
+  add("gnss_noise", &world->gnss_noise_m, "their noise per axis, 1 sigma [m]");
+  add("gnss_jumps", &world->num_gnss_jumps,
+      "intervals of 5 s in which they are 15 m off");
+  add("wheel_scale", &world->wheel_scale, "true speed per logged speed");
+  add("wheel_noise", &world->wheel_speed_noise,
+      "noise of the wheel speeds, 1 sigma [m/s]");
+  add("standstill", &world->standstill_s, "time at rest at the start [s]");
+  add("timeshift_cam_imu", &world->timeshift_cam_imu_s,
+      "IMU time minus camera time [s]");
+}
+
+void AddOptions(SynthesizerOptions* options, CommandOptions* command) {
   command->AddRequired("output_path", &options->output_path,
                        "folder for the world");
-  command->AddDefault("num_images", &world->num_images,
-                      "images of the drive, of each camera");
-  command->AddDefault("stereo_baseline", &world->stereo_baseline_m,
-                      "above 0: a second camera so far to the right of the "
-                      "first, with images at the same times [m]");
-  command->AddDefault("seed", &world->seed, "equal seeds give equal worlds");
-  command->AddDefault("spacing", &world->spacing_m,
-                      "mean distance between images [m]");
-  command->AddDefault("image_interval", &world->image_interval_s,
-                      "mean time between images under way; 0: that of 8 m/s, "
-                      "within 0.05 to 0.4 s [s]");
-  command->AddDefault("trajectory", &options->trajectory,
-                      "town (bends and revisits), straight, parallel (streets "
-                      "that look alike, up and down), floors (of a car park, "
-                      "which look alike) or lanes (of a mower)");
-  command->AddDefault("street_blocks", &world->street_num_blocks,
-                      "parallel: length of a street [60 m]");
-  command->AddDefault("floor_height", &world->floor_height_m,
-                      "floors: height from one to the next [m]");
-  command->AddDefault("lane_spacing", &world->lane_spacing_m,
-                      "lanes: distance between neighbouring ones [m]");
-  command->AddDefault("lane_length", &world->lane_length_m,
-                      "lanes: length of each [m]");
-  command->AddDefault("stops", &world->num_stops,
-                      "stops under way; images go on");
-  command->AddDefault("stop_duration", &world->stop_duration_s,
-                      "duration of a stop [s]");
-  command->AddDefault("spins", &world->num_spins,
-                      "turns by 360 deg on the spot; images go on");
-  command->AddDefault("spin_duration", &world->spin_duration_s,
-                      "duration of such a turn [s]");
-  command->AddDefault("camera_model", &options->camera_model,
-                      "camera of the drive: PINHOLE or OPENCV_FISHEYE");
-  command->AddDefault("image_width", &world->image_width,
-                      "width of an image [px]");
-  command->AddDefault("image_height", &world->image_height,
-                      "height of an image [px]");
-  command->AddDefault("num_keypoints", &world->num_keypoints_per_image,
-                      "keypoints per image of the database");
-  command->AddDefault("pixel_noise", &world->pixel_noise_px,
-                      "noise of keypoints, 1 sigma [px]");
-  command->AddDefault("rolling_shutter", &world->rolling_shutter_s,
-                      "time from the first to the last row of an image; 0: "
-                      "global shutter [s]");
-  command->AddDefault("moving_ratio", &world->moving_keypoint_ratio,
-                      "share of keypoints on cars that drive ahead");
-  command->AddDefault("outlier_ratio", &world->outlier_match_ratio,
-                      "share of raw matches that are wrong");
-  command->AddDefault("num_neighbors", &world->num_sequential_neighbors,
-                      "images matched with so many of the next ones");
-  command->AddDefault("alias_ratio", &world->alias_pair_ratio,
-                      "share of pairs that join look-alike places");
-  command->AddDefault("spurious_ratio", &world->spurious_pair_ratio,
-                      "share of pairs that join images with nothing in common "
-                      "by 15 to 25 matches");
-  command->AddDefault("rotation_outliers", &world->rotation_outlier_ratio,
-                      "share of true pairs whose rotation is wrong");
-  command->AddDefault("num_blackouts", &world->num_blackouts,
-                      "intervals without texture");
-  command->AddDefault("blackout_images", &world->blackout_num_images,
-                      "images of each such interval");
-  command->AddDefault("blackout_keypoints", &world->blackout_num_keypoints,
-                      "keypoints at most of such an image");
-  command->AddDefault("wheel_slips", &world->num_wheel_slips,
-                      "intervals in which the wheels slip");
-  command->AddDefault("wheel_slip_noise", &world->wheel_slip_sigma,
-                      "gravel: random slip of each wheel over a second, 1 "
-                      "sigma, as a share of its speed; not declared");
-  command->AddDefault("gyro_drift", &world->gyro_drift,
-                      "growth of the gyroscope's bias about the vertical, not "
-                      "declared [rad/s^2]");
-  command->AddDefault("gnss_rate", &world->gnss_rate_hz,
-                      "positions of a receiver, in gnss.csv; 0: none [Hz]");
-  command->AddDefault("gnss_noise", &world->gnss_noise_m,
-                      "their noise per axis, 1 sigma [m]");
-  command->AddDefault("gnss_jumps", &world->num_gnss_jumps,
-                      "intervals of 5 s in which they are 15 m off");
-  command->AddDefault("wheel_scale", &world->wheel_scale,
-                      "true speed per logged speed");
-  command->AddDefault("wheel_noise", &world->wheel_speed_noise,
-                      "noise of the wheel speeds, 1 sigma [m/s]");
-  command->AddDefault("standstill", &world->standstill_s,
-                      "time at rest at the start [s]");
-  command->AddDefault("timeshift_cam_imu", &world->timeshift_cam_imu_s,
-                      "IMU time minus camera time [s]");
+  AddDriveOptions(options, command);
+  AddImageOptions(options, command);
+  AddPairOptions(&options->world, command);
+  AddSensorOptions(&options->world, command);
   command->AddDefault("render", &options->render,
                       "1: photos in images/ instead of a database");
 }

@@ -168,6 +168,19 @@ CommandOptions::CommandOptions(const std::string& name,
              "verbosity of the log lines of COLMAP and Ceres, 0 to 4");
 }
 
+void CommandOptions::AddOldName(const std::string& old_name,
+                                const std::string& name) {
+  old_names_[old_name] = name;
+}
+
+std::string CommandOptions::PresentName(const std::string& name) const {
+  const auto it = old_names_.find(name);
+  if (it == old_names_.end()) return name;
+  std::cerr << "NOTE: --" << name << " is --" << it->second << " now"
+            << std::endl;
+  return it->second;
+}
+
 void CommandOptions::PrintHelp() const {
   std::cout << "colmap " << name_ << "\n\n"
             << description_ << "\n\n"
@@ -184,10 +197,15 @@ Status CommandOptions::ReadProject(const std::string& path,
   SkipByteOrderMark(&file);
   // A project file serves several commands, so other commands' options are
   // passed over; a misspelt option of ours is not.
-  const po::parsed_options parsed =
+  po::parsed_options parsed =
       po::parse_config_file(file, options_, /*allow_unregistered=*/true);
-  for (const po::option& option : parsed.options) {
+  for (po::option& option : parsed.options) {
     if (!option.unregistered) continue;
+    if (old_names_.count(option.string_key) > 0) {
+      option.string_key = PresentName(option.string_key);
+      option.unregistered = false;
+      continue;
+    }
     const std::string group = option.string_key.substr(
         0, std::min(option.string_key.find('.'), option.string_key.size()));
     if (group.rfind("AdaSfm", 0) != 0) continue;
@@ -209,8 +227,14 @@ Status CommandOptions::Parse(int argc, const char* const* argv) {
   try {
     const int style = po::command_line_style::default_style &
                       ~po::command_line_style::allow_guessing;
+    std::vector<std::string> words(argv + std::min(argc, 1), argv + argc);
+    for (std::string& word : words) {
+      if (word.rfind("--", 0) != 0) continue;
+      const size_t end = std::min(word.find('='), word.size());
+      word = "--" + PresentName(word.substr(2, end - 2)) + word.substr(end);
+    }
     const po::parsed_options parsed =
-        po::parse_command_line(argc, argv, options_, style);
+        po::command_line_parser(words).options(options_).style(style).run();
     for (const po::option& option : parsed.options) {
       if (!option.string_key.empty()) continue;
       return Status::Error(

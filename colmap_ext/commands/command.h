@@ -3,6 +3,7 @@
 
 #include <boost/program_options.hpp>
 #include <functional>
+#include <map>
 #include <sstream>
 #include <string>
 #include <type_traits>
@@ -41,6 +42,10 @@ class CommandOptions {
   template <typename T>
   void AddDefault(const std::string& name, T* value, const std::string& help);
 
+  // An earlier name of an option that is there already: taken as the new one,
+  // with a note on standard error.
+  void AddOldName(const std::string& old_name, const std::string& name);
+
   // Reads argv[1..]; -h prints the help, after which HelpShown() is true and
   // the command has nothing more to do.
   Status Parse(int argc, const char* const* argv);
@@ -52,6 +57,8 @@ class CommandOptions {
 
  private:
   void PrintHelp() const;
+  // The name in use, after a note if it is another one.
+  std::string PresentName(const std::string& name) const;
   Status ReadProject(const std::string& path,
                      boost::program_options::variables_map* values) const;
 
@@ -68,6 +75,7 @@ class CommandOptions {
     std::function<void()> exchange;
   };
   std::vector<Default> defaults_;
+  std::map<std::string, std::string> old_names_;
 };
 
 // argv[0] is the command's name. An error's message is one line: what, which

@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "colmap_ext/commands/global_options.h"
 
+#include <string>
+#include <utility>
+
 namespace adasfm {
 namespace {
 
@@ -62,14 +65,16 @@ void GlobalOptionAdder::AddRotations() {
 
 void GlobalOptionAdder::AddMount() {
   CameraMountOptions* mount = &stage_->poses.camera_mount;
-  Add("camera_mount_max_num_steps", &mount->max_num_steps,
-      "pairs at most this many images apart tell the camera's mount");
-  Add("camera_mount_sigma_deg", &mount->sigma_deg,
+  Add("camera_imu_max_num_steps", &mount->max_num_steps,
+      "pairs at most this many images apart tell the rotation between camera "
+      "and "
+      "IMU");
+  Add("camera_imu_sigma_deg", &mount->sigma_deg,
       "1 sigma of what T_cam_imu may be wrong by, per axis [deg]");
-  Add("camera_mount_min_sigma_deg", &mount->min_sigma_deg,
+  Add("camera_imu_min_sigma_deg", &mount->min_sigma_deg,
       "least error granted to what pairs say of it, per axis [deg]");
-  Add("camera_mount_min_num_sigmas", &mount->min_num_sigmas,
-      "priors are corrected when the mount is off by so many sigmas");
+  Add("camera_imu_min_num_sigmas", &mount->min_num_sigmas,
+      "priors are corrected when it is off by so many sigmas");
 }
 
 void GlobalOptionAdder::AddLoops() {
@@ -78,11 +83,11 @@ void GlobalOptionAdder::AddLoops() {
   Add("gyro_bias_sigma_rad_s", &stage_->poses.chain.gyro_bias_sigma_rad_s,
       "1 sigma of the gyroscope bias that is left, per axis, where the import "
       "does not state it [rad/s]");
-  Add("visual_step_length_error",
+  Add("visual_odometry_length_error",
       &stage_->poses.visual_steps.length_error_ratio,
       "1 sigma of the drift of lengths where vision completes the odometry, as "
       "a ratio");
-  Add("max_coasting_s", &stage_->poses.visual_steps.max_coasting_s,
+  Add("max_extrapolation_s", &stage_->poses.visual_steps.max_coasting_s,
       "motion that nothing sees is taken to go on for so long, to gate loops "
       "[s]");
   LoopClosureOptions* loops = &stage_->poses.loops;
@@ -97,11 +102,11 @@ void GlobalOptionAdder::AddLoops() {
       "error of the unit of a part without metres, 1 sigma of its logarithm");
   Add("max_sequence_gap", &loops->max_sequence_gap,
       "images at most this far apart in the order of capture follow each "
-      "other; pairs of others are loops, and join parts of a drive");
-  Add("join_min_num_pairs", &loops->min_num_pairs,
-      "pairs that each of the two places needs that join two parts");
-  Add("join_min_turn_deg", &loops->min_turn_deg,
-      "these places lie before and behind a turn [deg]");
+      "other; pairs of others are loop closures");
+  Add("closure_min_num_pairs", &loops->min_num_pairs,
+      "pairs of each of the two loop closures that joining two parts needs");
+  Add("closure_min_turn_deg", &loops->min_turn_deg,
+      "these lie before and behind a turn of so much [deg]");
 }
 
 void GlobalOptionAdder::AddPositions() {
@@ -159,16 +164,15 @@ void GlobalOptionAdder::AddAblations() {
       "start the rotations from the SDP");
   Add("use_loop_gating", &stage_->poses.loops.enabled,
       "remove false loop closures");
-  Add("split_unverified_joins", &stage_->poses.loops.split_unverified_joins,
+  Add("split_unconfirmed_closures", &stage_->poses.loops.split_unverified_joins,
       "parts of a drive (with sensor priors, or images in order) that only "
-      "pairs at one place join "
-      "become models of their own");
-  Add("use_visual_steps", &stage_->poses.visual_steps.enabled,
+      "loop closures at one place join become models of their own");
+  Add("use_visual_odometry", &stage_->poses.visual_steps.enabled,
       "vision completes the odometry that gates loops, where sensors have no "
       "position (0 or 1)");
   Add("refine_relative_poses", &stage_->poses.relative_poses.enabled,
       "least-squares relative poses");
-  Add("correct_camera_mount", &stage_->poses.camera_mount.enabled,
+  Add("correct_camera_imu_rotation", &stage_->poses.camera_mount.enabled,
       "take a wrong rotation of T_cam_imu out of the priors, by vision");
   Add("refine_translations", &stage_->poses.translations.enabled,
       "directions anew under the global rotations");
@@ -196,6 +200,23 @@ void AddGlobalOptions(GlobalStageOptions* stage, CommandOptions* command) {
   adder.AddStructure();
   adder.AddMatches();
   adder.AddAblations();
+  // Earlier names.
+  const std::pair<const char*, const char*> old_names[] = {
+      {"camera_mount_max_num_steps", "camera_imu_max_num_steps"},
+      {"camera_mount_sigma_deg", "camera_imu_sigma_deg"},
+      {"camera_mount_min_sigma_deg", "camera_imu_min_sigma_deg"},
+      {"camera_mount_min_num_sigmas", "camera_imu_min_num_sigmas"},
+      {"correct_camera_mount", "correct_camera_imu_rotation"},
+      {"visual_step_length_error", "visual_odometry_length_error"},
+      {"use_visual_steps", "use_visual_odometry"},
+      {"max_coasting_s", "max_extrapolation_s"},
+      {"join_min_num_pairs", "closure_min_num_pairs"},
+      {"join_min_turn_deg", "closure_min_turn_deg"},
+      {"split_unverified_joins", "split_unconfirmed_closures"}};
+  for (const auto& [old_name, name] : old_names) {
+    command->AddOldName(std::string("AdaSfmGlobal.") + old_name,
+                        std::string("AdaSfmGlobal.") + name);
+  }
 }
 
 }  // namespace adasfm

@@ -110,6 +110,17 @@ void SortByChain(const std::map<image_t, timestamp_t>& times,
       });
 }
 
+// The images that a row names first; counts it when the database lacks one.
+std::optional<std::pair<image_t, image_t>> ResolvePair(
+    const IdResolver& ids, const SqliteStatement& statement,
+    LoadedPriorTables* loaded) {
+  const std::optional<image_t> id1 = ids.Resolve(statement.Text(0));
+  const std::optional<image_t> id2 = ids.Resolve(statement.Text(1));
+  if (id1 && id2) return std::make_pair(*id1, *id2);
+  ++loaded->num_ignored_rows;
+  return std::nullopt;
+}
+
 void ReadPriors(const IdResolver& ids, SqliteConnection* database,
                 LoadedPriorTables* loaded) {
   if (!database->HasTable("adasfm_relative_pose_priors")) return;
@@ -122,19 +133,14 @@ void ReadPriors(const IdResolver& ids, SqliteConnection* database,
       "SELECT name1, name2, dt_ns, qvec, tvec, covariance, flags "
       "FROM adasfm_relative_pose_priors ORDER BY image_id1, image_id2");
   while (statement.Step()) {
-    const std::optional<image_t> id1 = ids.Resolve(statement.Text(0));
-    const std::optional<image_t> id2 = ids.Resolve(statement.Text(1));
-    if (!id1.has_value() || !id2.has_value()) {
-      ++loaded->num_ignored_rows;
-      continue;
-    }
+    const auto pair = ResolvePair(ids, statement, loaded);
+    if (!pair) continue;
     RelativePosePrior prior = PriorFromRow(statement);
-    prior.image_id1 = *id1;
-    prior.image_id2 = *id2;
-    if (times.count(*id1) == 0 || times.count(*id2) == 0) {
+    std::tie(prior.image_id1, prior.image_id2) = *pair;
+    const bool has_time1 = times.count(pair->first) > 0;
+    if (!has_time1 || times.count(pair->second) == 0) {
       throw SqliteError("table adasfm_relative_pose_priors: image " +
-                        statement.Text(times.count(*id1) == 0 ? 0 : 1) +
-                        " has no time");
+                        statement.Text(has_time1 ? 1 : 0) + " has no time");
     }
     loaded->tables.priors.push_back(prior);
   }
@@ -190,15 +196,10 @@ void ReadPositions(const IdResolver& ids, SqliteConnection* database,
       "SELECT name1, name2, share, position, covariance, antenna_in_cam "
       "FROM adasfm_position_priors ORDER BY rowid");
   while (statement.Step()) {
-    const std::optional<image_t> id1 = ids.Resolve(statement.Text(0));
-    const std::optional<image_t> id2 = ids.Resolve(statement.Text(1));
-    if (!id1.has_value() || !id2.has_value()) {
-      ++loaded->num_ignored_rows;
-      continue;
-    }
+    const auto pair = ResolvePair(ids, statement, loaded);
+    if (!pair) continue;
     PositionPrior prior = PositionFromRow(statement);
-    prior.image_id1 = *id1;
-    prior.image_id2 = *id2;
+    std::tie(prior.image_id1, prior.image_id2) = *pair;
     loaded->tables.positions.push_back(prior);
   }
 }

@@ -7,6 +7,7 @@
 
 #include "colmap_ext/evaluation/evaluation.h"
 #include "colmap_ext/host/model.h"
+#include "core/option_checker.h"
 #include "core/sensor_log.h"
 #include "sensors/io/log_file.h"
 #include "sensors/io/read_image_times.h"
@@ -152,10 +153,9 @@ StatusOr<NamedPoses> ReadTrajectory(const std::string& path,
 }  // namespace
 
 bool GroundTruthOptions::IsValid(std::string* error) const {
-  if (max_time_gap_s > 0.0) return true;
-  *error =
-      "max_time_gap_s = " + std::to_string(max_time_gap_s) + ", must be > 0";
-  return false;
+  return OptionChecker(error)
+      .Positive({{"max_time_gap_s", max_time_gap_s}})
+      .AllHold();
 }
 
 StatusOr<NamedPoses> ReadGroundTruth(

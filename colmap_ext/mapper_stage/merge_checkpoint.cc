@@ -16,70 +16,60 @@ std::string RoundPath(const std::string& checkpoint_path, int num_rounds) {
   return checkpoint_path + "/refine_" + std::to_string(num_rounds);
 }
 
-nlohmann::json AsJson(const AlignSimilarityResult& alignment) {
-  return {{"success", alignment.success},
-          {"scale", alignment.target_from_source.scale},
-          {"threshold", alignment.threshold},
-          {"inlier_ratio", alignment.inlier_ratio},
-          {"rmse", alignment.rmse},
-          {"num_iterations", alignment.num_iterations}};
+// What the summary tells: visit(name, value) of each.
+template <typename Alignment, typename Visit>
+void VisitAlignment(Alignment& alignment, const Visit& visit) {
+  visit("success", alignment.success);
+  visit("scale", alignment.target_from_source.scale);
+  visit("threshold", alignment.threshold);
+  visit("inlier_ratio", alignment.inlier_ratio);
+  visit("rmse", alignment.rmse);
+  visit("num_iterations", alignment.num_iterations);
 }
 
-// What the summary tells of an alignment.
-AlignSimilarityResult AlignmentFromJson(const nlohmann::json& json) {
-  AlignSimilarityResult alignment;
-  json.at("success").get_to(alignment.success);
-  json.at("scale").get_to(alignment.target_from_source.scale);
-  json.at("threshold").get_to(alignment.threshold);
-  json.at("inlier_ratio").get_to(alignment.inlier_ratio);
-  json.at("rmse").get_to(alignment.rmse);
-  json.at("num_iterations").get_to(alignment.num_iterations);
-  return alignment;
+template <typename Summary, typename Visit>
+void VisitSummary(Summary& summary, const Visit& visit) {
+  visit("num_separators", summary.aligned.num_separators);
+  visit("separator_rmse_before", summary.aligned.separator_rmse_before);
+  visit("separator_rmse_after", summary.aligned.separator_rmse_after);
+  visit("coarse_images", summary.merge.coarse_images);
+  visit("num_points", summary.merge.num_points);
+  visit("num_merged_points", summary.merge.num_merged_points);
+  visit("num_iterations", summary.refine.num_iterations);
+  visit("keypoint_sigma_factor", summary.refine.keypoint_sigma_factor);
+  visit("keypoint_sigma_px", summary.refine.keypoint_sigma_px);
+  visit("prior_chi2_per_dof", summary.refine.prior_chi2_per_dof);
+  visit("num_images_put_back", summary.refine.num_images_put_back);
+  visit("num_images_left_out", summary.refine.num_images_left_out);
+  visit("started_from_coarse_poses", summary.started_from_coarse_poses);
+}
+
+auto WriteTo(nlohmann::json* json) {
+  return [json](const char* name, const auto& value) { (*json)[name] = value; };
+}
+
+auto ReadFrom(const nlohmann::json& json) {
+  return
+      [&json](const char* name, auto& value) { json.at(name).get_to(value); };
 }
 
 nlohmann::json AsJson(const MapperStageSummary& summary) {
-  nlohmann::json json = {
-      {"num_separators", summary.aligned.num_separators},
-      {"separator_rmse_before", summary.aligned.separator_rmse_before},
-      {"separator_rmse_after", summary.aligned.separator_rmse_after},
-      {"coarse_images", summary.merge.coarse_images},
-      {"num_points", summary.merge.num_points},
-      {"num_merged_points", summary.merge.num_merged_points},
-      {"num_iterations", summary.refine.num_iterations},
-      {"keypoint_sigma_factor", summary.refine.keypoint_sigma_factor},
-      {"keypoint_sigma_px", summary.refine.keypoint_sigma_px},
-      {"prior_chi2_per_dof", summary.refine.prior_chi2_per_dof},
-      {"num_images_put_back", summary.refine.num_images_put_back},
-      {"num_images_left_out", summary.refine.num_images_left_out},
-      {"started_from_coarse_poses", summary.started_from_coarse_poses}};
-  json["alignments"] = nlohmann::json::array();
+  nlohmann::json json;
+  VisitSummary(summary, WriteTo(&json));
+  nlohmann::json& alignments = json["alignments"] = nlohmann::json::array();
   for (const AlignSimilarityResult& alignment : summary.aligned.alignments) {
-    json["alignments"].push_back(AsJson(alignment));
+    VisitAlignment(alignment, WriteTo(&alignments.emplace_back()));
   }
   return json;
 }
 
 void SummaryFromJson(const nlohmann::json& json, MapperStageSummary* summary) {
-  AlignPartsResult& aligned = summary->aligned;
-  json.at("num_separators").get_to(aligned.num_separators);
-  json.at("separator_rmse_before").get_to(aligned.separator_rmse_before);
-  json.at("separator_rmse_after").get_to(aligned.separator_rmse_after);
-  aligned.alignments.clear();
+  VisitSummary(*summary, ReadFrom(json));
+  std::vector<AlignSimilarityResult>& alignments = summary->aligned.alignments;
+  alignments.clear();
   for (const nlohmann::json& alignment : json.at("alignments")) {
-    aligned.alignments.push_back(AlignmentFromJson(alignment));
+    VisitAlignment(alignments.emplace_back(), ReadFrom(alignment));
   }
-  json.at("coarse_images").get_to(summary->merge.coarse_images);
-  json.at("num_points").get_to(summary->merge.num_points);
-  json.at("num_merged_points").get_to(summary->merge.num_merged_points);
-  RefineModelSummary& refine = summary->refine;
-  json.at("num_iterations").get_to(refine.num_iterations);
-  json.at("keypoint_sigma_factor").get_to(refine.keypoint_sigma_factor);
-  json.at("keypoint_sigma_px").get_to(refine.keypoint_sigma_px);
-  json.at("prior_chi2_per_dof").get_to(refine.prior_chi2_per_dof);
-  json.at("num_images_put_back").get_to(refine.num_images_put_back);
-  json.at("num_images_left_out").get_to(refine.num_images_left_out);
-  json.at("started_from_coarse_poses")
-      .get_to(summary->started_from_coarse_poses);
 }
 
 StatusOr<MergeCheckpoint> ReadRound(const std::string& path,

@@ -54,6 +54,32 @@ std::string PositionLines(const PriorImport& import) {
   return text.str();
 }
 
+std::string WheelLines(const SensorSummary& summary) {
+  std::ostringstream text;
+  text.precision(4);
+  text << "wheels              " << summary.wheel_rate_hz << " Hz, "
+       << summary.num_wheel_gaps << " gaps (longest " << summary.max_wheel_gap_s
+       << " s), scale " << summary.wheel_scale << " +- "
+       << summary.wheel_scale_sigma << ", " << summary.wheel_delay_s << " +- "
+       << summary.wheel_delay_sigma_s << " s behind the IMU\n"
+       << "driving direction   " << summary.wheel_mount_deg.x() << " left, "
+       << summary.wheel_mount_deg.y() << " down of T_imu_wheel's, +- "
+       << summary.wheel_mount_sigma_deg.x() << " and "
+       << summary.wheel_mount_sigma_deg.y() << " deg\n"
+       << "distance            " << summary.distance_m << " m, "
+       << summary.wheel_slips.size() << " slips\n";
+  for (const WheelSlip& slip : summary.wheel_slips) {
+    text << "  slip              " << slip.start_ns << " to " << slip.end_ns
+         << " ns, " << slip.speed_error_m_s << " m/s off\n";
+  }
+  text << "expected drift      " << summary.drift_per_100m_m << " m";
+  if (summary.drift_per_100m_deg > 0.0) {
+    text << " and " << summary.drift_per_100m_deg << " deg";
+  }
+  text << " per 100 m\n";
+  return text.str();
+}
+
 }  // namespace
 
 std::string FormatPriorImport(const PriorImport& import) {
@@ -94,28 +120,7 @@ std::string FormatPriorImport(const PriorImport& import) {
     text << "lengths             err alike for seconds by "
          << 100.0 * summary.length_drift_ratio << " %\n";
   }
-  if (summary.wheel_rate_hz > 0.0) {
-    text << "wheels              " << summary.wheel_rate_hz << " Hz, "
-         << summary.num_wheel_gaps << " gaps (longest "
-         << summary.max_wheel_gap_s << " s), scale " << summary.wheel_scale
-         << " +- " << summary.wheel_scale_sigma << ", " << summary.wheel_delay_s
-         << " +- " << summary.wheel_delay_sigma_s << " s behind the IMU\n"
-         << "driving direction   " << summary.wheel_mount_deg.x() << " left, "
-         << summary.wheel_mount_deg.y() << " down of T_imu_wheel's, +- "
-         << summary.wheel_mount_sigma_deg.x() << " and "
-         << summary.wheel_mount_sigma_deg.y() << " deg\n"
-         << "distance            " << summary.distance_m << " m, "
-         << summary.wheel_slips.size() << " slips\n";
-    for (const WheelSlip& slip : summary.wheel_slips) {
-      text << "  slip              " << slip.start_ns << " to " << slip.end_ns
-           << " ns, " << slip.speed_error_m_s << " m/s off\n";
-    }
-    text << "expected drift      " << summary.drift_per_100m_m << " m";
-    if (summary.drift_per_100m_deg > 0.0) {
-      text << " and " << summary.drift_per_100m_deg << " deg";
-    }
-    text << " per 100 m\n";
-  }
+  if (summary.wheel_rate_hz > 0.0) text << WheelLines(summary);
   if (import.num_fixes > 0) text << PositionLines(import);
   for (const std::string& warning : import.warnings) {
     text << "WARNING: " << warning << "\n";

@@ -317,12 +317,8 @@ StatusOr<PriorImport> ImportTrajectory(const PriorImportPaths& paths,
 }  // namespace
 
 bool PriorImportOptions::IsValid(std::string* error) const {
-  if (max_visual_gap < 1) {
-    *error = "AdaSfmPriors.max_visual_gap is " +
-             std::to_string(max_visual_gap) + "; it must be positive";
-    return false;
-  }
   return OptionChecker("AdaSfmPriors", error)
+             .AtLeast(1, "max_visual_gap", max_visual_gap)
              .Require(max_memory_gb > 0.0 || max_memory_gb == -1.0,
                       "max_memory_gb", max_memory_gb, "must be positive, or -1")
              .AllHold() &&

@@ -6,6 +6,7 @@
 #include <set>
 
 #include "colmap_ext/priors/stamp_images.h"
+#include "core/option_checker.h"
 #include "core/so3.h"
 
 namespace adasfm {
@@ -79,11 +80,10 @@ StatusOr<std::map<int, camera_t>> FindCameraIds(
 }  // namespace
 
 bool RigOptions::IsValid(std::string* error) const {
-  if (rotation_sigma_deg > 0.0 && translation_sigma_m > 0.0) return true;
-  *error =
-      "AdaSfmRig.rotation_sigma_deg and AdaSfmRig.translation_sigma_m must be "
-      "positive";
-  return false;
+  return OptionChecker("AdaSfmRig", error)
+      .Positive({{"rotation_sigma_deg", rotation_sigma_deg},
+                 {"translation_sigma_m", translation_sigma_m}})
+      .AllHold();
 }
 
 StatusOr<std::map<camera_t, RigCamera>> FindRigCameras(

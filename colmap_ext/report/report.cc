@@ -9,6 +9,7 @@
 #include "colmap_ext/host/pose_conversion.h"
 #include "colmap_ext/report/report_html.h"
 #include "colmap_ext/report/report_input.h"
+#include "core/option_checker.h"
 
 namespace adasfm {
 namespace {
@@ -183,18 +184,12 @@ std::string FormatNotes(const std::vector<std::string>& notes) {
 }  // namespace
 
 bool ReportOptions::IsValid(std::string* error) const {
-  if (max_num_points < 0) {
-    *error = "max_num_points = " + std::to_string(max_num_points) +
-             " must not be negative";
-    return false;
-  }
-  // More would make a page that no phone opens.
-  if (max_num_examples < 0 || max_num_examples > 50) {
-    *error = "max_num_examples = " + std::to_string(max_num_examples) +
-             " must lie between 0 and 50";
-    return false;
-  }
-  return ground_truth.IsValid(error);
+  // More examples would make a page that no phone opens.
+  return OptionChecker(error)
+             .AtLeast(0, "max_num_points", max_num_points)
+             .Within(0, 50, "max_num_examples", max_num_examples)
+             .AllHold() &&
+         ground_truth.IsValid(error);
 }
 
 StatusOr<std::string> BuildReport(const ReportOptions& options) {

@@ -11,6 +11,7 @@
 #include "colmap_ext/host/camera.h"
 #include "colmap_ext/host/two_view.h"
 #include "colmap_ext/scene/two_view_poses.h"
+#include "core/option_checker.h"
 #include "core/parallel.h"
 #include "global/two_view/minimize_epipolar_distances.h"
 
@@ -272,16 +273,13 @@ std::optional<Minimum> FindFocalLength(
 }  // namespace
 
 bool FocalLengthCalibrationOptions::IsValid(std::string* error) const {
-  if (max_num_pairs >= kMinNumPairs && max_num_matches >= 8 &&
-      loss_scale_px > 0.0 && keypoint_sigma_px > 0.0 &&
-      max_relative_sigma > 0.0) {
-    return true;
-  }
-  *error =
-      "focal lengths: at least 5 pairs and 8 matches, and sigmas and loss "
-      "above "
-      "0 are needed";
-  return false;
+  return OptionChecker(error)
+      .AtLeast(kMinNumPairs, "max_num_pairs", max_num_pairs)
+      .AtLeast(8, "max_num_matches", max_num_matches)
+      .Positive({{"loss_scale_px", loss_scale_px},
+                 {"keypoint_sigma_px", keypoint_sigma_px},
+                 {"max_relative_sigma", max_relative_sigma}})
+      .AllHold();
 }
 
 std::vector<CalibratedFocalLength> CalibrateFocalLengths(

@@ -6,6 +6,7 @@
 
 #include "colmap_ext/host/two_view.h"
 #include "colmap_ext/scene/capture_order.h"
+#include "core/option_checker.h"
 #include "core/parallel.h"
 #include "global/view_graph/epipolar.h"
 
@@ -87,17 +88,10 @@ PoseOrigin FindPose(const TwoViewPoseOptions& options, const SceneData& scene,
 }  // namespace
 
 bool TwoViewPoseOptions::IsValid(std::string* error) const {
-  if (!(min_inlier_ratio >= 0.0 && min_inlier_ratio <= 1.0)) {
-    *error = "min_inlier_ratio is " + std::to_string(min_inlier_ratio) +
-             ", but must lie between 0 and 1";
-    return false;
-  }
-  if (!(max_error_px > 0.0)) {
-    *error = "max_error_px is " + std::to_string(max_error_px) +
-             ", but must be positive";
-    return false;
-  }
-  return true;
+  return OptionChecker(error)
+      .Within(0, 1, "min_inlier_ratio", min_inlier_ratio)
+      .Positive({{"max_error_px", max_error_px}})
+      .AllHold();
 }
 
 Rigid3d DecomposeEssential(const Eigen::Matrix3d& essential_matrix,

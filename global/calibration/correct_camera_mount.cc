@@ -8,6 +8,7 @@
 #include <cmath>
 #include <map>
 
+#include "core/option_checker.h"
 #include "core/parallel.h"
 #include "core/so3.h"
 #include "global/calibration/mount_observations.h"
@@ -175,21 +176,11 @@ Eigen::Vector3d KeepKnown(const CameraMountOptions& options, const Turns& turns,
 }  // namespace
 
 bool CameraMountOptions::IsValid(std::string* error) const {
-  if (max_num_steps < 1) {
-    *error =
-        "max_num_steps = " + std::to_string(max_num_steps) + " must be >= 1";
-    return false;
-  }
-  if (!(sigma_deg > 0.0) || !(min_sigma_deg > 0.0) ||
-      !(min_num_sigmas >= 0.0)) {
-    *error =
-        "sigma_deg = " + std::to_string(sigma_deg) +
-        " and min_sigma_deg = " + std::to_string(min_sigma_deg) +
-        " must be > 0, min_num_sigmas = " + std::to_string(min_num_sigmas) +
-        " >= 0";
-    return false;
-  }
-  return true;
+  return OptionChecker(error)
+      .AtLeast(1, "max_num_steps", max_num_steps)
+      .Positive({{"sigma_deg", sigma_deg}, {"min_sigma_deg", min_sigma_deg}})
+      .NotNegative({{"min_num_sigmas", min_num_sigmas}})
+      .AllHold();
 }
 
 void TurnPrior(const Eigen::Quaterniond& turned_from_cam,

@@ -8,6 +8,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include "core/option_checker.h"
 #include "global/loop_closures/consistent_sets.h"
 #include "global/loop_closures/drive_parts.h"
 #include "global/loop_closures/loop_groups.h"
@@ -283,28 +284,16 @@ class LoopClosureFilter {
 }  // namespace
 
 bool LoopClosureOptions::IsValid(std::string* error) const {
-  if (!(significance > 0.0 && significance < 1.0)) {
-    *error =
-        "significance = " + std::to_string(significance) + " must be in (0, 1)";
-    return false;
-  }
-  if (!(pair_angle_sigma_deg > 0.0) || !(pair_length_log_sigma > 0.0) ||
-      !(unit_log_sigma >= 0.0) || !(min_turn_deg > 0.0)) {
-    *error =
-        "pair_angle_sigma_deg = " + std::to_string(pair_angle_sigma_deg) +
-        ", pair_length_log_sigma = " + std::to_string(pair_length_log_sigma) +
-        " and min_turn_deg = " + std::to_string(min_turn_deg) +
-        " must be > 0, unit_log_sigma = " + std::to_string(unit_log_sigma) +
-        " >= 0";
-    return false;
-  }
-  if (max_sequence_gap < 1 || min_num_pairs < 1) {
-    *error = "max_sequence_gap = " + std::to_string(max_sequence_gap) +
-             " and min_num_pairs = " + std::to_string(min_num_pairs) +
-             " must be >= 1";
-    return false;
-  }
-  return true;
+  return OptionChecker(error)
+      .Require(significance > 0.0 && significance < 1.0, "significance",
+               significance, "must be between 0 and 1")
+      .Positive({{"pair_angle_sigma_deg", pair_angle_sigma_deg},
+                 {"pair_length_log_sigma", pair_length_log_sigma},
+                 {"min_turn_deg", min_turn_deg}})
+      .NotNegative({{"unit_log_sigma", unit_log_sigma}})
+      .AtLeast(1, "max_sequence_gap", max_sequence_gap)
+      .AtLeast(1, "min_num_pairs", min_num_pairs)
+      .AllHold();
 }
 
 LoopClosureReport FilterLoopClosures(const LoopClosureOptions& options,

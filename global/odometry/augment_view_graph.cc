@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 
+#include "core/option_checker.h"
 #include "core/so3.h"
 
 namespace adasfm {
@@ -60,12 +61,9 @@ bool EdgeFromPrior(const AugmentationOptions& options,
 }  // namespace
 
 bool AugmentationOptions::IsValid(std::string* error) const {
-  if (!(max_prior_time_gap_s > 0.0)) {
-    *error = "max_prior_time_gap_s = " + std::to_string(max_prior_time_gap_s) +
-             " must be > 0";
-    return false;
-  }
-  return true;
+  return OptionChecker(error)
+      .Positive({{"max_prior_time_gap_s", max_prior_time_gap_s}})
+      .AllHold();
 }
 
 bool IsKnownMotion(const AugmentationOptions& options,

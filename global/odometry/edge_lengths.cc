@@ -5,6 +5,7 @@
 #include <cmath>
 #include <numeric>
 
+#include "core/option_checker.h"
 #include "global/odometry/length_propagation.h"
 
 namespace adasfm {
@@ -31,22 +32,14 @@ void SeedParts(const EdgeLengthOptions& options, const ViewGraph& graph,
 }  // namespace
 
 bool EdgeLengthOptions::IsValid(std::string* error) const {
-  if (!(min_parallax_deg > 0.0)) {
-    *error = "min_parallax_deg = " + std::to_string(min_parallax_deg) +
-             " must be > 0";
-    return false;
-  }
-  if (max_num_matches < 1 || min_num_shared < 1 ||
-      num_shared_reliable < min_num_shared || num_sweeps < 0 ||
-      !(max_log_sigma > 0.0)) {
-    *error = "max_num_matches = " + std::to_string(max_num_matches) +
-             " and min_num_shared = " + std::to_string(min_num_shared) +
-             " must be >= 1, num_shared_reliable >= min_num_shared, "
-             "max_log_sigma > 0, num_sweeps = " +
-             std::to_string(num_sweeps) + " >= 0";
-    return false;
-  }
-  return true;
+  return OptionChecker(error)
+      .Positive({{"min_parallax_deg", min_parallax_deg},
+                 {"max_log_sigma", max_log_sigma}})
+      .AtLeast(1, "max_num_matches", max_num_matches)
+      .AtLeast(1, "min_num_shared", min_num_shared)
+      .AtLeast(min_num_shared, "num_shared_reliable", num_shared_reliable)
+      .AtLeast(0, "num_sweeps", num_sweeps)
+      .AllHold();
 }
 
 EdgeLengths EstimateEdgeLengths(

@@ -4,11 +4,10 @@
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
-#include <initializer_list>
 #include <set>
 #include <stdexcept>
-#include <utility>
 
+#include "core/option_checker.h"
 #include "core/so3.h"
 #include "global/odometry/uncertain_motion.h"
 
@@ -67,22 +66,16 @@ Rigid3d ObservedMotion(const RelativePosePrior& prior) {
 }  // namespace
 
 bool OdometryChainOptions::IsValid(std::string* error) const {
-  for (const auto& [name, value] :
-       std::initializer_list<std::pair<const char*, double>>{
-           {"scale_sigma", scale_sigma},
+  return OptionChecker(error)
+      .NotNegative(
+          {{"scale_sigma", scale_sigma},
            {"gyro_bias_sigma_rad_s", gyro_bias_sigma_rad_s},
            {"gyro_bias_walk_rad_s_sqrt_s", gyro_bias_walk_rad_s_sqrt_s},
            {"extrinsic_rotation_sigma_rad", extrinsic_rotation_sigma_rad},
            {"driving_direction_sigma_rad", driving_direction_sigma_rad},
            {"persistent_translation_ratio", persistent_translation_ratio},
-           {"scale_drift_ratio", scale_drift_ratio}}) {
-    if (!(value >= 0.0)) {
-      *error =
-          std::string(name) + " = " + std::to_string(value) + " must be >= 0";
-      return false;
-    }
-  }
-  return true;
+           {"scale_drift_ratio", scale_drift_ratio}})
+      .AllHold();
 }
 
 OdometryChain::OdometryChain(const std::vector<RelativePosePrior>& priors,

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "core/median.h"
+#include "core/option_checker.h"
 #include "core/so3.h"
 
 namespace adasfm {
@@ -189,29 +190,16 @@ double MedianLength(const std::vector<RelativePosePrior>& priors) {
 }  // namespace
 
 bool VisualStepOptions::IsValid(std::string* error) const {
-  if (max_num_steps < 1) {
-    *error = "max_num_steps = " + std::to_string(max_num_steps) +
-             " must be at least 1";
-    return false;
-  }
-  if (!(length_error_ratio > 0.0) || !(direction_error_deg > 0.0) ||
-      !(rotation_error_deg > 0.0) || !(coasting_error_ratio > 0.0) ||
-      !(max_coasting_s >= 0.0) || !(scale_drift_ratio >= 0.0)) {
-    *error =
-        "length_error_ratio, direction_error_deg, rotation_error_deg and "
-        "coasting_error_ratio must be > 0, max_coasting_s = " +
-        std::to_string(max_coasting_s) +
-        " and scale_drift_ratio = " + std::to_string(scale_drift_ratio) +
-        " >= 0";
-    return false;
-  }
-  if (!(max_contradicting_ratio >= 0.0 && max_contradicting_ratio <= 1.0)) {
-    *error =
-        "max_contradicting_ratio = " + std::to_string(max_contradicting_ratio) +
-        " must be in [0, 1]";
-    return false;
-  }
-  return true;
+  return OptionChecker(error)
+      .AtLeast(1, "max_num_steps", max_num_steps)
+      .Positive({{"length_error_ratio", length_error_ratio},
+                 {"direction_error_deg", direction_error_deg},
+                 {"rotation_error_deg", rotation_error_deg},
+                 {"coasting_error_ratio", coasting_error_ratio}})
+      .NotNegative({{"max_coasting_s", max_coasting_s},
+                    {"scale_drift_ratio", scale_drift_ratio}})
+      .Within(0, 1, "max_contradicting_ratio", max_contradicting_ratio)
+      .AllHold();
 }
 
 VisualSteps AddVisualSteps(const VisualStepOptions& options,

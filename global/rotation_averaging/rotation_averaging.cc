@@ -5,6 +5,7 @@
 #include <cmath>
 #include <vector>
 
+#include "core/option_checker.h"
 #include "core/so3.h"
 #include "global/rotation_averaging/rotation_sdp.h"
 #include "global/rotation_averaging/rotation_spanning_tree.h"
@@ -205,26 +206,17 @@ void RunIterations(const RotationAveragingOptions& options,
 }  // namespace
 
 bool RotationAveragingOptions::IsValid(std::string* error) const {
-  if (min_rank < 3 || max_rank < min_rank || max_rank > 12) {
-    *error = "min_rank = " + std::to_string(min_rank) +
-             " must be >= 3 and max_rank = " + std::to_string(max_rank) +
-             " in [min_rank, 12]";
-    return false;
-  }
-  if (max_num_sdp_sweeps < 1 || max_num_l1_iterations < 0 ||
-      max_num_irls_iterations < 1) {
-    *error =
-        "max_num_sdp_sweeps and max_num_irls_iterations must be >= 1, "
-        "max_num_l1_iterations >= 0";
-    return false;
-  }
-  if (!(loss_scale_deg > 0.0) || !(min_rotation_sigma_rad > 0.0) ||
-      !(convergence_rad > 0.0)) {
-    *error = "loss_scale_deg = " + std::to_string(loss_scale_deg) +
-             ", min_rotation_sigma_rad and convergence_rad must be > 0";
-    return false;
-  }
-  return true;
+  return OptionChecker(error)
+      .AtLeast(3, "min_rank", min_rank)
+      .Require(max_rank >= min_rank && max_rank <= 12, "max_rank", max_rank,
+               "must be from min_rank to 12")
+      .AtLeast(1, "max_num_sdp_sweeps", max_num_sdp_sweeps)
+      .AtLeast(0, "max_num_l1_iterations", max_num_l1_iterations)
+      .AtLeast(1, "max_num_irls_iterations", max_num_irls_iterations)
+      .Positive({{"loss_scale_deg", loss_scale_deg},
+                 {"min_rotation_sigma_rad", min_rotation_sigma_rad},
+                 {"convergence_rad", convergence_rad}})
+      .AllHold();
 }
 
 GlobalRotations EstimateGlobalRotations(const RotationAveragingOptions& options,

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "core/disjoint_sets.h"
+#include "core/option_checker.h"
 
 namespace adasfm {
 namespace {
@@ -162,22 +163,13 @@ std::vector<Track> SelectNeededTracks(const TrackOptions& options,
 }  // namespace
 
 bool TrackOptions::IsValid(std::string* error) const {
-  if (min_track_length < 2) {
-    *error = "min_track_length = " + std::to_string(min_track_length) +
-             " must be >= 2";
-    return false;
-  }
-  if (max_track_length < std::max(3, min_track_length)) {
-    *error = "max_track_length = " + std::to_string(max_track_length) +
-             " must be >= 3 and >= min_track_length";
-    return false;
-  }
-  if (min_num_tracks_per_image < 1) {
-    *error = "min_num_tracks_per_image = " +
-             std::to_string(min_num_tracks_per_image) + " must be >= 1";
-    return false;
-  }
-  return true;
+  return OptionChecker(error)
+      .AtLeast(2, "min_track_length", min_track_length)
+      .Require(max_track_length >= std::max(3, min_track_length),
+               "max_track_length", max_track_length,
+               "must be at least 3, and at least min_track_length")
+      .AtLeast(1, "min_num_tracks_per_image", min_num_tracks_per_image)
+      .AllHold();
 }
 
 size_t EstimateTrackBytes(const Matches& matches) {

@@ -7,6 +7,7 @@
 #include <limits>
 #include <optional>
 
+#include "core/option_checker.h"
 #include "core/parallel.h"
 #include "core/so3.h"
 
@@ -175,18 +176,12 @@ std::optional<TriangulatedTrack> TriangulateTrack(
 }  // namespace
 
 bool TrackTriangulationOptions::IsValid(std::string* error) const {
-  if (!(min_triangulation_angle_deg >= 0.0)) {
-    *error = "min_triangulation_angle_deg = " +
-             std::to_string(min_triangulation_angle_deg) + " must be >= 0";
-    return false;
-  }
-  if (!(max_reproj_error_px > 0.0) || min_track_length < 2) {
-    *error = "max_reproj_error_px = " + std::to_string(max_reproj_error_px) +
-             " must be > 0 and min_track_length = " +
-             std::to_string(min_track_length) + " >= 2";
-    return false;
-  }
-  return true;
+  return OptionChecker(error)
+      .NotNegative(
+          {{"min_triangulation_angle_deg", min_triangulation_angle_deg}})
+      .Positive({{"max_reproj_error_px", max_reproj_error_px}})
+      .AtLeast(2, "min_track_length", min_track_length)
+      .AllHold();
 }
 
 std::vector<TriangulatedTrack> TriangulateTracks(

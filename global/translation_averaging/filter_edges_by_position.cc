@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "global/translation_averaging/filter_edges_by_position.h"
 
-#include <algorithm>
 #include <cmath>
 
+#include "core/option_checker.h"
 #include "core/so3.h"
 
 namespace adasfm {
@@ -31,20 +31,13 @@ bool FitsPositions(const PositionFilterOptions& options,
 }  // namespace
 
 bool PositionFilterOptions::IsValid(std::string* error) const {
-  if (!(max_direction_discrepancy_deg > 0.0) || !(max_num_sigmas >= 0.0)) {
-    *error =
-        "max_direction_discrepancy_deg = " +
-        std::to_string(max_direction_discrepancy_deg) +
-        " must be > 0 and max_num_sigmas = " + std::to_string(max_num_sigmas) +
-        " >= 0";
-    return false;
-  }
-  if (!(max_length_ratio > 1.0)) {
-    *error = "max_length_ratio = " + std::to_string(max_length_ratio) +
-             " must be > 1";
-    return false;
-  }
-  return true;
+  return OptionChecker(error)
+      .Positive(
+          {{"max_direction_discrepancy_deg", max_direction_discrepancy_deg}})
+      .NotNegative({{"max_num_sigmas", max_num_sigmas}})
+      .Require(max_length_ratio > 1.0, "max_length_ratio", max_length_ratio,
+               "must be above 1")
+      .AllHold();
 }
 
 int FilterEdgesByPosition(

@@ -7,6 +7,7 @@
 
 #include "core/disjoint_sets.h"
 #include "core/median.h"
+#include "core/option_checker.h"
 #include "core/so3.h"
 #include "global/translation_averaging/refine_positions.h"
 #include "global/view_graph/laplacian_solver.h"
@@ -201,21 +202,15 @@ void NormalizeScale(const std::vector<PositionEdge>& edges, Vectors* centers) {
 }  // namespace
 
 bool TranslationAveragingOptions::IsValid(std::string* error) const {
-  if (max_num_iterations < 1 || max_num_refine_iterations < 1) {
-    *error = "max_num_iterations = " + std::to_string(max_num_iterations) +
-             " and max_num_refine_iterations = " +
-             std::to_string(max_num_refine_iterations) + " must be >= 1";
-    return false;
-  }
-  if (!(convergence_ratio > 0.0) || !(min_sigma > 0.0) ||
-      !(min_residual > 0.0) || !(refine_loss_scale > 0.0) ||
-      !(min_soft_length_sigma > 0.0)) {
-    *error =
-        "convergence_ratio, min_sigma, min_residual, refine_loss_scale and "
-        "min_soft_length_sigma must be > 0";
-    return false;
-  }
-  return true;
+  return OptionChecker(error)
+      .AtLeast(1, "max_num_iterations", max_num_iterations)
+      .AtLeast(1, "max_num_refine_iterations", max_num_refine_iterations)
+      .Positive({{"convergence_ratio", convergence_ratio},
+                 {"min_sigma", min_sigma},
+                 {"min_residual", min_residual},
+                 {"refine_loss_scale", refine_loss_scale},
+                 {"min_soft_length_sigma", min_soft_length_sigma}})
+      .AllHold();
 }
 
 GlobalPositions EstimateGlobalPositions(

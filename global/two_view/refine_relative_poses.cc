@@ -5,6 +5,7 @@
 #include <Eigen/LU>
 #include <cmath>
 
+#include "core/option_checker.h"
 #include "core/parallel.h"
 #include "global/two_view/detect_baseline.h"
 #include "global/two_view/minimize_epipolar_distances.h"
@@ -92,19 +93,12 @@ void RefineEdge(const RelativePoseRefinementOptions& options,
 }  // namespace
 
 bool RelativePoseRefinementOptions::IsValid(std::string* error) const {
-  if (max_num_iterations < 1 || max_num_matches < 8) {
-    *error = "max_num_iterations = " + std::to_string(max_num_iterations) +
-             " must be >= 1 and max_num_matches = " +
-             std::to_string(max_num_matches) + " >= 8";
-    return false;
-  }
-  if (!(keypoint_sigma_px > 0.0) || !(loss_scale_px > 0.0)) {
-    *error = "keypoint_sigma_px = " + std::to_string(keypoint_sigma_px) +
-             " and loss_scale_px = " + std::to_string(loss_scale_px) +
-             " must be > 0";
-    return false;
-  }
-  return true;
+  return OptionChecker(error)
+      .AtLeast(1, "max_num_iterations", max_num_iterations)
+      .AtLeast(8, "max_num_matches", max_num_matches)
+      .Positive({{"keypoint_sigma_px", keypoint_sigma_px},
+                 {"loss_scale_px", loss_scale_px}})
+      .AllHold();
 }
 
 void RefineRelativePoses(

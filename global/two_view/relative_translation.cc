@@ -3,10 +3,10 @@
 
 #include <Eigen/Eigenvalues>
 #include <Eigen/LU>
-#include <algorithm>
 #include <atomic>
 #include <cmath>
 
+#include "core/option_checker.h"
 #include "core/parallel.h"
 #include "core/so3.h"
 #include "global/two_view/detect_baseline.h"
@@ -62,22 +62,14 @@ void RefineEdge(const RelativeTranslationOptions& options,
 }  // namespace
 
 bool RelativeTranslationOptions::IsValid(std::string* error) const {
-  if (max_num_iterations < 1 || max_num_matches < 8) {
-    *error = "max_num_iterations = " + std::to_string(max_num_iterations) +
-             " must be >= 1 and max_num_matches = " +
-             std::to_string(max_num_matches) + " >= 8";
-    return false;
-  }
-  if (!(keypoint_sigma_px > 0.0) || !(loss_scale_px > 0.0) ||
-      !(max_direction_sigma_deg > 0.0) || !(rotation_sigma_deg >= 0.0)) {
-    *error = "keypoint_sigma_px = " + std::to_string(keypoint_sigma_px) +
-             ", loss_scale_px = " + std::to_string(loss_scale_px) +
-             " and max_direction_sigma_deg = " +
-             std::to_string(max_direction_sigma_deg) +
-             " must be > 0, rotation_sigma_deg >= 0";
-    return false;
-  }
-  return true;
+  return OptionChecker(error)
+      .AtLeast(1, "max_num_iterations", max_num_iterations)
+      .AtLeast(8, "max_num_matches", max_num_matches)
+      .Positive({{"keypoint_sigma_px", keypoint_sigma_px},
+                 {"loss_scale_px", loss_scale_px},
+                 {"max_direction_sigma_deg", max_direction_sigma_deg}})
+      .NotNegative({{"rotation_sigma_deg", rotation_sigma_deg}})
+      .AllHold();
 }
 
 RelativeTranslationReport EstimateRelativeTranslations(

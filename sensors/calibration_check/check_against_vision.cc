@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "sensors/calibration_check/check_against_vision.h"
 
-#include <algorithm>
 #include <cmath>
 #include <stdexcept>
 
+#include "core/option_checker.h"
 #include "sensors/calibration_check/calibration_mistakes.h"
 #include "sensors/calibration_check/rotation_comparison.h"
 #include "sensors/calibration_check/shift_search.h"
@@ -262,18 +262,19 @@ VisionCheck VisionComparer::Run() {
 }  // namespace
 
 bool VisionCheckOptions::IsValid(std::string* error) const {
-  if (max_time_shift_s > 0.0 && min_rotation_rms_deg > 0.0 &&
-      min_contradicting_rms_deg > 0.0 && min_num_rotations > 1 &&
-      min_correlation > 0.0 && min_correlation < 1.0 &&
-      max_accepted_shift_s > 0.0 && max_clock_shift_s >= min_clock_shift_s &&
-      min_clock_shift_s >= 0.0 && max_unexplained_ratio > 0.0 &&
-      max_visual_error_ratio > 0.0) {
-    return true;
-  }
-  *error =
-      "AdaSfmVisionCheck: every option must be positive and "
-      "min_correlation below 1";
-  return false;
+  return OptionChecker(error)
+      .Positive({{"max_time_shift_s", max_time_shift_s},
+                 {"min_rotation_rms_deg", min_rotation_rms_deg},
+                 {"min_contradicting_rms_deg", min_contradicting_rms_deg},
+                 {"max_accepted_shift_s", max_accepted_shift_s},
+                 {"max_unexplained_ratio", max_unexplained_ratio},
+                 {"max_visual_error_ratio", max_visual_error_ratio}})
+      .AtLeast(2, "min_num_rotations", min_num_rotations)
+      .Require(min_correlation > 0.0 && min_correlation < 1.0,
+               "min_correlation", min_correlation, "must be between 0 and 1")
+      .NotNegative({{"min_clock_shift_s", min_clock_shift_s}})
+      .AtLeast(min_clock_shift_s, "max_clock_shift_s", max_clock_shift_s)
+      .AllHold();
 }
 
 VisionCheck CheckAgainstVision(const std::vector<TimedRotation>& rotations,

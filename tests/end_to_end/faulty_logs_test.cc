@@ -161,7 +161,8 @@ TEST_F(FaultyLogsTest, ImpossibleNoiseFiguresAreRefused) {
 TEST_F(FaultyLogsTest, AnEstimateThatIsNotFiniteIsNotWritten) {
   ASSERT_EQ(Call(ImportArguments()).ExitCode(), 0);
   const std::vector<RelativePosePrior> before = Priors();
-  const Run run = Call(ImportArguments() + " --AdaSfmPriors.gravity_m_s2 inf");
+  const Run run =
+      Call(ImportArguments() + " --AdaSfmPriors.gravity_m_s2 1e300");
   EXPECT_EQ(run.ExitCode(), 1) << run.out;
   ExpectNear(Priors(), before, 1e-9, 1e-12);
 }

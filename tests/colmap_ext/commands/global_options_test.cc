@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <fstream>
 #include <functional>
 #include <string>
 #include <vector>
@@ -38,17 +39,15 @@ const std::vector<OptionCase>& Cases() {
       OPTION("num_threads", 1, num_threads),
       OPTION("min_num_inliers", 20, poses.min_num_inliers),
       OPTION("num_rotation_rounds", 1, poses.num_rotation_rounds),
-      OPTION("camera_mount_max_num_steps", 5, poses.camera_mount.max_num_steps),
-      OPTION("camera_mount_sigma_deg", 2, poses.camera_mount.sigma_deg),
-      OPTION("camera_mount_min_sigma_deg", 0.2,
-             poses.camera_mount.min_sigma_deg),
-      OPTION("camera_mount_min_num_sigmas", 3,
-             poses.camera_mount.min_num_sigmas),
+      OPTION("camera_imu_max_num_steps", 5, poses.camera_mount.max_num_steps),
+      OPTION("camera_imu_sigma_deg", 2, poses.camera_mount.sigma_deg),
+      OPTION("camera_imu_min_sigma_deg", 0.2, poses.camera_mount.min_sigma_deg),
+      OPTION("camera_imu_min_num_sigmas", 3, poses.camera_mount.min_num_sigmas),
       OPTION("wheel_scale_sigma", 0.02, poses.chain.scale_sigma),
       OPTION("gyro_bias_sigma_rad_s", 0.001, poses.chain.gyro_bias_sigma_rad_s),
-      OPTION("visual_step_length_error", 0.2,
+      OPTION("visual_odometry_length_error", 0.2,
              poses.visual_steps.length_error_ratio),
-      OPTION("max_coasting_s", 3, poses.visual_steps.max_coasting_s),
+      OPTION("max_extrapolation_s", 3, poses.visual_steps.max_coasting_s),
       OPTION("loop_significance", 1e-4, poses.loops.significance),
       OPTION("loop_pair_angle_sigma_deg", 1, poses.loops.pair_angle_sigma_deg),
       OPTION("loop_pair_length_log_sigma", 0.1,
@@ -57,8 +56,8 @@ const std::vector<OptionCase>& Cases() {
       OPTION("max_num_position_iterations", 7,
              poses.positions.max_num_iterations),
       OPTION("max_sequence_gap", 5, poses.loops.max_sequence_gap),
-      OPTION("join_min_num_pairs", 5, poses.loops.min_num_pairs),
-      OPTION("join_min_turn_deg", 40, poses.loops.min_turn_deg),
+      OPTION("closure_min_num_pairs", 5, poses.loops.min_num_pairs),
+      OPTION("closure_min_turn_deg", 40, poses.loops.min_turn_deg),
       OPTION("min_angle_floor_deg", 2, structure.min_angle_floor_deg),
       OPTION("min_num_points_per_image", 10,
              structure.min_num_points_per_image),
@@ -85,10 +84,11 @@ const std::vector<OptionCase>& Cases() {
       OPTION("min_num_matches", 30, refinement.min_num_matches),
       OPTION("use_sdp_start", 0, poses.rotations.use_sdp_start),
       OPTION("use_loop_gating", 0, poses.loops.enabled),
-      OPTION("split_unverified_joins", 0, poses.loops.split_unverified_joins),
-      OPTION("use_visual_steps", 0, poses.visual_steps.enabled),
+      OPTION("split_unconfirmed_closures", 0,
+             poses.loops.split_unverified_joins),
+      OPTION("use_visual_odometry", 0, poses.visual_steps.enabled),
       OPTION("refine_relative_poses", 0, poses.relative_poses.enabled),
-      OPTION("correct_camera_mount", 0, poses.camera_mount.enabled),
+      OPTION("correct_camera_imu_rotation", 0, poses.camera_mount.enabled),
       OPTION("refine_translations", 0, poses.translations.enabled),
       OPTION("use_augmentation", 0, poses.augmentation.enabled),
       OPTION("use_metric_lengths", 0, poses.augmentation.use_metric_lengths),
@@ -146,6 +146,27 @@ TEST(GlobalOptionsTest, WrongValuesAreNamedAsTheyAreTyped) {
         << name << ": " << status.message();
   }
   EXPECT_GT(num_refused, 25);
+}
+
+TEST(GlobalOptionsTest, OldNamesAreTaken) {
+  GlobalStageOptions stage;
+  testing::internal::CaptureStderr();
+  EXPECT_TRUE(ParseGlobal({"--AdaSfmGlobal.max_coasting_s=3",
+                           "--AdaSfmGlobal.join_min_turn_deg", "40"},
+                          &stage)
+                  .ok());
+  const std::string notes = testing::internal::GetCapturedStderr();
+  EXPECT_EQ(stage.poses.visual_steps.max_coasting_s, 3.0);
+  EXPECT_EQ(stage.poses.loops.min_turn_deg, 40.0);
+  EXPECT_NE(notes.find("--AdaSfmGlobal.max_coasting_s is "
+                       "--AdaSfmGlobal.max_extrapolation_s now"),
+            std::string::npos)
+      << notes;
+  // Of a project file too.
+  const std::string path = testing::TempDir() + "/old_names.ini";
+  std::ofstream(path) << "[AdaSfmGlobal]\ncamera_mount_sigma_deg=0.5\n";
+  EXPECT_TRUE(ParseGlobal({"--project_path", path}, &stage).ok());
+  EXPECT_EQ(stage.poses.camera_mount.sigma_deg, 0.5);
 }
 
 TEST(GlobalOptionsTest, TheHelpNamesAll) {
