@@ -30,6 +30,15 @@ void Attach(const std::string& path, SqliteConnection* database) {
   attach.Step();
 }
 
+// A database that the extraction is writing to.
+void AttachForReading(const std::string& path, SqliteConnection* database) {
+  Attach(path, database);
+  SqliteStatement mode(database, "PRAGMA other.journal_mode");
+  if (!mode.Step() || mode.Text(0) != "wal") {
+    throw SqliteError(path + " cannot be read while it is written");
+  }
+}
+
 // Tables first.
 std::vector<SchemaEntry> ReadSchema(SqliteConnection* database) {
   SqliteStatement statement(
@@ -121,7 +130,7 @@ void OpenEarlyDatabase(const std::string& database_path,
     throw SqliteError("cannot write " + early_path);
   }
   SqliteConnection database(early_path, SqliteConnection::Mode::kWrite);
-  Attach(database_path, &database);
+  AttachForReading(database_path, &database);
   BeginReadingOther(&database);
   CopyVersion(&database);
   const std::vector<SchemaEntry> entries = ReadSchema(&database);
@@ -145,11 +154,7 @@ void OpenEarlyDatabase(const std::string& database_path,
 EarlyFeatures::EarlyFeatures(const std::string& early_path,
                              const std::string& database_path)
     : early_(early_path, SqliteConnection::Mode::kWrite) {
-  Attach(database_path, &early_);
-  SqliteStatement mode(&early_, "PRAGMA other.journal_mode");
-  if (!mode.Step() || mode.Text(0) != "wal") {
-    throw SqliteError(database_path + " cannot be read while it is written");
-  }
+  AttachForReading(database_path, &early_);
 }
 
 std::set<image_t> EarlyFeatures::FindReady() {

@@ -22,7 +22,8 @@ inline std::string EarlyDatabasePath(const std::string& workspace_path) {
 }
 
 // Makes it, unless it is there with the same inputs: a text that tells what the
-// matches depend on. Whole, or not at all. Throws SqliteError.
+// matches depend on. Whole, or not at all. Throws SqliteError, also when
+// reading would keep the host from writing.
 void OpenEarlyDatabase(const std::string& database_path,
                        const std::string& inputs,
                        const std::string& early_path);
@@ -30,8 +31,7 @@ void OpenEarlyDatabase(const std::string& database_path,
 // A connection to the early database that also reads the workspace's.
 class EarlyFeatures {
  public:
-  // Throws SqliteError, as all methods do; also when reading would keep the
-  // host from writing.
+  // Throws SqliteError, as all methods do.
   EarlyFeatures(const std::string& early_path,
                 const std::string& database_path);
 
