@@ -156,7 +156,7 @@ Status Reconstructor::Matching() {
   };
   const auto work = [&]() -> Status {
     const ProgressCallback progress = ProgressIn(kMatching, "matching");
-    progress("reading the logs", 0.0);
+    if (HasMotionLogs()) progress("reading the logs", 0.0);
     const Status imported = ImportForPairs(database_path_);
     if (!imported.ok()) return imported;
     const StatusOr<int> num_early =
