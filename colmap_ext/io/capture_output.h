@@ -13,17 +13,22 @@ namespace adasfm {
 // While it lives, what is printed on std::cout and std::cerr, by whatever
 // thread, goes to the end of a file instead. The host's classes print what they
 // do; lines that begin with `counted` are counted. Streams made from
-// std::cout.rdbuf() before are not affected.
+// std::cout.rdbuf() before are not affected. While one lives, others, of work
+// beside it, capture nothing.
 class CaptureOutput : private std::streambuf {
  public:
   CaptureOutput(const std::string& path, const std::string& counted)
-      : counted_(counted),
-        file_(path, std::ios::app),
-        cout_(std::cout.rdbuf(this)),
-        cerr_(std::cerr.rdbuf(this)) {}
+      : captures_(!is_captured_.exchange(true)), counted_(counted) {
+    if (!captures_) return;
+    file_.open(path, std::ios::app);
+    cout_ = std::cout.rdbuf(this);
+    cerr_ = std::cerr.rdbuf(this);
+  }
   ~CaptureOutput() override {
+    if (!captures_) return;
     std::cout.rdbuf(cout_);
     std::cerr.rdbuf(cerr_);
+    is_captured_ = false;
   }
   CaptureOutput(const CaptureOutput&) = delete;
   CaptureOutput& operator=(const CaptureOutput&) = delete;
@@ -57,13 +62,16 @@ class CaptureOutput : private std::streambuf {
     line_.clear();
   }
 
+  static inline std::atomic<bool> is_captured_{false};
+
   std::mutex mutex_;
+  const bool captures_;
   const std::string counted_;
   std::string line_;
   std::atomic<int> num_counted_{0};
   std::ofstream file_;
-  std::streambuf* cout_;
-  std::streambuf* cerr_;
+  std::streambuf* cout_ = nullptr;
+  std::streambuf* cerr_ = nullptr;
 };
 
 }  // namespace adasfm

@@ -165,6 +165,7 @@ Status AddDistantPairs(const PairSelectionOptions& options,
     selection->num_predicted = predicted.chosen.size();
     if (!predicted.has_unsure) return Status::Ok();
   }
+  if (!options.use_similarity) return Status::Ok();
   return AddSimilarPairs(
       options, database_path,
       [&](const ImagePair& pair) {

@@ -19,6 +19,9 @@ struct PairSelectionOptions {
   // database predict what images share, those that share most of their views;
   // where they cannot tell, the most similar ones.
   int num_similar_images = 30;
+  // Without, only the pairs that need no features to be found: a part of those
+  // found with it.
+  bool use_similarity = true;
   OverlapPredictionOptions odometry;
   // Times of the images (sensors/io/read_image_times.h); empty: those that
   // adasfm_prior_importer left in the database.

@@ -4,12 +4,24 @@
 #include <utility>
 
 #include "colmap_ext/features/extract_sift.h"
+#include "colmap_ext/host/host_features.h"
 #include "colmap_ext/io/digest.h"
 #include "colmap_ext/pairs/predict_motions.h"
+#include "colmap_ext/workspace/early_database.h"
+#include "colmap_ext/workspace/early_matcher.h"
 #include "colmap_ext/workspace/reconstructor.h"
 #include "colmap_ext/workspace/reset_workspace.h"
 
 namespace adasfm {
+namespace {
+
+std::string TextOf(const StepInputs& inputs) {
+  std::string text;
+  for (const auto& [name, value] : inputs) text += name + "=" + value + "\n";
+  return text;
+}
+
+}  // namespace
 
 Status Reconstructor::ExtractAll(const std::vector<std::string>& names) {
   const ProgressCallback progress = ProgressIn(kFeatures, "features");
@@ -34,20 +46,62 @@ Status Reconstructor::ExtractAll(const std::vector<std::string>& names) {
           std::to_string(names.size()) + " files (the first one is " +
           images->unreadable.front() + ")"});
   }
-  const ProgressCallback extraction_progress =
+  return ExtractRegistered(
       [&progress](const std::string& what, double share_done) {
         progress(what, 0.1 + 0.9 * share_done);
-      };
-  if (options_.features.extractor == "opencv") {
+      });
+}
+
+bool Reconstructor::CanMatchEarly() const {
+  // With a number of threads given, the rest of the machine is not ours. One
+  // GPU has enough to do with the features, and the host's matcher inside says
+  // on std::cout what it does, as the extraction does.
+  const FeatureOptions& features = options_.features;
+  const bool matches_here = !UsesGpu(features) && features.matcher == "adasfm";
+  return options_.num_threads == -1 && (UsesHostProgram() || matches_here);
+}
+
+Status Reconstructor::ExtractRegistered(const ProgressCallback& progress) {
+  const FeatureOptions& features = options_.features;
+  const StatusOr<StepInputs> inputs = MatchingInputs();
+  if (!inputs.ok()) return inputs.status();
+  EarlyMatchingRequest request;
+  request.features = features;
+  request.pairs = options_.pairs;
+  request.guided_matching = options_.guided_matching;
+  request.database_path = database_path_;
+  request.early_path = EarlyDatabasePath(paths_.workspace_path);
+  request.inputs = TextOf(*inputs);
+  request.log_path = InWorkspace("logs/matching.log");
+  request.import_priors = [this](const std::string& path) {
+    return ImportForPairs(path);
+  };
+  EarlyMatcher matcher(std::move(request));
+  const bool can_match_early = CanMatchEarly();
+  double first_share = -1.0;
+  const ProgressCallback extraction_progress = [&](const std::string& what,
+                                                   double share_done) {
+    if (first_share < 0.0) first_share = share_done;
+    if (can_match_early && share_done > first_share) matcher.Start();
+    progress(what, share_done);
+  };
+  Status status;
+  if (features.extractor == "opencv") {
     SiftFeatureOptions sift;
-    sift.max_image_size = options_.features.max_image_size;
-    sift.max_num_features = options_.features.max_num_features;
-    return ExtractSiftOfDatabase(sift, options_.features.num_threads,
-                                 paths_.image_path, database_path_,
-                                 extraction_progress);
+    sift.max_image_size = features.max_image_size;
+    sift.max_num_features = features.max_num_features;
+    status =
+        ExtractSiftOfDatabase(sift, features.num_threads, paths_.image_path,
+                              database_path_, extraction_progress);
+  } else {
+    status =
+        ExtractFeatures(features, paths_.image_path, database_path_,
+                        InWorkspace("logs/features.log"), extraction_progress);
   }
-  return ExtractFeatures(options_.features, paths_.image_path, database_path_,
-                         InWorkspace("logs/features.log"), extraction_progress);
+  if (!status.ok()) return status;
+  matcher.Finish();
+  num_guided_early_ = matcher.NumGuided();
+  return Status::Ok();
 }
 
 Status Reconstructor::Features() {
@@ -75,7 +129,7 @@ Status Reconstructor::Features() {
                   [this] { return CheckFeatures(database_path_); }});
 }
 
-Status Reconstructor::Matching() {
+StatusOr<StepInputs> Reconstructor::MatchingInputs() const {
   const PairSelectionOptions& pairs = options_.pairs;
   // The odometry has a say in the pairs.
   StatusOr<StepInputs> inputs = DigestSensors();
@@ -90,16 +144,27 @@ Status Reconstructor::Matching() {
       std::to_string(pairs.num_similar_images);
   inputs.value()["matcher"] = options_.features.matcher;
   inputs.value()["guided_matching"] = std::to_string(options_.guided_matching);
+  return inputs;
+}
+
+Status Reconstructor::Matching() {
+  const StatusOr<StepInputs> inputs = MatchingInputs();
+  if (!inputs.ok()) return inputs.status();
   const auto reset = [this] {
     const Status status = ResetMatches(database_path_);
     return status.ok() ? ResetPriors(database_path_) : status;
   };
   const auto work = [&]() -> Status {
     const ProgressCallback progress = ProgressIn(kMatching, "matching");
-    const Status imported = ImportForPairs(progress);
+    if (HasMotionLogs()) progress("reading the logs", 0.0);
+    const Status imported = ImportForPairs(database_path_);
     if (!imported.ok()) return imported;
+    const StatusOr<int> num_early =
+        TakeEarlyMatches(EarlyDatabasePath(paths_.workspace_path),
+                         TextOf(*inputs), database_path_);
+    if (!num_early.ok()) return num_early.status();
     const StatusOr<PairSelection> selection =
-        SelectPairs(pairs, database_path_,
+        SelectPairs(options_.pairs, database_path_,
                     [&progress](const std::string& what, double share_done) {
                       progress(what, 0.05 * share_done);
                     });
@@ -110,6 +175,10 @@ Status Reconstructor::Matching() {
              std::to_string(selection->num_predicted) + " by the odometry, " +
              std::to_string(selection->num_similar) +
              " more of similar images");
+    if (*num_early > 0) {
+      message_("matching: " + std::to_string(*num_early) +
+               " of them are matched, while features were extracted");
+    }
     return MatchSelected(selection->pairs, progress);
   };
   return RunStep("matching", *inputs, {reset, work, &KeepAll});
@@ -132,6 +201,7 @@ Status Reconstructor::MatchSelected(const std::vector<ImagePair>& pairs,
       },
       predictor, &num_guided);
   if (!status.ok()) return status;
+  num_guided += num_guided_early_;
   if (num_guided > 0) {
     message_("matching: " + std::to_string(num_guided) + " of " +
              std::to_string(pairs.size()) + " pairs along their predicted " +

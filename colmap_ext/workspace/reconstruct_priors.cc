@@ -6,23 +6,23 @@
 
 namespace adasfm {
 
-Status Reconstructor::ImportForPairs(const ProgressCallback& progress) const {
+Status Reconstructor::ImportForPairs(const std::string& database_path) const {
   if (!HasMotionLogs()) return Status::Ok();
-  const StatusOr<LoadedPriorTables> tables = ReadPriorTables(database_path_);
+  const StatusOr<LoadedPriorTables> tables = ReadPriorTables(database_path);
   if (!tables.ok() || !tables->tables.priors.empty()) return tables.status();
-  progress("reading the logs", 0.0);
-  return Import().status();
+  return Import(database_path).status();
 }
 
-StatusOr<PriorImport> Reconstructor::Import() const {
+StatusOr<PriorImport> Reconstructor::Import(
+    const std::string& database_path) const {
   PriorImportPaths paths;
-  paths.database_path = database_path_;
+  paths.database_path = database_path;
   paths.image_times_path = paths_.image_times_path;
   paths.imu_path = paths_.imu_path;
   paths.wheel_path = paths_.wheel_path;
   paths.gnss_path = paths_.gnss_path;
   paths.sensors_path = paths_.sensors_path;
-  return ImportPriors(options_.priors, paths, database_path_ + ".priors.json");
+  return ImportPriors(options_.priors, paths, database_path + ".priors.json");
 }
 
 StatusOr<StepInputs> Reconstructor::DigestSensors() const {
@@ -49,7 +49,7 @@ Status Reconstructor::Priors() {
   const auto work = [&]() -> Status {
     if (!has_sensors) return Status::Ok();
     ProgressIn(kPriors, "priors")("reading the logs", 0.0);
-    const StatusOr<PriorImport> import = Import();
+    const StatusOr<PriorImport> import = Import(database_path_);
     if (!import.ok()) return import.status();
     message_(FormatPriorImport(*import));
     return Status::Ok();

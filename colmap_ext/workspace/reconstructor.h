@@ -78,6 +78,10 @@ class Reconstructor {
           extract);
   Status Features();
   Status ExtractAll(const std::vector<std::string>& names);
+  // Matches what it can while they are extracted.
+  Status ExtractRegistered(const ProgressCallback& progress);
+  bool CanMatchEarly() const;
+  StatusOr<StepInputs> MatchingInputs() const;
   Status Matching();
   Status MatchSelected(const std::vector<ImagePair>& pairs,
                        const ProgressCallback& progress);
@@ -86,11 +90,11 @@ class Reconstructor {
     return !paths_.imu_path.empty() || !paths_.wheel_path.empty();
   }
   StatusOr<StepInputs> DigestSensors() const;
-  StatusOr<PriorImport> Import() const;
+  StatusOr<PriorImport> Import(const std::string& database_path) const;
   // Before the matching, without the photos' rotations: for the choice of
   // pairs, and so that faults of the logs are known before the long work. A run
   // that goes on takes what is there, so that it chooses the same pairs.
-  Status ImportForPairs(const ProgressCallback& progress) const;
+  Status ImportForPairs(const std::string& database_path) const;
   Status Coarse();
   Status Model();
   Status Report();
@@ -105,6 +109,8 @@ class Reconstructor {
   std::string database_path_;
   std::shared_ptr<FolderLock> lock_;
   StepJournal journal_;
+  // Of the pairs matched while features were extracted.
+  int num_guided_early_ = 0;
   AutomaticReconstructionResult result_;
 };
 

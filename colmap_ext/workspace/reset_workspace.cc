@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "colmap_ext/database/prior_corrections.h"
+#include "colmap_ext/workspace/early_database.h"
 #include "core/sqlite.h"
 
 namespace adasfm {
@@ -46,7 +47,7 @@ Status ResetFeatures(const std::string& workspace_path) {
     const Status status = Remove(workspace_path + "/" + name);
     if (!status.ok()) return status;
   }
-  return Status::Ok();
+  return RemoveEarlyDatabase(EarlyDatabasePath(workspace_path));
 }
 
 Status ResetMatches(const std::string& database_path) {

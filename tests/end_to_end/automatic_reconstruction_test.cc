@@ -77,6 +77,16 @@ class AutomaticTest : public CommandLineTest {
     EXPECT_GT(fs::file_size(workspace_ + "/report.html"), 10000);
   }
 
+  // The host's own program.
+  std::string HostPath() {
+    const std::string version = Call("adasfm_version").out;
+    std::smatch match;
+    EXPECT_TRUE(std::regex_search(version, match,
+                                  std::regex("Host: +COLMAP \\S+ \\((.*)\\)")))
+        << version;
+    return match[1].str();
+  }
+
   // What the steps recorded, by name.
   std::map<std::string, bool> DoneSteps() const {
     std::map<std::string, bool> steps;
@@ -133,12 +143,7 @@ TEST_F(AutomaticTest, PhotosAndSensorsThenAgainThenWithOtherOptions) {
 }
 
 TEST_F(AutomaticTest, TheUsersColmapExtractsAndMatches) {
-  const std::string version = Call("adasfm_version").out;
-  std::smatch match;
-  ASSERT_TRUE(std::regex_search(version, match,
-                                std::regex("Host: +COLMAP \\S+ \\((.*)\\)")))
-      << version;
-  const std::string host = match[1].str();
+  const std::string host = HostPath();
   // It fails half-way: one line, which names the log.
   const std::string wrapper = WriteScript(
       "[ \"$1\" = matches_importer ] && [ \"$2\" != -h ] && "
@@ -271,6 +276,29 @@ TEST_F(AutomaticTest, InterruptionKeepsWhatIsDone) {
   const Run run = ExpectSuccess(Photos());
   EXPECT_TRUE(Contains(run.out, "features: done before"));
   ExpectModel();
+}
+
+// A program that extracts without the processor, as on a GPU, leaves it to the
+// matching.
+TEST_F(AutomaticTest, MatchingBeginsWhileTheExtractorIsIdle) {
+  const std::string wrapper =
+      WriteScript(HostPath() +
+                  " \"$@\" || exit\n"
+                  "[ \"$1\" = feature_extractor ] && [ \"$2\" != -h ] && sleep "
+                  "5\nexit 0\n");
+  ASSERT_EQ(setenv("ADASFM_HOST_COLMAP", wrapper.c_str(), 1), 0);
+  const std::string out = folder_.File("stdout");
+  const std::string word = "of them are matched, while features";
+  const int code =
+      InterruptAt(Photos(), word, SIGINT, out, folder_.File("stderr"));
+  unsetenv("ADASFM_HOST_COLMAP");
+  EXPECT_EQ(code, 130);
+  const std::string text = ReadBytes(out);
+  EXPECT_TRUE(Contains(text, word)) << text;
+  EXPECT_FALSE(fs::exists(workspace_ + "/early.db"));
+  for (const auto& entry : fs::directory_iterator(workspace_ + "/logs")) {
+    EXPECT_EQ(entry.path().extension(), ".log") << entry.path();
+  }
 }
 
 TEST_F(AutomaticTest, WrongInputIsOneLine) {
