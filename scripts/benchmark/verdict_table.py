@@ -266,6 +266,22 @@ def table_row(name, seed, run, judgement):
       ' | '.join(numbers), run.said.strip().replace('|', '/')[:300])
 
 
+def print_summary(rows):
+  """How many verdicts of each kind err by how much of their own limit."""
+  bounds = [(0.0, 1.5), (1.5, MAX_RATIO), (MAX_RATIO, float('inf'))]
+  print('\n| verdict | up to 1.5 own limits | 1.5 to 3 | above 3 |\n'
+        '|---|---|---|---|')
+  for result in ('good', 'doubtful', 'failed'):
+    ratios = [judgement.own for run, judgement in rows
+              if run.result == result and judgement.own is not None]
+    print('| %s | %s |' % (result, ' | '.join(
+        str(sum(low < value <= high for value in ratios))
+        for low, high in bounds)))
+  print('\n%d runs, %d without a model, %d wrong' % (
+      len(rows), sum(run.errors is None for run, _ in rows),
+      sum(judgement.wrong for _, judgement in rows)))
+
+
 def main():
   parser = argparse.ArgumentParser(description=__doc__)
   parser.add_argument('colmap', help='our colmap')
@@ -275,7 +291,7 @@ def main():
   parser.add_argument('--only', default='', help='rows with this in the name')
   args = parser.parse_args()
   colmap = os.path.abspath(args.colmap)
-  num_wrong = 0
+  rows = []
   print('| world | seed | verdict | error [m] | own limit [m] | ratio | '
         'shape: ratio | metres: sigmas off | unspoilt limit [m] | ratio | said |')
   print('|---|---|---|---|---|---|---|---|---|---|---|')
@@ -286,9 +302,10 @@ def main():
       folder = os.path.join(os.path.abspath(args.folder), 'world')
       run = run_world(colmap, folder, options, args.images, seed)
       judgement = judge(run)
-      num_wrong += judgement.wrong
+      rows.append((run, judgement))
       print(table_row(name, seed, run, judgement), flush=True)
-  return 1 if num_wrong else 0
+  print_summary(rows)
+  return 1 if any(judgement.wrong for _, judgement in rows) else 0
 
 
 if __name__ == '__main__':

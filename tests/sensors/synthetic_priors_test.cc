@@ -184,8 +184,8 @@ TEST(SyntheticPriors, SlipsAreFoundAndTheLengthStays) {
   }
 }
 
-// Wheels that slip until the log ends jump once: what comes after is wrong, too,
-// though the accelerometer agrees with it.
+// Wheels that slip until the log ends jump once: what comes after is wrong,
+// too, though the accelerometer agrees with it.
 TEST(SyntheticPriors, ASlipUntilTheEndIsFound) {
   for (const uint64_t seed : {1, 2, 3, 4, 5}) {
     Dataset data = ToDataset(BuildSyntheticWorld(SmallWorld(seed, 60)));
