@@ -159,7 +159,13 @@ void AppendLostImages(const SceneData& scene, const GlobalStageResult& result,
 
 void AppendMountWarning(const CameraMountReport& mount,
                         std::vector<std::string>* warnings) {
-  if (!mount.corrected) return;
+  // Below it the direction of driving is as likely to be wrong, by what the
+  // import states for it.
+  constexpr double kMinNumSigmas = 3.0;
+  if (!mount.corrected ||
+      mount.turn_rad.norm() < kMinNumSigmas * mount.sigma_rad) {
+    return;
+  }
   std::ostringstream text;
   text << std::fixed << std::setprecision(2) << "the camera's mount is "
        << RadToDeg(mount.turn_rad.norm()) << " +- " << RadToDeg(mount.sigma_rad)

@@ -42,6 +42,9 @@ constexpr double kNoForceCorrelation = 0.2;
 constexpr double kMaxTurnDeg = 30.0;
 // Factors within this are right, or are found by the smoother.
 constexpr double kMaxFactor = 1.5;
+// Below it wheels may as well have spun while a straight drive gained speed: no
+// unit is that near to another.
+constexpr double kMinUnitFactor = 1.9;
 
 class WheelChecker {
  public:
@@ -252,14 +255,16 @@ std::string WheelChecker::CheckUnits(const WheelFit& fit,
   if (high < 1.0 / kMaxFactor || low > kMaxFactor) {
     const double logged = 1.0 / std::sqrt(low * high);
     const bool is_kmh = logged > 2.9 && logged < 4.4;
-    return FormatFigures(
-               "the wheel log's speeds are %.2g times those of the "
-               "accelerometer: ",
-               logged) +
-           (is_kmh ? "they look like km/h: divide them by 3.6 (m/s are "
-                     "expected)"
-                   : "check their unit (m/s are expected), metres_per_tick "
-                     "and the wheels' radius");
+    const std::string text =
+        FormatFigures(
+            "the wheel log's speeds are %.2g times those of the "
+            "accelerometer: ",
+            logged) +
+        (is_kmh ? "they look like km/h: divide them by 3.6 (m/s are expected)"
+                : "check their unit (m/s are expected), metres_per_tick and "
+                  "the wheels' radius");
+    if (logged > kMinUnitFactor || logged < 1.0 / kMinUnitFactor) return text;
+    warnings->push_back(text + ", unless they spun");
   }
   if (!YawTells(fit)) return "";
   if (fit.yaw < 0.0) {

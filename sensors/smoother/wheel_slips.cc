@@ -2,6 +2,10 @@
 #include "sensors/smoother/wheel_slips.h"
 
 #include <algorithm>
+#include <cmath>
+#include <optional>
+
+#include "core/median.h"
 
 namespace adasfm {
 namespace {
@@ -9,31 +13,64 @@ namespace {
 // Wheels that leave this much force unexplained at the start are slipping or
 // stuck there: no machine's gravity is off so far.
 constexpr double kMaxFirstForceError = 1.5;  // m/s^2
+// What jumps may add up to by that much force in the links without one.
+constexpr double kMaxFirstSpeedError = 1.0;  // m/s
+
+// By how much more the wheels' speed grows over link k than the accelerometer's
+// along the motion, m/s, where the force that is left is not gravity.
+std::optional<double> FindJump(const OdometryFusionProblem& problem, size_t k,
+                               double gravity_m_s2) {
+  const OdometryLink& link = problem.links[k];
+  if (!link.has_imu || !link.has_wheel || link.dt_s <= 0.0) return std::nullopt;
+  const OdometryState& first = problem.initial_states[k];
+  const OdometryState& second = problem.initial_states[k + 1];
+  const Eigen::Vector3d force =
+      (link.imu.delta_rotation * second.velocity_in_imu -
+       first.velocity_in_imu - link.imu.delta_velocity) /
+      link.dt_s;
+  const Eigen::Vector3d error =
+      force - first.world_from_imu.conjugate() *
+                  Eigen::Vector3d(0.0, 0.0, -gravity_m_s2);
+  if (error.norm() < kMaxFirstForceError) return std::nullopt;
+  const Eigen::Vector3d forward =
+      problem.imu_from_wheel.rotation * Eigen::Vector3d::UnitX();
+  return link.dt_s * forward.dot(error);
+}
 
 }  // namespace
 
 std::vector<size_t> FindSuspectWheels(const OdometryFusionProblem& problem,
                                       double gravity_m_s2) {
   const size_t num_links = problem.links.size();
-  std::vector<size_t> suspects;
+  std::vector<bool> is_suspect(num_links, false);
+  std::vector<double> offsets(num_links, 0.0);
+  double offset = 0.0;
   for (size_t k = 0; k < num_links; ++k) {
     const OdometryLink& link = problem.links[k];
-    if (!link.has_imu || !link.has_wheel || link.dt_s <= 0.0) continue;
-    const OdometryState& first = problem.initial_states[k];
-    const OdometryState& second = problem.initial_states[k + 1];
-    const Eigen::Vector3d force =
-        (link.imu.delta_rotation * second.velocity_in_imu -
-         first.velocity_in_imu - link.imu.delta_velocity) /
-        link.dt_s;
-    const Eigen::Vector3d expected = first.world_from_imu.conjugate() *
-                                     Eigen::Vector3d(0.0, 0.0, -gravity_m_s2);
-    if ((force - expected).norm() < kMaxFirstForceError) continue;
-    for (size_t i = k > 0 ? k - 1 : 0; i < std::min(num_links, k + 2); ++i) {
-      if (problem.links[i].has_wheel) suspects.push_back(i);
+    const std::optional<double> jump = FindJump(problem, k, gravity_m_s2);
+    if (jump) {
+      offset += *jump;
+      for (size_t i = k > 0 ? k - 1 : 0; i < std::min(num_links, k + 2); ++i) {
+        is_suspect[i] = true;
+      }
+    }
+    // At rest wheels are right, and across a hole nothing is known.
+    if (!link.has_imu || !link.has_wheel ||
+        link.standstill == StandstillKind::kAtRest) {
+      offset = 0.0;
+    }
+    offsets[k] = offset;
+  }
+  std::vector<double> sorted = offsets;
+  const double usual_offset = UpperMedian(&sorted);
+  std::vector<size_t> suspects;
+  for (size_t k = 0; k < num_links; ++k) {
+    if (problem.links[k].has_wheel &&
+        (is_suspect[k] ||
+         std::abs(offsets[k] - usual_offset) > kMaxFirstSpeedError)) {
+      suspects.push_back(k);
     }
   }
-  std::sort(suspects.begin(), suspects.end());
-  suspects.erase(std::unique(suspects.begin(), suspects.end()), suspects.end());
   return suspects;
 }
 

@@ -10,7 +10,8 @@ namespace adasfm {
 
 // Links with grossly wrong wheels, which would pull the first solution far off,
 // in ascending order: those whose first speeds leave a force that is not
-// gravity, and their neighbours.
+// gravity, their neighbours, and stretches between two such jumps whose speeds
+// are off those of most links by what the jumps add up to.
 std::vector<size_t> FindSuspectWheels(const OdometryFusionProblem& problem,
                                       double gravity_m_s2);
 

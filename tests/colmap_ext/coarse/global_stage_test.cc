@@ -261,6 +261,10 @@ TEST(RunGlobalStageTest, CorrectsTheMountOrWarnsOfTheContradiction) {
   warnings = ListGlobalWarnings(scene, corrected);
   ASSERT_EQ(warnings.size(), 1);
   EXPECT_NE(warnings[0].find("mount"), std::string::npos);
+  // A turn that the direction of driving explains is no reason for advice.
+  GlobalStageResult uncertain = corrected;
+  uncertain.poses.camera_mount.sigma_rad = 0.4 * mount.turn_rad.norm();
+  EXPECT_TRUE(ListGlobalWarnings(scene, uncertain).empty());
 }
 
 void ScaleFocalLength(double ratio, SceneData* scene) {
