@@ -9,6 +9,7 @@
 
 #include "core/relative_pose_prior.h"
 #include "core/rigid3d.h"
+#include "core/so3.h"
 #include "core/types.h"
 
 namespace adasfm {
@@ -22,7 +23,7 @@ struct RigCamera {
   std::optional<Rigid3d> cam_from_rig;
   // 1 sigma of its error, which all frames share, per axis: a good calibration
   // of two cameras.
-  double rotation_sigma_rad = 1e-3;
+  double rotation_sigma_rad = DegToRad(0.05);
   double translation_sigma_m = 2e-3;
 };
 

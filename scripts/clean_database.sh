@@ -8,13 +8,14 @@
 #   scripts/clean_database.sh DATABASE CLEANED [SENSORS]
 #
 #   DATABASE   matched and verified, by any COLMAP from 3.6 on
-#   CLEANED    the copy to make; CLEANED.coarse becomes the coarse model
+#   CLEANED    the copy to make; CLEANED.coarse becomes the coarse model, and
+#              CLEANED.options what COLMAP's mapper has to be told, if anything
 #   SENSORS    folder with imu.csv, wheel.csv, times.csv and sensors.yaml;
 #              leave it out when there are none
 #
 # Environment: COLMAP, our executable (default: colmap of the PATH).
 set -euo pipefail
-if [ $# -lt 2 ]; then sed -n '3,16s/^# \{0,1\}//p' "$0" >&2; exit 1; fi
+if [ $# -lt 2 ]; then sed -n '3,17s/^# \{0,1\}//p' "$0" >&2; exit 1; fi
 colmap=${COLMAP:-colmap}
 database=$1 cleaned=$2 sensors=${3:-}
 if [ -e "$cleaned" ]; then echo "$cleaned is there already" >&2; exit 1; fi
@@ -49,4 +50,7 @@ mkdir -p "$cleaned.coarse"
   --output_path "$cleaned.coarse" --AdaSfmGlobal.write_pose_priors "$priors"
 
 # Joins that vision cannot measure: COLMAP's mappers have no sensors for them.
-"$(dirname "${BASH_SOURCE[0]}")/drop_weak_joins.py" "$cleaned"
+scripts=$(dirname "${BASH_SOURCE[0]}")
+"$scripts/drop_weak_joins.py" "$cleaned"
+"$scripts/mapper_start.py" "$cleaned" "$cleaned.coarse/summary.json" \
+  > "$cleaned.options"

@@ -9,6 +9,7 @@
 #include "colmap_ext/bundle_adjustment/balance_priors.h"
 #include "colmap_ext/bundle_adjustment/bundle_adjustment.h"
 #include "colmap_ext/bundle_adjustment/find_focal_length_error.h"
+#include "colmap_ext/coarse/mapper_start.h"
 #include "colmap_ext/coarse/pair_agreement.h"
 #include "colmap_ext/host/colmap.h"
 #include "colmap_ext/scene/align_to_positions.h"
@@ -98,6 +99,8 @@ struct CoarseModel {
   int num_images_without_points = 0;
   // Of the verified pairs with the poses; measured by the stage.
   PairAgreement pair_agreement;
+  // Of the refined pairs; found by the stage.
+  std::optional<MapperStart> mapper_start;
   // One per round; the poses before a failed round are kept.
   std::vector<PriorBundleAdjustmentSummary> rounds;
 };

@@ -73,6 +73,15 @@ std::string DescribeSplitJoin(const SceneData& scene,
   return text.str();
 }
 
+Json MapperStartJson(const std::optional<MapperStart>& start) {
+  if (!start) return nullptr;
+  return {{"image_id1", start->pair.image_id1},
+          {"image_id2", start->pair.image_id2},
+          {"matches", start->num_matches},
+          {"parallax_deg", RadToDeg(start->parallax_rad)},
+          {"must_be_told", start->must_be_told}};
+}
+
 Json ModelJson(const SceneData& scene, const CoarseComponent& component,
                const CoarseModel& model) {
   const FocalLengthError focal =
@@ -114,6 +123,7 @@ Json ModelJson(const SceneData& scene, const CoarseComponent& component,
           {"least_pair_agreement", model.pair_agreement.least_image_share},
           {"rotation_optimality", component.sdp_optimality},
           {"unverified_joins", JoinsJson(scene, component.unverified_joins)},
+          {"mapper_start", MapperStartJson(model.mapper_start)},
           {"adjustments", rounds}};
 }
 

@@ -88,6 +88,15 @@ std::vector<std::vector<const ScenePair*>> SortPairs(
   return pairs;
 }
 
+void Append(MatchRefinementReport* report, MatchRefinementReport* total) {
+  std::move(report->pairs.begin(), report->pairs.end(),
+            std::back_inserter(total->pairs));
+  total->num_removed_pairs += report->num_removed_pairs;
+  total->num_skipped_pairs += report->num_skipped_pairs;
+  total->num_candidates += report->num_candidates;
+  total->num_kept += report->num_kept;
+}
+
 // The refined pairs as new rows and removals.
 void CollectGeometries(GlobalStageResult* result) {
   for (RefinedPair& pair : result->refinement.pairs) {
@@ -125,12 +134,7 @@ void RefineRawMatches(const MatchRefinementOptions& options,
     }
     MatchRefinementReport report =
         RefineMatches(options, cams_from_world, bearings, candidates);
-    std::move(report.pairs.begin(), report.pairs.end(),
-              std::back_inserter(total->pairs));
-    total->num_removed_pairs += report.num_removed_pairs;
-    total->num_skipped_pairs += report.num_skipped_pairs;
-    total->num_candidates += report.num_candidates;
-    total->num_kept += report.num_kept;
+    Append(&report, total);
   }
 }
 
@@ -156,13 +160,16 @@ void RefineStageMatches(const GlobalStageOptions& options,
       SortPairs(scene, result);
   for (size_t i = 0; i < result->models.size(); ++i) {
     const colmap::Reconstruction& model = result->models[i].reconstruction;
+    MatchRefinementReport report;
     std::map<image_t, std::vector<Bearing>> refined;
     if (result->models[i].cameras_refined) {
       refined = ComputeModelBearings(model, options.num_threads);
     }
     RefineRawMatches(FitToNoise(options.refinement, model), source,
                      CamsFromWorld(model), refined.empty() ? bearings : refined,
-                     pairs[i], &result->refinement);
+                     pairs[i], &report);
+    result->models[i].mapper_start = FindMapperStart(report.pairs);
+    Append(&report, &result->refinement);
   }
   CollectGeometries(result);
 }

@@ -32,9 +32,9 @@ void MeasurePairAgreements(
 // Step 8 of the coarse global stage: RefineRawMatches of the pairs within every
 // model of the result, under the model's poses and, where its adjustment has
 // refined them, its cameras (else the bearings of the scene). Fills the
-// result's refinement (its pairs become geometries), geometries and
-// removed_pairs; pairs that the view graph
-// refuted and pairs between two models are removed ones.
+// result's refinement (its pairs become geometries), geometries, removed_pairs
+// and every model's mapper_start; pairs that the view graph refuted and pairs
+// between two models are removed ones.
 void RefineStageMatches(const GlobalStageOptions& options,
                         const SceneData& scene, const RawMatchSource& source,
                         const std::map<image_t, std::vector<Bearing>>& bearings,

@@ -2,10 +2,12 @@
 #include "global/structure/match_refinement.h"
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 #include <set>
 #include <utility>
 
+#include "core/median.h"
 #include "core/option_checker.h"
 #include "core/parallel.h"
 #include "global/view_graph/epipolar.h"
@@ -84,6 +86,22 @@ std::vector<FeatureMatch> KeepBestPerKeypoint(
   return kept;
 }
 
+double MedianParallax(const Eigen::Quaterniond& cam2_from_cam1,
+                      const std::vector<Bearing>& bearings1,
+                      const std::vector<Bearing>& bearings2,
+                      const std::vector<FeatureMatch>& matches) {
+  const Eigen::Matrix3d rotation = cam2_from_cam1.toRotationMatrix();
+  std::vector<double> angles;
+  angles.reserve(matches.size());
+  for (const FeatureMatch& match : matches) {
+    const Eigen::Vector3d ray1 =
+        rotation * bearings1.at(match.point2D_idx1).direction;
+    const Eigen::Vector3d& ray2 = bearings2.at(match.point2D_idx2).direction;
+    angles.push_back(std::atan2(ray1.cross(ray2).norm(), ray1.dot(ray2)));
+  }
+  return UpperMedian(&angles);
+}
+
 void RefinePair(const MatchRefinementOptions& options,
                 const std::vector<Bearing>& bearings1,
                 const std::vector<Bearing>& bearings2,
@@ -100,6 +118,8 @@ void RefinePair(const MatchRefinementOptions& options,
                          bearings1, bearings2, candidates));
   pair->removed =
       static_cast<int>(pair->matches.size()) < options.min_num_matches;
+  pair->median_parallax_rad = MedianParallax(
+      pair->cam2_from_cam1.rotation, bearings1, bearings2, pair->matches);
 }
 
 }  // namespace

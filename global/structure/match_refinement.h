@@ -27,6 +27,8 @@ struct RefinedPair {
   // Of the global poses; the translation has their unit.
   Rigid3d cam2_from_cam1;
   std::vector<FeatureMatch> matches;  // sorted
+  // Angle between the rays of a match, median of all.
+  double median_parallax_rad = 0.0;
   int num_candidates = 0;
   bool removed = false;
 };

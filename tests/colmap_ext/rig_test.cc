@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <cstring>
+#include <filesystem>
 
 #include "colmap_ext/database/prior_tables.h"
 #include "colmap_ext/database/rig_table.h"
@@ -17,13 +18,12 @@
 namespace adasfm {
 namespace {
 
-constexpr int kNumFrames = 40;
-
 class RigTest : public CommandLineTest {
  protected:
-  void Synthesize() {
+  void Synthesize(int num_frames) {
+    num_frames_ = num_frames;
     Run run =
-        Call("adasfm_synthesizer --num_images " + std::to_string(kNumFrames) +
+        Call("adasfm_synthesizer --num_images " + std::to_string(num_frames) +
              " --stereo_baseline 0.5 --num_neighbors 4 --seed 3 "
              "--output_path " +
              folder_.Path());
@@ -31,36 +31,53 @@ class RigTest : public CommandLineTest {
   }
 
   void Import(const std::string& logs) {
-    Run run = Call("adasfm_prior_importer --database_path " + Database() +
+    Run run = Call("adasfm_prior_importer --database_path " + database_ +
                    " --image_times_path " + folder_.File("times.csv") +
                    " --sensors_path " + folder_.File("sensors.yaml") + logs);
     ASSERT_EQ(run.ExitCode(), 0) << run.err;
   }
 
-  void Reconstruct() {
-    Run run = Call("adasfm_global --database_path " + Database() +
-                   " --output_path " + folder_.File("coarse"));
+  void Reconstruct(const std::string& output = "model") {
+    coarse_ = folder_.File(output) + "/global/0";
+    const std::string sparse = folder_.File(output) + "/sparse";
+    Run run = Call("adasfm_global --database_path " + database_ +
+                   " --output_path " + folder_.File(output) + "/global");
     ASSERT_EQ(run.ExitCode(), 0) << run.err;
-    run = Call("adasfm_mapper --database_path " + Database() +
-               " --input_path " + folder_.File("coarse/0") + " --output_path " +
-               folder_.File("sparse"));
+    run = Call("adasfm_mapper --database_path " + database_ + " --input_path " +
+               coarse_ + " --output_path " + sparse);
     ASSERT_EQ(run.ExitCode(), 0) << run.err;
-    model_ = *ReadModel(folder_.File("sparse/0"));
-    ASSERT_EQ(model_.NumRegImages(), 2 * kNumFrames);
+    sparse_ = sparse + "/0";
+    model_ = *ReadModel(sparse_);
+    ASSERT_EQ(model_.NumRegImages(), 2 * num_frames_);
   }
 
-  // Image k of cam0 and k + kNumFrames of cam1 are a frame: their relative pose
-  // is one and the same.
+  // Image k of cam0 and k + num_frames_ of cam1 are a frame: their relative
+  // pose is one and the same.
   Rigid3d Mount(image_t image_id) const {
     return ComputeCam2FromCam1(
         CamFromWorld(model_.Image(image_id)),
-        CamFromWorld(model_.Image(image_id + kNumFrames)));
+        CamFromWorld(model_.Image(image_id + num_frames_)));
   }
   void ExpectRigidFrames() const {
-    for (image_t image_id = 2; image_id <= kNumFrames; ++image_id) {
+    for (image_t image_id = 2; image_id <= num_frames_; ++image_id) {
       EXPECT_LT((Mount(image_id).ToMatrix() - Mount(1).ToMatrix()).norm(),
                 1e-9);
     }
+  }
+
+  // The second camera's pose of the calibration, as COLMAP writes it.
+  std::string SensorFromRig() {
+    SqliteConnection database(database_, SqliteConnection::Mode::kRead);
+    SqliteStatement statement(
+        &database,
+        "SELECT qvec, tvec FROM adasfm_rig_cameras WHERE camera_id = 2");
+    EXPECT_TRUE(statement.Step());
+    std::string bytes;
+    for (int column : {0, 1}) {
+      bytes.append(static_cast<const char*>(statement.Blob(column)),
+                   statement.NumBytes(column));
+    }
+    return bytes;
   }
 
   // How many times too long the way from the first camera to each other one is.
@@ -76,7 +93,7 @@ class RigTest : public CommandLineTest {
     };
     double sum = 0.0;
     double sum_of_truth = 0.0;
-    for (image_t image_id = 2; image_id <= kNumFrames; ++image_id) {
+    for (image_t image_id = 2; image_id <= num_frames_; ++image_id) {
       sum += way(CamFromWorld(model_.Image(1)),
                  CamFromWorld(model_.Image(image_id)));
       sum_of_truth += way(true_pose(1), true_pose(image_id));
@@ -84,13 +101,15 @@ class RigTest : public CommandLineTest {
     return sum / sum_of_truth;
   }
 
-  std::string Database() const { return folder_.File("database.db"); }
-
+  std::string database_ = folder_.File("database.db");
+  int num_frames_ = 0;
+  std::string coarse_;
+  std::string sparse_;
   colmap::Reconstruction model_;
 };
 
 TEST_F(RigTest, TheBaselineAloneGivesMetres) {
-  Synthesize();
+  Synthesize(40);
   Import("");
   Reconstruct();
   ExpectRigidFrames();
@@ -98,23 +117,23 @@ TEST_F(RigTest, TheBaselineAloneGivesMetres) {
   // The baseline's 2 mm of 0.5 m are 0.4 %, vision adds some.
   EXPECT_NEAR(Scale(), 1.0, 0.02);
   // COLMAP 3.12 and later read the rig: one, of two cameras.
-  const std::string rigs = ReadBytes(folder_.File("sparse/0/rigs.bin"));
+  const std::string rigs = ReadBytes(sparse_ + "/rigs.bin");
   ASSERT_EQ(rigs.size(), 8u + 4 + 4 + 8 + 8 + 1 + 7 * 8);
-  const std::string frames = ReadBytes(folder_.File("sparse/0/frames.bin"));
+  const std::string frames = ReadBytes(sparse_ + "/frames.bin");
   uint64_t num_frames = 0;
   ASSERT_GE(frames.size(), sizeof(num_frames));
   std::memcpy(&num_frames, frames.data(), sizeof(num_frames));
-  EXPECT_EQ(num_frames, kNumFrames);
+  EXPECT_EQ(num_frames, num_frames_);
 }
 
 TEST_F(RigTest, LogsMoveTheFrames) {
-  Synthesize();
+  Synthesize(40);
   Import(" --imu_path " + folder_.File("imu.csv") + " --wheel_path " +
          folder_.File("wheel.csv"));
-  const StatusOr<LoadedPriorTables> loaded = ReadPriorTables(Database());
+  const StatusOr<LoadedPriorTables> loaded = ReadPriorTables(database_);
   ASSERT_TRUE(loaded.ok()) << loaded.status().message();
-  EXPECT_EQ(loaded->tables.image_times.size(), 2 * kNumFrames);
-  EXPECT_EQ(loaded->tables.priors.size(), kNumFrames - 1);
+  EXPECT_EQ(loaded->tables.image_times.size(), 2 * num_frames_);
+  EXPECT_EQ(loaded->tables.priors.size(), num_frames_ - 1);
   for (const RelativePosePrior& prior : loaded->tables.priors) {
     EXPECT_EQ(prior.image_id2, prior.image_id1 + 1);
   }
@@ -123,23 +142,61 @@ TEST_F(RigTest, LogsMoveTheFrames) {
   EXPECT_NEAR(Scale(), 1.0, 0.01);
 }
 
+// Where a database has no rigs, the calibration brings it; COLMAP 3.12 and
+// later have it in tables of their own.
+TEST_F(RigTest, AllFormsGiveTheSameModels) {
+  Synthesize(12);
+  const std::string world = database_;
+  std::string pose;
+  std::string coarse;
+  std::map<image_t, Rigid3d> expected_poses;
+  for (const std::string& form : DatabaseForms()) {
+    SCOPED_TRACE("COLMAP " + form);
+    database_ = folder_.File("form.db");
+    std::filesystem::copy_file(
+        world, database_, std::filesystem::copy_options::overwrite_existing);
+    ReshapeDatabase(database_, form);
+    if (SqliteConnection(database_, SqliteConnection::Mode::kRead)
+            .HasTable("rigs")) {
+      ASSERT_FALSE(pose.empty());
+      MakeStereoRig(database_, num_frames_, pose);
+    } else {
+      Import("");
+    }
+    ASSERT_NO_FATAL_FAILURE(Reconstruct("model-" + form));
+    ExpectRigidFrames();
+    EXPECT_TRUE(std::filesystem::exists(sparse_ + "/rigs.bin"));
+    const std::map<image_t, Rigid3d> poses = CamsFromWorld(model_);
+    if (expected_poses.empty()) {
+      pose = SensorFromRig();
+      coarse = coarse_;
+      expected_poses = poses;
+    }
+    for (const std::string file :
+         {"cameras.bin", "images.bin", "points3D.bin"}) {
+      EXPECT_EQ(ReadBytes(coarse_ + "/" + file), ReadBytes(coarse + "/" + file))
+          << file;
+    }
+    for (const auto& [image_id, expected] : expected_poses) {
+      const Rigid3d& found = poses.at(image_id);
+      EXPECT_LT((found.translation - expected.translation).norm(), 1e-9);
+      EXPECT_LT(found.rotation.angularDistance(expected.rotation), 1e-9);
+    }
+  }
+}
+
 // The host's own rig, of which only the frames are known.
 TEST_F(RigTest, AnUnknownMountIsEstimated) {
-  Synthesize();
-  ReshapeDatabase(Database(), "4.2");
-  SqliteConnection(Database(), SqliteConnection::Mode::kWrite)
-      .Execute(
-          "INSERT INTO rig_sensors VALUES (1, 2, 0, NULL);"
-          "UPDATE frame_data SET frame_id = data_id - 40 WHERE data_id > 40;"
-          "DELETE FROM frames WHERE frame_id > 40;"
-          "DELETE FROM rigs WHERE rig_id = 2;");
+  Synthesize(40);
+  ReshapeDatabase(database_, "4.2");
+  MakeStereoRig(database_, num_frames_, "");
   Reconstruct();
   ExpectRigidFrames();
   const CameraRigs rigs = [&] {
-    SqliteConnection database(Database(), SqliteConnection::Mode::kRead);
+    SqliteConnection database(database_, SqliteConnection::Mode::kRead);
     return ReadCameraRigs(&database);
   }();
-  EXPECT_EQ(rigs.images.size(), 2 * kNumFrames);
+  EXPECT_EQ(rigs.images.size(), 2 * num_frames_);
   // In the truth the second camera is to the right, turned by half a degree.
   EXPECT_NEAR(Mount(1).translation.normalized().x(), -1.0, 0.01);
   EXPECT_LT(Eigen::AngleAxisd(Mount(1).rotation).angle(), 0.015);

@@ -2,6 +2,7 @@
 """Tests of scripts/clean_database.sh and scripts/drop_weak_joins.py.
 ADASFM_LAUNCHER names our `colmap`."""
 
+import json
 import os
 import sqlite3
 import subprocess
@@ -14,6 +15,7 @@ SCRIPTS = os.path.join(os.path.dirname(os.path.abspath(__file__)), '..', '..',
 sys.path.insert(0, SCRIPTS)
 
 from drop_weak_joins import MAX_NUM_IMAGES, find_weak_joins  # noqa: E402
+from mapper_start import count_parts, options_of  # noqa: E402
 
 
 def sequence(first, last, num_matches=100):
@@ -45,6 +47,24 @@ class WeakJoinsTest(unittest.TestCase):
     pairs[pair(20, 30)] = 20
     self.assertEqual(find_weak_joins(pairs, 150, 10), set())
     self.assertEqual(find_weak_joins(sequence(1, 50, 40), 150, 10), set())
+
+
+class MapperStartTest(unittest.TestCase):
+
+  def test_parts_that_the_mapper_keeps_count(self):
+    self.assertEqual(count_parts(sequence(1, 20)), 1)
+    pairs = {**sequence(1, 20), **sequence(30, 60), **sequence(70, 75)}
+    self.assertEqual(count_parts(pairs), 2)
+    pairs[pair(20, 30)] = 20
+    self.assertEqual(count_parts(pairs), 1)
+
+  def test_the_pair_is_named_with_half_of_its_angle(self):
+    start = {'image_id1': 22, 'image_id2': 30, 'parallax_deg': 3.0}
+    self.assertEqual(
+        options_of(start),
+        '--Mapper.init_image_id1 22 --Mapper.init_image_id2 30 '
+        '--Mapper.init_max_forward_motion 1 --Mapper.init_min_tri_angle 1.5 '
+        '--Mapper.multiple_models 0')
 
 
 class CleanDatabaseTest(unittest.TestCase):
@@ -80,6 +100,12 @@ class CleanDatabaseTest(unittest.TestCase):
       self.assertTrue(clean < raw)
       self.assertGreater(len(clean), 0.85 * len(raw))
       self.assertTrue(os.path.isfile(cleaned + '.coarse/0/images.bin'))
+      # COLMAP's mapper is told where to begin, or finds that itself.
+      with open(cleaned + '.coarse/summary.json') as file:
+        start = json.load(file)['models'][0]['mapper_start']
+      with open(cleaned + '.options') as file:
+        self.assertEqual(bool(file.read()), start['must_be_told'])
+      self.assertGreaterEqual(start['matches'], 100)
       # Not twice.
       again = subprocess.run(
           [os.path.join(SCRIPTS, 'clean_database.sh'), database, cleaned],

@@ -17,7 +17,7 @@ import subprocess
 # The product: what a figure can depend on.
 PRODUCT = ('CMakeLists.txt', 'cmake', 'core', 'sensors', 'global', 'partition',
            'synthetic', 'colmap_ext', 'scripts/clean_database.sh',
-           'scripts/drop_weak_joins.py')
+           'scripts/drop_weak_joins.py', 'scripts/mapper_start.py')
 
 
 class MixedVersions(Exception):

@@ -49,6 +49,10 @@ def run_mapper(command, executable, folder, source, args):
     group = 'GlobalMapper' if command == 'global_mapper' else 'Mapper'
     if has_option(executable, command, group + '.ba_refine_focal_length'):
       arguments += fixed_intrinsics(group + '.ba_')
+  told = os.path.join(folder, 'cleaned.db.options')
+  if command == 'mapper' and os.path.isfile(told):
+    with open(told) as file:
+      arguments += file.read().split()
   usage = run(arguments, os.path.join(folder, 'run.log'), args.timeout)
   return output, {command: usage}
 

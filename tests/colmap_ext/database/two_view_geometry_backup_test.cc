@@ -10,6 +10,7 @@
 #include "colmap_ext/host/colmap.h"
 #include "colmap_ext/scene/scene_data.h"
 #include "core/so3.h"
+#include "tests/testing/colmap_ext/reshape_database.h"
 #include "tests/testing/colmap_ext/temporary_folder.h"
 
 namespace adasfm {
@@ -66,23 +67,6 @@ class TwoViewGeometryBackupTest : public testing::Test {
     std::filesystem::copy_file(path_, folder_.File(name));
   }
 
-  // What COLMAP 4 does to a file of COLMAP 3.8 when it opens it.
-  void MigrateToColmap4() {
-    Execute(
-        "ALTER TABLE two_view_geometries ADD COLUMN camera1 BLOB;"
-        "ALTER TABLE two_view_geometries ADD COLUMN camera2 BLOB;"
-        "ALTER TABLE descriptors ADD COLUMN type INTEGER NOT NULL DEFAULT 0;"
-        "UPDATE two_view_geometries SET qvec = NULL, tvec = NULL WHERE "
-        "hex(qvec) IN ('', " +
-        kZeroPose + ", " + kNegativeZeroPose +
-        ") OR (hex(qvec) = " + kIdentity + " AND tvec = zeroblob(24));");
-    for (const std::string matrix : {"F", "E", "H"}) {
-      Execute("UPDATE two_view_geometries SET " + matrix + " = NULL WHERE " +
-              matrix + " IN (X'', zeroblob(72));");
-    }
-    Execute("PRAGMA user_version = 4020100;");
-  }
-
   // Poses that mean "none" in COLMAP 3, and matrices, on pairs of every kind.
   void WriteMissingPoses() {
     const std::string every =
@@ -100,8 +84,7 @@ class TwoViewGeometryBackupTest : public testing::Test {
         every + "3);");
   }
 
-  // As hexadecimal text: zeros, as COLMAP 3.8 writes them, and w = 1.
-  const std::string kZeroPose = "'" + std::string(64, '0') + "'";
+  // As hexadecimal text.
   const std::string kNegativeZeroPose = "'0000000000000000" +
                                         std::string("0000000000000080") +
                                         "00000000000000800000000000000080'";
@@ -211,13 +194,13 @@ TEST_F(TwoViewGeometryBackupTest, RestoresAfterColmap4OpenedTheFile) {
   CopyTo("migrated.db");
   const std::string written_by_us = path_;
   path_ = folder_.File("migrated.db");
-  MigrateToColmap4();
+  MigrateToColmap4(path_);
   const std::string expected = Dump("two_view_geometries");
   ASSERT_NE(expected.find("|NULL"), std::string::npos);
 
   path_ = written_by_us;
   ASSERT_TRUE(RewriteTwoViewGeometries(path_, rows_, removed_).ok());
-  MigrateToColmap4();
+  MigrateToColmap4(path_);
   const StatusOr<RestoreSummary> restored = RestoreTwoViewGeometries(path_);
   ASSERT_TRUE(restored.ok()) << restored.status().message();
   EXPECT_EQ(restored->num_restored, rows_.size() + removed_.size());
@@ -230,7 +213,7 @@ TEST_F(TwoViewGeometryBackupTest, RewritesAgainAfterColmap4OpenedTheFile) {
   const std::string expected_pairs = Dump("two_view_geometries");
   ASSERT_TRUE(RewriteTwoViewGeometries(path_, rows_, removed_).ok());
   const std::string once = Dump("two_view_geometries");
-  MigrateToColmap4();
+  MigrateToColmap4(path_);
   ASSERT_TRUE(RewriteTwoViewGeometries(path_, rows_, removed_).ok());
   EXPECT_EQ(Dump("two_view_geometries"), once);
   EXPECT_EQ(RestoreTwoViewGeometries(path_)->num_restored,
@@ -250,7 +233,7 @@ TEST_F(TwoViewGeometryBackupTest, RestoresWhatVersion010Wrote) {
 }
 
 TEST_F(TwoViewGeometryBackupTest, KeepsColumnsOfANewerColmap) {
-  MigrateToColmap4();
+  MigrateToColmap4(path_);
   Execute("UPDATE two_view_geometries SET camera1 = X'0102', camera2 = X'03';");
   ASSERT_TRUE(RewriteTwoViewGeometries(path_, rows_, removed_).ok());
   const auto count = [this](const std::string& where) {

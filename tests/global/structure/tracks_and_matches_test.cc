@@ -162,6 +162,22 @@ TEST(RefineMatches, RecoversTrueMatchesAndDropsFalseOnes) {
     EXPECT_GT(num_true_kept, 0.97 * num_true);
     EXPECT_GT(num_true_kept, 0.96 * num_kept);
     EXPECT_EQ(report.num_removed_pairs, 0);
+    // Half of a pair's points are seen under a larger angle.
+    for (const RefinedPair& pair : report.pairs) {
+      const auto centre = [&](image_t image_id) {
+        return scene.cams_from_world.at(image_id).TargetOriginInSource();
+      };
+      int num_larger = 0;
+      for (const FeatureMatch& match : pair.matches) {
+        const Eigen::Vector3d& point = scene.landmarks[match.point2D_idx1];
+        const Eigen::Vector3d ray1 = point - centre(pair.pair.image_id1);
+        const Eigen::Vector3d ray2 = point - centre(pair.pair.image_id2);
+        num_larger += std::atan2(ray1.cross(ray2).norm(), ray1.dot(ray2)) >
+                      pair.median_parallax_rad;
+      }
+      EXPECT_NEAR(num_larger, 0.5 * pair.matches.size(),
+                  0.1 * pair.matches.size());
+    }
   }
 }
 

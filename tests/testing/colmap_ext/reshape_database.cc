@@ -61,6 +61,24 @@ void ClearPoses(const std::string& form, size_t index,
   }
 }
 
+std::string Repeat(const std::string& text, int count) {
+  std::string result;
+  for (int i = 0; i < count; ++i) result += text;
+  return result;
+}
+
+void AddMissingColumns(const std::string& table,
+                       const std::vector<std::string>& definitions,
+                       SqliteConnection* database) {
+  const std::vector<std::string> columns = database->Columns(table);
+  for (const std::string& definition : definitions) {
+    const std::string name = definition.substr(0, definition.find(' '));
+    if (std::find(columns.begin(), columns.end(), name) == columns.end()) {
+      database->Execute("ALTER TABLE " + table + " ADD COLUMN " + definition);
+    }
+  }
+}
+
 }  // namespace
 
 const std::vector<std::string>& DatabaseForms() {
@@ -111,6 +129,47 @@ void ReshapeDatabase(const std::string& path, const std::string& form) {
                         : since("3.7") ? "3800"
                                        : "3600";
   database.Execute(std::string("PRAGMA user_version = ") + version);
+}
+
+void MakeStereoRig(const std::string& path, int num_frames,
+                   const std::string& sensor_from_rig) {
+  SqliteConnection database(path, SqliteConnection::Mode::kWrite);
+  const std::string n = std::to_string(num_frames);
+  database.Execute("UPDATE frame_data SET frame_id = frame_id - " + n +
+                   " WHERE data_id > " + n +
+                   ";DELETE FROM frames WHERE frame_id NOT IN "
+                   "(SELECT frame_id FROM frame_data);"
+                   "DELETE FROM rigs WHERE rig_id = 2;");
+  SqliteStatement statement(&database,
+                            "INSERT INTO rig_sensors VALUES (1, 2, 0, ?)");
+  if (!sensor_from_rig.empty()) {
+    statement.BindBlob(1, sensor_from_rig.data(), sensor_from_rig.size());
+  }
+  statement.Step();
+}
+
+void MigrateToColmap4(const std::string& path) {
+  SqliteConnection database(path, SqliteConnection::Mode::kWrite);
+  AddMissingColumns("two_view_geometries",
+                    {"qvec BLOB", "tvec BLOB", "camera1 BLOB", "camera2 BLOB"},
+                    &database);
+  AddMissingColumns("descriptors", {"type INTEGER NOT NULL DEFAULT 0"},
+                    &database);
+  if (!database.HasTable("frames")) AddFrames(0, &database);
+  // Doubles as hexadecimal text.
+  const std::string zero = "0000000000000000";
+  const std::string negative_zero = "0000000000000080";
+  database.Execute(
+      "UPDATE two_view_geometries SET qvec = NULL, tvec = NULL WHERE "
+      "hex(qvec) IN ('', '" +
+      Repeat(zero, 4) + "', '" + zero + Repeat(negative_zero, 3) +
+      "') OR (hex(qvec) = '000000000000F03F" + Repeat(zero, 3) +
+      "' AND tvec = zeroblob(24));");
+  for (const std::string matrix : {"F", "E", "H"}) {
+    database.Execute("UPDATE two_view_geometries SET " + matrix +
+                     " = NULL WHERE " + matrix + " IN (X'', zeroblob(72));");
+  }
+  database.Execute("PRAGMA user_version = 4020100;");
 }
 
 }  // namespace adasfm

@@ -17,4 +17,14 @@ const std::vector<std::string>& DatabaseForms();
 // SqliteError.
 void ReshapeDatabase(const std::string& path, const std::string& form);
 
+// Makes cameras 1 and 2 of a database of COLMAP 3.12 or later the rig of
+// rig_configurator: images k and k + num_frames become one frame.
+// sensor_from_rig is camera 2's pose as COLMAP writes it; empty when unknown.
+void MakeStereoRig(const std::string& path, int num_frames,
+                   const std::string& sensor_from_rig);
+
+// What COLMAP 4.2 does to an older file when it opens it: columns and tables
+// that are missing, NULL for poses and matrices that mean "none".
+void MigrateToColmap4(const std::string& path);
+
 }  // namespace adasfm
