@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <optional>
 
 #include "colmap_ext/host/pose_conversion.h"
@@ -11,11 +12,32 @@
 namespace adasfm {
 namespace {
 
-constexpr double kMaxTerm = 25.0;
+// Terms count at most three sigmas, of those stated or of those found when they
+// are larger: beyond that the adjustment's loss takes a term for an outlier
+// (prior_loss_scale in bundle_adjustment.h), which says nothing of the others.
+constexpr double kMaxNumSigmas = 3.0;
+constexpr double kMeanSquareTolerance = 1e-3;
 // Fewer terms of a kind than this are no statistic.
 constexpr int kMinNumTerms = 10;
 
 constexpr std::array<int, kNumPriorTerms> kNumDof = {3, 2, 1, 3};
+
+// Huber's estimate of a scale, with its cap: the mean m of the squares, each at
+// most 3^2 max(1, m). The search begins at the plain mean and only falls, so
+// that errors which most terms share are told in full, and a few large ones,
+// up to one term in nine, are not.
+double ComputeCappedMean(const std::vector<double>& squares, int num_dof) {
+  double mean = std::numeric_limits<double>::infinity();
+  double last = 0.0;
+  do {
+    last = mean;
+    const double cap = kMaxNumSigmas * kMaxNumSigmas * std::max(1.0, last);
+    double sum = 0.0;
+    for (const double square : squares) sum += std::min(square / num_dof, cap);
+    mean = sum / squares.size();
+  } while (mean < (1.0 - kMeanSquareTolerance) * last);
+  return mean;
+}
 
 // The error of one motion by term, in rad and m; a rotation vector for the
 // direction.
@@ -61,7 +83,7 @@ void AddPriorTerm(PriorTerm term, double squared_residual,
   const auto k = static_cast<size_t>(term);
   PriorComponent& component = (*components)[k];
   component.num_residuals += kNumDof[k];
-  component.mean_square += std::min(kMaxTerm * kNumDof[k], squared_residual);
+  component.squares.push_back(squared_residual);
 }
 
 void FinishPriorComponents(PriorComponents* components) {
@@ -70,7 +92,8 @@ void FinishPriorComponents(PriorComponents* components) {
     if (component.num_residuals < kMinNumTerms * kNumDof[k]) {
       component = PriorComponent();
     } else {
-      component.mean_square /= component.num_residuals;
+      component.mean_square = ComputeCappedMean(component.squares, kNumDof[k]);
+      component.squares.clear();
     }
   }
 }

@@ -13,8 +13,12 @@ namespace adasfm {
 struct PriorComponent {
   // 0 for fewer terms than a statistic needs.
   int num_residuals = 0;
-  // Mean of the squared whitened residuals; each term counts at most 25 per
-  // residual, so that a slipping wheel does not speak for all.
+  // Of each term, the squared norm of its whitened residual, until all are
+  // added.
+  std::vector<double> squares;
+  // Mean of the squared whitened residuals without its outliers, so that wheels
+  // which slip for seconds do not speak for all: of residuals beyond three
+  // sigmas, and beyond three times this, as much counts.
   double mean_square = 0.0;
   // The share of the residuals that the adjustment leaves free: honest sigmas
   // give a mean square of this, since poses and shared errors follow the
@@ -39,8 +43,8 @@ inline bool IsTestedMeasurement(const PosePriorEdge& edge) {
   return edge.dt_s >= 0.0 && edge.is_held_by_points;
 }
 
-// Adds a term of this squared whitened residual; mean_square is their sum until
-// all are added.
+// Adds a term of this squared whitened residual; mean_square is known when all
+// are added.
 void AddPriorTerm(PriorTerm term, double squared_residual,
                   PriorComponents* components);
 void FinishPriorComponents(PriorComponents* components);

@@ -15,6 +15,31 @@ namespace {
 
 constexpr PriorSigmaFactors kStated = {1.0, 1.0, 1.0, 1.0};
 
+PriorComponent LengthsOf(int num_honest, double honest, int num_wild) {
+  PriorComponents components;
+  for (int i = 0; i < num_honest; ++i) {
+    AddPriorTerm(PriorTerm::kLength, honest, &components);
+  }
+  for (int i = 0; i < num_wild; ++i) {
+    AddPriorTerm(PriorTerm::kLength, 400.0, &components);
+  }
+  FinishPriorComponents(&components);
+  return components[static_cast<size_t>(PriorTerm::kLength)];
+}
+
+// Lengths that are 20 sigmas off where wheels slip count as three of the sigmas
+// found: m = 0.93 * 0.5 + 0.07 * 9 m.
+TEST(PriorComponents, FewSlipsDoNotSpeakForAllLengths) {
+  EXPECT_NEAR(LengthsOf(93, 0.5, 7).mean_square, 0.93 * 0.5 / 0.37, 0.01);
+  EXPECT_NEAR(LengthsOf(97, 0.5, 3).mean_square, 0.97 * 0.5 + 0.03 * 9.0, 0.01);
+}
+
+// An error that most of them share is told in full, whatever its size.
+TEST(PriorComponents, SharedErrorsAreToldInFull) {
+  EXPECT_NEAR(LengthsOf(100, 25.0, 0).mean_square, 25.0, 1e-9);
+  EXPECT_NEAR(LengthsOf(50, 0.5, 50).mean_square, 200.25, 1e-9);
+}
+
 // Poses that nothing but the priors holds follow a single measurement of each
 // motion wholly, and two by half.
 TEST(PriorComponents, RedundancyIsWhatMeasurementsTestOfEachOther) {
