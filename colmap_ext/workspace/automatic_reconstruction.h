@@ -87,6 +87,7 @@ struct AutomaticReconstructionResult {
 //   4  coarse     coarse global SfM                    coarse/
 //   5  model      partitioned mapping                  sparse/0
 //   6  report     one page to look at                  report.html
+// Pairs are matched as soon as their features are there (early_matcher.h).
 // steps.json records what is done, and with which inputs: the same call again
 // does what is missing, a call with other options starts at the first step that
 // they change. Interruption (core/interruption.h) by `progress` keeps what is
