@@ -111,7 +111,9 @@ StatusOr<std::map<camera_t, RigCamera>> FindRigCameras(
     camera.rig_id = ids->at(reference);
     camera.is_reference = index == reference;
     camera.cam_from_rig =
-        cams_from_imu[index] * cams_from_imu[reference].Inverse();
+        camera.is_reference
+            ? Rigid3d()
+            : cams_from_imu[index] * cams_from_imu[reference].Inverse();
     camera.rotation_sigma_rad = DegToRad(options.rotation_sigma_deg);
     camera.translation_sigma_m = options.translation_sigma_m;
     cameras[camera_id] = camera;
