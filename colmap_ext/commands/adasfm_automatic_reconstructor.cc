@@ -129,8 +129,10 @@ Status RunAdasfmAutomaticReconstructor(int argc, char** argv) {
   command.AddDefault("max_memory_gb", &options.max_memory_gb,
                      "for each of the stages from priors to the model, which "
                      "do not begin when they may take more [GB]; -1: no bound");
-  command.AddDefault("num_threads", &options.num_threads,
-                     "-1: all of the machine's");
+  command.AddDefault(
+      "num_threads", &options.num_threads,
+      "-1: all of the machine's, and pairs are matched while features "
+      "are extracted");
   const Status parsed = command.Parse(argc, argv);
   if (!parsed.ok() || command.HelpShown()) return parsed;
   const Status valid =
