@@ -59,7 +59,7 @@ class RigTest : public CommandLineTest {
         CamFromWorld(model_.Image(image_id + num_frames_)));
   }
   void ExpectRigidFrames() const {
-    for (image_t image_id = 2; image_id <= num_frames_; ++image_id) {
+    for (int image_id = 2; image_id <= num_frames_; ++image_id) {
       EXPECT_LT((Mount(image_id).ToMatrix() - Mount(1).ToMatrix()).norm(),
                 1e-9);
     }
@@ -93,7 +93,7 @@ class RigTest : public CommandLineTest {
     };
     double sum = 0.0;
     double sum_of_truth = 0.0;
-    for (image_t image_id = 2; image_id <= num_frames_; ++image_id) {
+    for (int image_id = 2; image_id <= num_frames_; ++image_id) {
       sum += way(CamFromWorld(model_.Image(1)),
                  CamFromWorld(model_.Image(image_id)));
       sum_of_truth += way(true_pose(1), true_pose(image_id));

@@ -144,7 +144,8 @@ TEST(FilterLoopClosures, AWrongPoseOfATruePlaceIsNoFalseLoop) {
     motion.rotation = turn * motion.rotation;
   }
   FilterLoopClosures(LoopClosureOptions(), problem.odometry, &problem.graph);
-  for (size_t e = 0; e < problem.graph.edges.size(); ++e) {
+  const int num_edges = static_cast<int>(problem.graph.edges.size());
+  for (int e = 0; e < num_edges; ++e) {
     const EdgeRemoval removal = problem.graph.edges[e].removal;
     if (e == loop || e == near) {
       EXPECT_EQ(removal, EdgeRemoval::kOdometryPose);

@@ -104,7 +104,7 @@ TEST(TriangulateTracks, FindsThePointsDespiteWrongObservations) {
     options.fisheye = fisheye;
     const TestScene scene = BuildTestScene(options, 1);
     std::vector<Track> tracks;
-    for (point2D_t k = 0; k < options.num_landmarks; ++k) {
+    for (int k = 0; k < options.num_landmarks; ++k) {
       tracks.emplace_back();
       for (const image_t image_id : scene.graph.images) {
         // Image 4 sees something else.

@@ -90,11 +90,13 @@ const std::vector<std::string>& DatabaseForms() {
 
 void ReshapeDatabase(const std::string& path, const std::string& form) {
   const auto& forms = DatabaseForms();
-  const size_t index =
-      std::find(forms.begin(), forms.end(), form) - forms.begin();
+  const auto index_of = [&forms](const std::string& version) {
+    return static_cast<size_t>(std::find(forms.begin(), forms.end(), version) -
+                               forms.begin());
+  };
+  const size_t index = index_of(form);
   const auto since = [&](const std::string& version) {
-    return index >=
-           std::find(forms.begin(), forms.end(), version) - forms.begin();
+    return index >= index_of(version);
   };
   SqliteConnection database(path, SqliteConnection::Mode::kWrite);
   database.Execute("PRAGMA foreign_keys = OFF;");

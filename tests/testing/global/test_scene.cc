@@ -51,20 +51,21 @@ TestScene BuildTestScene(const TestSceneOptions& options, uint64_t seed) {
           ComputeBearing(camera, pixel));
     }
   }
-  for (image_t i = 1; i <= options.num_images; ++i) {
-    for (image_t j = i + 1;
-         j <= std::min(options.num_images, int(i) + options.max_gap); ++j) {
+  for (int i = 1; i <= options.num_images; ++i) {
+    for (int j = i + 1; j <= std::min(options.num_images, i + options.max_gap);
+         ++j) {
       Rigid3d motion = ComputeCam2FromCam1(scene.cams_from_world.at(i),
                                            scene.cams_from_world.at(j));
       motion.translation.normalize();
       scene.graph.edges.push_back(BuildEdge(ImagePair(i, j), motion));
       std::vector<FeatureMatch>& matches =
           scene.correspondences.matches[ImagePair(i, j)];
-      for (point2D_t k = 0; k < options.num_landmarks; ++k) {
+      for (int k = 0; k < options.num_landmarks; ++k) {
         const bool is_outlier = random.Uniform(0, 1) < options.outlier_ratio;
-        matches.push_back({k, is_outlier ? point2D_t(random.UniformInt(
-                                               0, options.num_landmarks - 1))
-                                         : k});
+        const int other =
+            is_outlier ? random.UniformInt(0, options.num_landmarks - 1) : k;
+        matches.push_back(
+            {static_cast<point2D_t>(k), static_cast<point2D_t>(other)});
       }
     }
   }
@@ -77,7 +78,7 @@ std::vector<ImagePair> BuildRandomPairs(int num_images, int num_chords,
   for (int k = 0; k < num_images; ++k) {
     pairs.insert(ImagePair(k + 1, (k + 1) % num_images + 1));
   }
-  while (pairs.size() < num_images + num_chords) {
+  while (static_cast<int>(pairs.size()) < num_images + num_chords) {
     const std::vector<int> ends = random->Sample(2, num_images);
     pairs.insert(ImagePair(ends[0] + 1, ends[1] + 1));
   }
