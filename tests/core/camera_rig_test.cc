@@ -30,6 +30,8 @@ CameraRigs MakeRigs(int num_frames) {
 TEST(CameraRig, FramesHaveOnePriorForEachFurtherImage) {
   CameraRigs rigs = MakeRigs(3);
   rigs.images.erase(2);  // Without its reference image.
+  rigs.cameras[2].rotation_sigma_rad = 1e-3;
+  rigs.cameras[2].translation_sigma_m = 2e-3;
   const auto leaders = FindFrameLeaders(rigs);
   EXPECT_EQ(leaders.at(1), 1u);
   EXPECT_EQ(leaders.at(2), 102u);
