@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "synthetic/synthetic_world_options.h"
 
+#include <algorithm>
+#include <string>
 #include <utility>
 
 #include "core/option_checker.h"
@@ -9,6 +11,8 @@ namespace adasfm {
 
 bool SyntheticWorldOptions::IsValid(std::string* error) const {
   OptionChecker checker(error);
+  const int max_num_blackouts =
+      num_images / 2 / std::max(1, blackout_num_images);
   checker.AtLeast(2, "num_images", num_images)
       .AtLeast(64, "image_width", image_width)
       .AtLeast(64, "image_height", image_height)
@@ -50,9 +54,10 @@ bool SyntheticWorldOptions::IsValid(std::string* error) const {
       .Within(0.0, 0.5, "wheel_slip_sigma", wheel_slip_sigma)
       .Within(-1e6, 1e6, "gyro_drift", gyro_drift)
       .Within(-1e6, 1e6, "timeshift_cam_imu_s", timeshift_cam_imu_s)
-      .Require(2 * int64_t{num_blackouts} * blackout_num_images <= num_images,
-               "num_blackouts", num_blackouts,
-               "must leave half of the images their texture");
+      .Require(num_blackouts <= max_num_blackouts, "num_blackouts",
+               num_blackouts,
+               "must be at most " + std::to_string(max_num_blackouts) +
+                   ": half of the images keep their texture");
   const std::pair<const char*, double> shares[] = {
       {"outlier_match_ratio", outlier_match_ratio},
       {"moving_keypoint_ratio", moving_keypoint_ratio},
