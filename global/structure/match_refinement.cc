@@ -10,6 +10,7 @@
 #include "core/median.h"
 #include "core/option_checker.h"
 #include "core/parallel.h"
+#include "core/so3.h"
 #include "global/view_graph/epipolar.h"
 
 namespace adasfm {
@@ -94,10 +95,9 @@ double MedianParallax(const Eigen::Quaterniond& cam2_from_cam1,
   std::vector<double> angles;
   angles.reserve(matches.size());
   for (const FeatureMatch& match : matches) {
-    const Eigen::Vector3d ray1 =
-        rotation * bearings1.at(match.point2D_idx1).direction;
-    const Eigen::Vector3d& ray2 = bearings2.at(match.point2D_idx2).direction;
-    angles.push_back(std::atan2(ray1.cross(ray2).norm(), ray1.dot(ray2)));
+    angles.push_back(
+        AngleBetweenRad(rotation * bearings1.at(match.point2D_idx1).direction,
+                        bearings2.at(match.point2D_idx2).direction));
   }
   return UpperMedian(&angles);
 }

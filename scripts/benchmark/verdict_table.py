@@ -277,9 +277,12 @@ def print_summary(rows):
     print('| %s | %s |' % (result, ' | '.join(
         str(sum(low < value <= high for value in ratios))
         for low, high in bounds)))
-  print('\n%d runs, %d without a model, %d wrong' % (
-      len(rows), sum(run.errors is None for run, _ in rows),
-      sum(judgement.wrong for _, judgement in rows)))
+  print('\n%d runs, %d without a model, %d wrong; good ones above %g unspoilt '
+        'limits: %d' % (
+            len(rows), sum(run.errors is None for run, _ in rows),
+            sum(judgement.wrong for _, judgement in rows), MAX_RATIO,
+            sum(run.result == 'good' and (judgement.unspoilt or 0) > MAX_RATIO
+                for run, judgement in rows)))
 
 
 def main():
