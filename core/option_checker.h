@@ -44,6 +44,11 @@ class OptionChecker {
     }
     return *this;
   }
+  // -1 stands for "as the machine allows".
+  OptionChecker& PositiveOrMinusOne(const std::string& name, double value) {
+    return RequireFinite(value > 0.0 || value == -1.0, name, value,
+                         "must be positive, or -1");
+  }
   OptionChecker& AtLeast(double min, const std::string& name, double value) {
     return RequireFinite(value >= min, name, value, "must be at least ", min);
   }

@@ -36,6 +36,7 @@ bool CoarsePoseOptions::IsValid(std::string* error) const {
              .Positive({{"max_rotation_discrepancy_deg",
                          max_rotation_discrepancy_deg}})
              .AtLeast(0, "min_num_inliers", min_num_inliers)
+             .AtLeast(1, "num_rotation_rounds", num_rotation_rounds)
              .Within(0, 1, "min_sequence_ratio", min_sequence_ratio)
              .NotNegative({{"min_known_length_m", min_known_length_m}})
              .AllHold() &&

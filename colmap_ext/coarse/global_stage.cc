@@ -164,8 +164,8 @@ std::string DescribeMatches(const GlobalStageResult& result) {
 bool GlobalStageOptions::IsValid(std::string* error) const {
   return OptionChecker("AdaSfmGlobal", error)
              .Positive("pose_prior_sigma", pose_prior_sigma)
-             .Require(max_memory_gb > 0.0 || max_memory_gb == -1.0,
-                      "max_memory_gb", max_memory_gb, "must be positive, or -1")
+             .PositiveOrMinusOne("max_memory_gb", max_memory_gb)
+             .PositiveOrMinusOne("num_threads", num_threads)
              .AllHold() &&
          focal_lengths.IsValid(error) && two_view.IsValid(error) &&
          poses.IsValid(error) && structure.IsValid(error) &&

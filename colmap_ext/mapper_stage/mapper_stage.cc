@@ -61,8 +61,10 @@ std::string PartCheckpointPath(const std::string& checkpoint_path,
 
 bool MapperStageOptions::IsValid(std::string* error) const {
   return OptionChecker("AdaSfmMapper", error)
-             .Require(max_memory_gb > 0.0 || max_memory_gb == -1.0,
-                      "max_memory_gb", max_memory_gb, "must be positive, or -1")
+             .PositiveOrMinusOne("max_memory_gb", max_memory_gb)
+             .PositiveOrMinusOne("num_threads", num_threads)
+             .PositiveOrMinusOne("max_num_parallel_parts",
+                                 max_num_parallel_parts)
              .AllHold() &&
          partition.IsValid(error) && local.IsValid(error) &&
          align.IsValid(error);

@@ -319,8 +319,7 @@ StatusOr<PriorImport> ImportTrajectory(const PriorImportPaths& paths,
 bool PriorImportOptions::IsValid(std::string* error) const {
   return OptionChecker("AdaSfmPriors", error)
              .AtLeast(1, "max_visual_gap", max_visual_gap)
-             .Require(max_memory_gb > 0.0 || max_memory_gb == -1.0,
-                      "max_memory_gb", max_memory_gb, "must be positive, or -1")
+             .PositiveOrMinusOne("max_memory_gb", max_memory_gb)
              .AllHold() &&
          focal_lengths.IsValid(error) && rig.IsValid(error) &&
          estimation.IsValid(error) && trajectory.IsValid(error) &&

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "colmap_ext/workspace/automatic_reconstruction.h"
 
+#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
-#include <sstream>
 #include <stdexcept>
 
 #include "colmap_ext/coarse/global_report.h"
@@ -18,6 +18,7 @@
 #include "colmap_ext/workspace/open_workspace.h"
 #include "colmap_ext/workspace/prepare_reconstruction.h"
 #include "colmap_ext/workspace/reconstructor.h"
+#include "core/option_checker.h"
 
 namespace adasfm {
 
@@ -160,19 +161,13 @@ Status Reconstructor::ReadVerdict() {
 }
 
 bool AutomaticReconstructionOptions::IsValid(std::string* error) const {
-  if (refine_intrinsics < -1 || refine_intrinsics > 1) {
-    *error = "refine_intrinsics = " + std::to_string(refine_intrinsics) +
-             " must be -1, 0 or 1";
-    return false;
-  }
-  if (!(max_memory_gb > 0.0 || max_memory_gb == -1.0)) {
-    std::ostringstream message;
-    message << "max_memory_gb = " << max_memory_gb
-            << " must be positive, or -1";
-    *error = message.str();
-    return false;
-  }
-  return bag.photos.IsValid(error) && features.IsValid(error) &&
+  return OptionChecker(error)
+             .Require(std::abs(refine_intrinsics) <= 1, "refine_intrinsics",
+                      refine_intrinsics, "must be -1, 0 or 1")
+             .PositiveOrMinusOne("max_memory_gb", max_memory_gb)
+             .PositiveOrMinusOne("num_threads", num_threads)
+             .AllHold() &&
+         bag.photos.IsValid(error) && features.IsValid(error) &&
          pairs.IsValid(error) && priors.IsValid(error) &&
          global.IsValid(error) && map.IsValid(error);
 }

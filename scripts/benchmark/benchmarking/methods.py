@@ -16,11 +16,17 @@ METHODS = ['mapper', 'hierarchical_mapper', 'adasfm', 'adasfm_no_sensors',
 
 # AdaSfM with one step changed: what does that step buy?
 ABLATIONS = {
-    'adasfm_no_candidates': {
-        'mapper': ['--AdaSfmMapper.use_global_candidate', '0']},
-    'adasfm_no_priors_in_adjustment': {
-        'mapper': ['--AdaSfmMapper.use_priors_in_adjustment', '0']},
-}
+    'adasfm_no_' + name: {command: ['--%s.%s' % (group, option), '0']}
+    for name, command, group, option in (
+        ('sdp_start', 'global', 'AdaSfmGlobal', 'use_sdp_start'),
+        ('loop_gating', 'global', 'AdaSfmGlobal', 'use_loop_gating'),
+        ('augmentation', 'global', 'AdaSfmGlobal', 'use_augmentation'),
+        ('refined_translations', 'global', 'AdaSfmGlobal',
+         'refine_translations'),
+        ('refined_positions', 'global', 'AdaSfmGlobal', 'refine_positions'),
+        ('candidates', 'mapper', 'AdaSfmMapper', 'use_global_candidate'),
+        ('priors_in_adjustment', 'mapper', 'AdaSfmMapper',
+         'use_priors_in_adjustment'))}
 # The alignment of parts with one threshold for all, in metres.
 ABLATIONS.update({
     'adasfm_fixed_threshold_%s' % metres: {

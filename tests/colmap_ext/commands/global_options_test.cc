@@ -4,30 +4,24 @@
 #include <gtest/gtest.h>
 
 #include <fstream>
-#include <functional>
 #include <string>
 #include <vector>
 
-#include "core/check_options.h"
+#include "tests/testing/colmap_ext/option_cases.h"
 
 namespace adasfm {
 namespace {
 
-struct OptionCase {
-  std::string name;
-  // Another value than the default.
-  double value;
-  std::function<double(const GlobalStageOptions&)> get;
-};
+using GlobalCase = OptionCase<GlobalStageOptions>;
 
 #define OPTION(name, value, member)                                            \
   {                                                                            \
-    name, value,                                                               \
+    "AdaSfmGlobal." name, value,                                               \
         [](const GlobalStageOptions& stage) -> double { return stage.member; } \
   }
 
-const std::vector<OptionCase>& Cases() {
-  static const std::vector<OptionCase> cases = {
+const std::vector<GlobalCase>& Cases() {
+  static const std::vector<GlobalCase> cases = {
       OPTION("max_prior_time_gap_s", 0.7,
              poses.augmentation.max_prior_time_gap_s),
       OPTION("max_rotation_discrepancy_deg", 6,
@@ -101,60 +95,26 @@ const std::vector<OptionCase>& Cases() {
 
 #undef OPTION
 
-Status ParseGlobal(const std::vector<std::string>& words,
-                   GlobalStageOptions* stage) {
-  CommandOptions command("test", "A test.");
-  AddGlobalOptions(stage, &command);
-  std::vector<const char*> argv = {"test"};
-  for (const std::string& word : words) argv.push_back(word.c_str());
-  return command.Parse(argv.size(), argv.data());
-}
-
 TEST(GlobalOptionsTest, EachSetsItsOwnField) {
-  for (const OptionCase& option : Cases()) {
-    GlobalStageOptions stage;
-    EXPECT_NE(option.get(stage), option.value) << option.name;
-    const Status parsed = ParseGlobal(
-        {"--AdaSfmGlobal." + option.name, OptionText(option.value)}, &stage);
-    ASSERT_TRUE(parsed.ok()) << parsed.message();
-    EXPECT_EQ(option.get(stage), option.value) << option.name;
-    std::string error;
-    EXPECT_TRUE(stage.IsValid(&error)) << option.name << ": " << error;
-    for (const OptionCase& other : Cases()) {
-      if (&other == &option) continue;
-      EXPECT_EQ(other.get(stage), other.get(GlobalStageOptions()))
-          << option.name << " changes " << other.name;
-    }
-  }
+  ExpectEachSetsItsOwnField(Cases(), AddGlobalOptions);
 }
 
 TEST(GlobalOptionsTest, WrongValuesAreNamedAsTheyAreTyped) {
-  int num_refused = 0;
-  for (const OptionCase& option : Cases()) {
-    GlobalStageOptions stage;
-    CommandOptions command("test", "A test.");
-    AddGlobalOptions(&stage, &command);
-    const std::string name = "AdaSfmGlobal." + option.name;
-    const std::string word = "--" + name;
-    const char* argv[] = {"test", word.c_str(), "-7"};
-    if (!command.Parse(3, argv).ok()) continue;  // a switch
-    const Status status =
-        command.Check([&stage] { return CheckOptions(stage); });
-    if (status.ok()) continue;
-    ++num_refused;
-    EXPECT_NE(status.message().find(name), std::string::npos)
-        << name << ": " << status.message();
-  }
-  EXPECT_GT(num_refused, 25);
+  EXPECT_GT(ExpectWrongValuesAreNamed(Cases(), AddGlobalOptions), 30);
+}
+
+TEST(GlobalOptionsTest, TheHelpNamesAll) {
+  ExpectHelpNamesAll(Cases(), AddGlobalOptions);
 }
 
 TEST(GlobalOptionsTest, OldNamesAreTaken) {
   GlobalStageOptions stage;
   testing::internal::CaptureStderr();
-  EXPECT_TRUE(ParseGlobal({"--AdaSfmGlobal.max_coasting_s=3",
-                           "--AdaSfmGlobal.join_min_turn_deg", "40"},
-                          &stage)
-                  .ok());
+  EXPECT_TRUE(
+      ParseWords<GlobalStageOptions>({"--AdaSfmGlobal.max_coasting_s=3",
+                                      "--AdaSfmGlobal.join_min_turn_deg", "40"},
+                                     AddGlobalOptions, &stage)
+          .ok());
   const std::string notes = testing::internal::GetCapturedStderr();
   EXPECT_EQ(stage.poses.visual_steps.max_coasting_s, 3.0);
   EXPECT_EQ(stage.poses.loops.min_turn_deg, 40.0);
@@ -165,21 +125,10 @@ TEST(GlobalOptionsTest, OldNamesAreTaken) {
   // Of a project file too.
   const std::string path = testing::TempDir() + "/old_names.ini";
   std::ofstream(path) << "[AdaSfmGlobal]\ncamera_mount_sigma_deg=0.5\n";
-  EXPECT_TRUE(ParseGlobal({"--project_path", path}, &stage).ok());
+  EXPECT_TRUE(ParseWords<GlobalStageOptions>({"--project_path", path},
+                                             AddGlobalOptions, &stage)
+                  .ok());
   EXPECT_EQ(stage.poses.camera_mount.sigma_deg, 0.5);
-}
-
-TEST(GlobalOptionsTest, TheHelpNamesAll) {
-  testing::internal::CaptureStdout();
-  GlobalStageOptions stage;
-  EXPECT_TRUE(ParseGlobal({"-h"}, &stage).ok());
-  const std::string help = testing::internal::GetCapturedStdout();
-  size_t num_listed = 0;
-  for (size_t at = help.find("--AdaSfmGlobal."); at != std::string::npos;
-       at = help.find("--AdaSfmGlobal.", at + 1)) {
-    ++num_listed;
-  }
-  EXPECT_EQ(num_listed, Cases().size());
 }
 
 }  // namespace

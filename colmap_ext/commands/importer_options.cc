@@ -1,0 +1,144 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "colmap_ext/commands/importer_options.h"
+
+#include <string>
+#include <utility>
+
+namespace adasfm {
+namespace {
+
+void AddFusionOptions(OdometryFusionOptions* fusion, CommandOptions* command) {
+  const auto add = [command](const char* name, auto* value, const char* help) {
+    command->AddDefault(std::string("AdaSfmPriors.") + name, value, help);
+  };
+  add("gravity_m_s2", &fusion->gravity_m_s2, "the Earth's pull [m/s^2]");
+  add("gyroscope_bias_sigma_rad_s", &fusion->gyroscope_bias_sigma,
+      "gyroscope bias before any data, 1 sigma [rad/s]");
+  add("accelerometer_bias_sigma_m_s2", &fusion->accelerometer_bias_sigma,
+      "accelerometer bias before any data, 1 sigma [m/s^2]");
+  add("wheel_scale_sigma", &fusion->wheel_scale_sigma,
+      "scale of the wheels before any data, 1 sigma [1 = 100 %]");
+  add("wheel_track_sigma", &fusion->wheel_track_sigma,
+      "scale of the track width before any data, 1 sigma [1 = 100 %]");
+  add("wheel_curvature_sigma_per_m", &fusion->wheel_curvature_sigma,
+      "difference of the wheels before any data, 1 sigma [1/m]");
+  add("wheel_mount_sigma_deg", &fusion->wheel_mount_sigma_deg,
+      "driving direction against T_imu_wheel, 1 sigma [deg]; 0 trusts it");
+  add("wheel_delay_sigma_s", &fusion->wheel_delay_sigma_s,
+      "how long wheel readings lie behind their times, 1 sigma [s]");
+  add("lateral_speed_noise_m_s_sqrt_hz", &fusion->lateral_speed_noise,
+      "sideways speed of the wheel frame [m/s/sqrt(Hz)]");
+  add("vertical_speed_noise_m_s_sqrt_hz", &fusion->vertical_speed_noise,
+      "vertical speed of the wheel frame [m/s/sqrt(Hz)]");
+  add("planar_rotation_noise_rad_sqrt_s", &fusion->planar_rotation_noise,
+      "roll and pitch of a machine without IMU [rad/sqrt(s)]");
+  add("slip_threshold_sigma", &fusion->slip_threshold_sigma,
+      "wheels further than this from the IMU lose weight [sigma]");
+  add("vision_threshold_sigma", &fusion->vision_threshold_sigma,
+      "two-view rotations further than this from the rest lose weight [sigma]");
+  add("visual_rotation_scale_sigma", &fusion->visual_turn_sigma,
+      "scale of all two-view rotations before any data, 1 sigma [1 = 100 %]");
+  add("slip_min_speed_m_s", &fusion->slip_min_speed_m_s,
+      "slip is reported beyond this error of the speed [m/s]");
+  add("standstill_speed_sigma_m_s", &fusion->standstill_speed_sigma,
+      "speed of a machine at rest, 1 sigma [m/s]");
+  add("standstill_rate_sigma_rad_s", &fusion->standstill_rate_sigma,
+      "angular rate of a machine at rest, 1 sigma [rad/s]");
+  add("unaided_speed_sigma_m_s", &fusion->unaided_speed_sigma,
+      "speed of an IMU without wheels, 1 sigma [m/s]");
+  add("max_num_iterations", &fusion->max_num_iterations,
+      "iterations of the smoother");
+}
+
+void AddOldNames(CommandOptions* command) {
+  // Earlier names.
+  const std::pair<const char*, const char*> old_names[] = {
+      {"gyroscope_bias_sigma", "gyroscope_bias_sigma_rad_s"},
+      {"accelerometer_bias_sigma", "accelerometer_bias_sigma_m_s2"},
+      {"wheel_curvature_sigma", "wheel_curvature_sigma_per_m"},
+      {"lateral_speed_noise", "lateral_speed_noise_m_s_sqrt_hz"},
+      {"vertical_speed_noise", "vertical_speed_noise_m_s_sqrt_hz"},
+      {"planar_rotation_noise", "planar_rotation_noise_rad_sqrt_s"},
+      {"visual_turn_sigma", "visual_rotation_scale_sigma"},
+      {"standstill_speed_sigma", "standstill_speed_sigma_m_s"},
+      {"standstill_rate_sigma", "standstill_rate_sigma_rad_s"},
+      {"unaided_speed_sigma", "unaided_speed_sigma_m_s"},
+      {"visual_bias_sigma", "visual_bias_sigma_rad_s"}};
+  for (const auto& [old_name, name] : old_names) {
+    command->AddOldName(std::string("AdaSfmPriors.") + old_name,
+                        std::string("AdaSfmPriors.") + name);
+  }
+}
+
+// Trajectories, rigs and GNSS.
+void AddOtherSources(PriorImportOptions* options, CommandOptions* command) {
+  TrajectoryPriorOptions* trajectory = &options->trajectory;
+  command->AddDefault("AdaSfmTrajectory.sigma_m_per_m",
+                      &trajectory->sigma_m_per_m,
+                      "error of the trajectory's translation between two "
+                      "images, 1 sigma [m/m]");
+  command->AddDefault(
+      "AdaSfmTrajectory.sigma_deg_per_m", &trajectory->sigma_deg_per_m,
+      "error of its rotation between two images, 1 sigma [deg/m]");
+  command->AddDefault("AdaSfmTrajectory.max_gap_s", &trajectory->max_gap_s,
+                      "longest gap of the trajectory to bridge [s]");
+  command->AddDefault("AdaSfmRig.rotation_sigma_deg",
+                      &options->rig.rotation_sigma_deg,
+                      "error of the cameras of a rig against each other, 1 "
+                      "sigma per axis [deg]");
+  command->AddDefault("AdaSfmRig.translation_sigma_m",
+                      &options->rig.translation_sigma_m,
+                      "the same for their distances [m]");
+  PositionPriorOptions* positions = &options->positions;
+  command->AddDefault("AdaSfmGnss.max_fix_gap_s", &positions->max_fix_gap_s,
+                      "longest gap of the positions to bridge [s]");
+  command->AddDefault("AdaSfmGnss.max_image_gap_s", &positions->max_image_gap_s,
+                      "a position between two images at most this far apart "
+                      "belongs to both [s]");
+  command->AddDefault("AdaSfmGnss.correlation_time_s",
+                      &positions->correlation_time_s,
+                      "for so long errors of positions persist; 0: no longer "
+                      "than to the next one [s]");
+}
+
+}  // namespace
+
+void AddImporterOptions(PriorImportOptions* options, CommandOptions* command) {
+  PriorEstimationOptions* estimation = &options->estimation;
+  const auto add = [command](const char* name, auto* value, const char* help) {
+    command->AddDefault(std::string("AdaSfmPriors.") + name, value, help);
+  };
+  add("max_imu_gap_s", &estimation->max_imu_gap_s,
+      "longest gap of the IMU log to bridge [s]");
+  add("max_wheel_gap_s", &estimation->max_wheel_gap_s,
+      "longest gap of the wheel log to bridge [s]");
+  add("max_link_s", &estimation->max_link_s,
+      "images further apart get states between them [s]");
+  add("max_lead_s", &estimation->max_lead_s,
+      "logs are used from this long before the first image on [s]");
+  add("use_visual_rotations", &estimation->use_visual_rotations,
+      "two-view rotations help to find the gyroscope's bias: its first value "
+      "when the machine never stands still, and its course (0 or 1)");
+  add("visual_bias_sigma_rad_s", &estimation->visual_bias_sigma,
+      "what their scatter does not show when they are too poor for the rest "
+      "and give the first value only, 1 sigma [rad/s]");
+  add("estimate_time_shift", &estimation->estimate_time_shift,
+      "add the time shift that vision and gyroscope agree on to the "
+      "calibration's: 0, 1, or -1: when it is clear and at most 0.15 s");
+  add("undo_gyroscope_filter", &estimation->undo_gyroscope_filter,
+      "undo a low-pass filter in the gyroscope's log when vision clearly shows "
+      "one (0 or 1)");
+  add("calibrate_focal_lengths", &options->focal_lengths.enabled,
+      "two-view rotations are those under focal lengths found from the "
+      "verified pairs where the database does not mark them as known (0 or 1)");
+  add("max_memory_gb", &options->max_memory_gb,
+      "an error, before the work, where the import may take more [GB]; -1: a "
+      "warning where it may take more than is free");
+  add("max_visual_gap", &options->max_visual_gap,
+      "two-view rotations are taken from images at most this many apart");
+  AddFusionOptions(&estimation->fusion, command);
+  AddOtherSources(options, command);
+  AddOldNames(command);
+}
+
+}  // namespace adasfm

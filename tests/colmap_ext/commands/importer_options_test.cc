@@ -1,0 +1,101 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "colmap_ext/commands/importer_options.h"
+
+#include <gtest/gtest.h>
+
+#include <vector>
+
+#include "tests/testing/colmap_ext/option_cases.h"
+
+namespace adasfm {
+namespace {
+
+using ImporterCase = OptionCase<PriorImportOptions>;
+
+#define OPTION(name, value, member)                                         \
+  {                                                                         \
+    "AdaSfm" name, value, [](const PriorImportOptions& options) -> double { \
+      return options.member;                                                \
+    }                                                                       \
+  }
+
+const std::vector<ImporterCase>& Cases() {
+  static const std::vector<ImporterCase> cases = {
+      OPTION("Priors.max_imu_gap_s", 0.2, estimation.max_imu_gap_s),
+      OPTION("Priors.max_wheel_gap_s", 0.5, estimation.max_wheel_gap_s),
+      OPTION("Priors.max_link_s", 1, estimation.max_link_s),
+      OPTION("Priors.max_lead_s", 5, estimation.max_lead_s),
+      OPTION("Priors.use_visual_rotations", 0, estimation.use_visual_rotations),
+      OPTION("Priors.visual_bias_sigma_rad_s", 0.01,
+             estimation.visual_bias_sigma),
+      OPTION("Priors.estimate_time_shift", 1, estimation.estimate_time_shift),
+      OPTION("Priors.undo_gyroscope_filter", 0,
+             estimation.undo_gyroscope_filter),
+      OPTION("Priors.calibrate_focal_lengths", 0, focal_lengths.enabled),
+      OPTION("Priors.max_memory_gb", 2, max_memory_gb),
+      OPTION("Priors.max_visual_gap", 5, max_visual_gap),
+      OPTION("Priors.gravity_m_s2", 9.78, estimation.fusion.gravity_m_s2),
+      OPTION("Priors.gyroscope_bias_sigma_rad_s", 0.01,
+             estimation.fusion.gyroscope_bias_sigma),
+      OPTION("Priors.accelerometer_bias_sigma_m_s2", 0.5,
+             estimation.fusion.accelerometer_bias_sigma),
+      OPTION("Priors.wheel_scale_sigma", 0.02,
+             estimation.fusion.wheel_scale_sigma),
+      OPTION("Priors.wheel_track_sigma", 0.2,
+             estimation.fusion.wheel_track_sigma),
+      OPTION("Priors.wheel_curvature_sigma_per_m", 0.02,
+             estimation.fusion.wheel_curvature_sigma),
+      OPTION("Priors.wheel_mount_sigma_deg", 0,
+             estimation.fusion.wheel_mount_sigma_deg),
+      OPTION("Priors.wheel_delay_sigma_s", 0.01,
+             estimation.fusion.wheel_delay_sigma_s),
+      OPTION("Priors.lateral_speed_noise_m_s_sqrt_hz", 0.1,
+             estimation.fusion.lateral_speed_noise),
+      OPTION("Priors.vertical_speed_noise_m_s_sqrt_hz", 0.1,
+             estimation.fusion.vertical_speed_noise),
+      OPTION("Priors.planar_rotation_noise_rad_sqrt_s", 0.01,
+             estimation.fusion.planar_rotation_noise),
+      OPTION("Priors.slip_threshold_sigma", 5,
+             estimation.fusion.slip_threshold_sigma),
+      OPTION("Priors.vision_threshold_sigma", 5,
+             estimation.fusion.vision_threshold_sigma),
+      OPTION("Priors.visual_rotation_scale_sigma", 0.02,
+             estimation.fusion.visual_turn_sigma),
+      OPTION("Priors.slip_min_speed_m_s", 0.3,
+             estimation.fusion.slip_min_speed_m_s),
+      OPTION("Priors.standstill_speed_sigma_m_s", 0.01,
+             estimation.fusion.standstill_speed_sigma),
+      OPTION("Priors.standstill_rate_sigma_rad_s", 0.001,
+             estimation.fusion.standstill_rate_sigma),
+      OPTION("Priors.unaided_speed_sigma_m_s", 5,
+             estimation.fusion.unaided_speed_sigma),
+      OPTION("Priors.max_num_iterations", 50,
+             estimation.fusion.max_num_iterations),
+      OPTION("Trajectory.sigma_m_per_m", 0.02, trajectory.sigma_m_per_m),
+      OPTION("Trajectory.sigma_deg_per_m", 0.2, trajectory.sigma_deg_per_m),
+      OPTION("Trajectory.max_gap_s", 1, trajectory.max_gap_s),
+      OPTION("Rig.rotation_sigma_deg", 0.1, rig.rotation_sigma_deg),
+      OPTION("Rig.translation_sigma_m", 0.01, rig.translation_sigma_m),
+      OPTION("Gnss.max_fix_gap_s", 5, positions.max_fix_gap_s),
+      OPTION("Gnss.max_image_gap_s", 1, positions.max_image_gap_s),
+      OPTION("Gnss.correlation_time_s", 60, positions.correlation_time_s),
+  };
+  return cases;
+}
+
+#undef OPTION
+
+TEST(ImporterOptionsTest, EachSetsItsOwnField) {
+  ExpectEachSetsItsOwnField(Cases(), AddImporterOptions);
+}
+
+TEST(ImporterOptionsTest, WrongValuesAreNamedAsTheyAreTyped) {
+  EXPECT_GT(ExpectWrongValuesAreNamed(Cases(), AddImporterOptions), 25);
+}
+
+TEST(ImporterOptionsTest, TheHelpNamesAll) {
+  ExpectHelpNamesAll(Cases(), AddImporterOptions);
+}
+
+}  // namespace
+}  // namespace adasfm
