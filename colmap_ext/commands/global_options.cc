@@ -161,7 +161,8 @@ void GlobalOptionAdder::AddMatches() {
 // What each step buys.
 void GlobalOptionAdder::AddAblations() {
   Add("use_sdp_start", &stage_->poses.rotations.use_sdp_start,
-      "start the rotations from the SDP");
+      "start the rotations from the SDP, as the paper does; without it they "
+      "start from a spanning tree");
   Add("use_loop_gating", &stage_->poses.loops.enabled,
       "remove false loop closures");
   Add("split_unconfirmed_closures", &stage_->poses.loops.split_unverified_joins,

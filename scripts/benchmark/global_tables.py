@@ -23,7 +23,6 @@ from benchmarking.process import Failed, run
 # Options of adasfm_global for each ablation.
 VARIANTS = {
     'as it is': [],
-    'no SDP start': ['use_sdp_start'],
     'no loop gating': ['use_loop_gating'],
     'no refinement of relative poses': ['refine_relative_poses'],
     'no refinement of translations': ['refine_translations'],

@@ -18,7 +18,6 @@ METHODS = ['mapper', 'hierarchical_mapper', 'adasfm', 'adasfm_no_sensors',
 ABLATIONS = {
     'adasfm_no_' + name: {command: ['--%s.%s' % (group, option), '0']}
     for name, command, group, option in (
-        ('sdp_start', 'global', 'AdaSfmGlobal', 'use_sdp_start'),
         ('loop_gating', 'global', 'AdaSfmGlobal', 'use_loop_gating'),
         ('augmentation', 'global', 'AdaSfmGlobal', 'use_augmentation'),
         ('refined_translations', 'global', 'AdaSfmGlobal',

@@ -76,7 +76,7 @@ const std::vector<GlobalCase>& Cases() {
       OPTION("refine_unknown_focal_length", 0,
              structure.refine_unknown_focal_length),
       OPTION("min_num_matches", 30, refinement.min_num_matches),
-      OPTION("use_sdp_start", 0, poses.rotations.use_sdp_start),
+      OPTION("use_sdp_start", 1, poses.rotations.use_sdp_start),
       OPTION("use_loop_gating", 0, poses.loops.enabled),
       OPTION("split_unconfirmed_closures", 0,
              poses.loops.split_unverified_joins),
