@@ -2,12 +2,14 @@
 #include "colmap_ext/bundle_adjustment/bundle_adjustment.h"
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <stdexcept>
 #include <unordered_map>
 
 #include "colmap_ext/bundle_adjustment/bundle_problem.h"
 #include "colmap_ext/bundle_adjustment/factor_size.h"
+#include "colmap_ext/bundle_adjustment/minimize_bundle.h"
 #include "colmap_ext/bundle_adjustment/position_priors.h"
 #include "colmap_ext/bundle_adjustment/reduced_system.h"
 #include "core/median.h"
@@ -116,10 +118,16 @@ bool HasSmallFactor(size_t num_full_images, const std::set<image_t>& images,
          num_full_images * (num_full_images - 1) / 2;
 }
 
+int NumThreads(const PriorBundleAdjustmentOptions& options,
+               const BundleProblem& problem) {
+  return problem.NumResiduals() < kMinNumResidualsForThreads
+             ? 1
+             : EffectiveNumThreads(options.num_threads);
+}
+
 ceres::Solver::Options SolverOptions(
-    const PriorBundleAdjustmentOptions& options,
-    const std::set<image_t>& images,
-    const colmap::Reconstruction& reconstruction, BundleProblem* problem) {
+    const PriorBundleAdjustmentOptions& options, bool has_small_factor,
+    BundleProblem* problem) {
   ceres::Solver::Options solver;
   solver.max_num_iterations = options.max_num_iterations;
   solver.function_tolerance = options.function_tolerance;
@@ -128,9 +136,7 @@ ceres::Solver::Options SolverOptions(
   solver.gradient_tolerance = 1e-12;
   solver.parameter_tolerance = 1e-12;
   solver.logging_type = ceres::SILENT;
-  solver.num_threads = problem->NumResiduals() < kMinNumResidualsForThreads
-                           ? 1
-                           : EffectiveNumThreads(options.num_threads);
+  solver.num_threads = NumThreads(options, *problem);
   solver.max_linear_solver_iterations = 200;
   solver.max_num_consecutive_invalid_steps = 10;
   const int num_images = problem->NumImages();
@@ -139,8 +145,7 @@ ceres::Solver::Options SolverOptions(
     solver.linear_solver_type = ceres::DENSE_SCHUR;
   } else if (!has_points) {
     solver.linear_solver_type = ceres::SPARSE_NORMAL_CHOLESKY;
-  } else if (HasSmallFactor(options.max_num_images_sparse, images,
-                            reconstruction)) {
+  } else if (has_small_factor) {
     solver.linear_solver_type = ceres::SPARSE_SCHUR;
   } else {
     solver.linear_solver_type = ceres::ITERATIVE_SCHUR;
@@ -148,6 +153,37 @@ ceres::Solver::Options SolverOptions(
   }
   if (has_points) solver.linear_solver_ordering = problem->Ordering();
   return solver;
+}
+
+// Sets what a solver has to say, and whether its parameters may be used.
+void SolveWithCeres(const PriorBundleAdjustmentOptions& options,
+                    bool has_small_factor, BundleProblem* bundle,
+                    PriorBundleAdjustmentSummary* summary) {
+  ceres::Solver::Summary solver_summary;
+  ceres::Solve(SolverOptions(options, has_small_factor, bundle),
+               bundle->CeresProblem(), &solver_summary);
+  summary->num_iterations = solver_summary.num_successful_steps +
+                            solver_summary.num_unsuccessful_steps;
+  summary->initial_cost = solver_summary.initial_cost;
+  summary->final_cost = solver_summary.final_cost;
+  summary->message = solver_summary.message;
+  summary->success = solver_summary.IsSolutionUsable();
+}
+
+void SolveByPoints(const PriorBundleAdjustmentOptions& options,
+                   BundleProblem* bundle,
+                   PriorBundleAdjustmentSummary* summary) {
+  MinimizeBundleOptions minimize;
+  minimize.max_num_iterations = options.max_num_iterations;
+  minimize.function_tolerance = options.function_tolerance;
+  minimize.initial_radius = kInitialTrustRegionRadius;
+  minimize.num_threads = NumThreads(options, *bundle);
+  const MinimizeBundleSummary minimized = MinimizeBundle(minimize, bundle);
+  summary->num_iterations = minimized.num_iterations;
+  summary->initial_cost = minimized.initial_cost;
+  summary->final_cost = minimized.final_cost;
+  summary->message = minimized.message;
+  summary->success = minimized.success;
 }
 
 }  // namespace
@@ -230,7 +266,12 @@ PriorBundleAdjustmentSummary AdjustBundle(
   summary.prior_sigma_factors = options.prior_sigma_factors;
   PriorBundleAdjustmentProblem with_windows = problem;
   AssignWindows(options.shared_errors, &with_windows.priors);
-  BundleProblem bundle(options, with_windows, *reconstruction);
+  const bool has_small_factor = HasSmallFactor(options.max_num_images_sparse,
+                                               problem.images, *reconstruction);
+  BundleProblem bundle(
+      options, with_windows, *reconstruction,
+      has_small_factor && static_cast<int>(problem.images.size()) >
+                              options.max_num_images_dense);
   summary.num_images = bundle.NumImages();
   summary.num_points = bundle.NumPoints();
   summary.num_residuals = bundle.NumResiduals();
@@ -243,18 +284,17 @@ PriorBundleAdjustmentSummary AdjustBundle(
     FixGauge(HasLengths(problem.priors), &bundle);
   }
 
-  ceres::Solver::Summary solver_summary;
-  ceres::Solve(SolverOptions(options, problem.images, *reconstruction, &bundle),
-               bundle.CeresProblem(), &solver_summary);
-  summary.num_iterations = solver_summary.num_successful_steps +
-                           solver_summary.num_unsuccessful_steps;
-  summary.initial_cost = solver_summary.initial_cost;
-  summary.final_cost = solver_summary.final_cost;
-  summary.seconds = solver_summary.total_time_in_seconds;
-  summary.message = solver_summary.message;
-  summary.success = solver_summary.IsSolutionUsable() &&
-                    std::isfinite(solver_summary.final_cost) &&
-                    bundle.IsFinite();
+  const auto start = std::chrono::steady_clock::now();
+  if (bundle.NumPointsApart() > 0) {
+    SolveByPoints(options, &bundle, &summary);
+  } else {
+    SolveWithCeres(options, has_small_factor, &bundle, &summary);
+  }
+  summary.seconds =
+      std::chrono::duration<double>(std::chrono::steady_clock::now() - start)
+          .count();
+  summary.success =
+      summary.success && std::isfinite(summary.final_cost) && bundle.IsFinite();
   if (summary.success) {
     bundle.WriteTo(reconstruction);
     summary.shared_errors = bundle.EstimatedSharedErrors();

@@ -15,7 +15,8 @@ namespace adasfm {
 
 BundleProblem::BundleProblem(const PriorBundleAdjustmentOptions& options,
                              const PriorBundleAdjustmentProblem& problem,
-                             const colmap::Reconstruction& reconstruction)
+                             const colmap::Reconstruction& reconstruction,
+                             bool may_keep_points_apart)
     : options_(options),
       prior_loss_(
           std::make_unique<ceres::CauchyLoss>(options.prior_loss_scale)) {
@@ -30,6 +31,8 @@ BundleProblem::BundleProblem(const PriorBundleAdjustmentOptions& options,
   problem_options.evaluation_callback = this;
   problem_ = std::make_unique<ceres::Problem>(problem_options);
   AddImages(problem, reconstruction);
+  points_apart_ =
+      may_keep_points_apart && !options.RefinesCameras() && mounts_.empty();
   AddPoints(reconstruction);
   AddPriors(problem.priors);
   AddMountPriors(problem.rigs);
@@ -181,13 +184,20 @@ void BundleProblem::AddPoints(const colmap::Reconstruction& reconstruction) {
   point_ids.erase(std::unique(point_ids.begin(), point_ids.end()),
                   point_ids.end());
   points_.reserve(point_ids.size());
+  if (points_apart_) {
+    size_t num_observations = 0;
+    for (const colmap::point3D_t point_id : point_ids) {
+      num_observations += TrackOf(reconstruction.Point3D(point_id)).Length();
+    }
+    observations_.reserve(num_observations);
+  }
   for (const colmap::point3D_t point_id : point_ids) {
     const colmap::Point3D& point = reconstruction.Point3D(point_id);
     if (!XyzOf(point).allFinite()) continue;
     const std::vector<Observation> observations =
         FindObservations(reconstruction, point);
     if (observations.empty()) continue;
-    points_.push_back({point_id, XyzOf(point)});
+    points_.push_back({point_id, XyzOf(point), observations_.size()});
     for (const Observation& observation : observations) {
       AddObservation(reconstruction, observation, &points_.back());
     }
@@ -199,6 +209,10 @@ void BundleProblem::AddObservation(const colmap::Reconstruction& reconstruction,
                                    PointBlock* point) {
   ImageBlock& block = images_.at(observation.image_id);
   block.num_observations += 1;
+  if (points_apart_) {
+    observations_.push_back({observation.keypoint, block.pose});
+    return;
+  }
   if (!options_.RefinesCameras()) {
     reprojection_costs_.emplace_back(observation.keypoint, block.pose);
     AddCost(&reprojection_costs_.back(), reprojection_loss_.get(), {&block},
@@ -266,6 +280,7 @@ void BundleProblem::SetConstantBlocks(
     const colmap::Reconstruction& reconstruction) {
   for (auto& [image_id, block] : images_) {
     if (!block.IsUsed()) continue;
+    if (points_apart_) problem_->AddParameterBlock(block.pose->parameters, 6);
     if (block.is_constant) {
       problem_->SetParameterBlockConstant(block.pose->parameters);
     } else {
@@ -291,6 +306,13 @@ void BundleProblem::SetConstantBlocks(
           new ceres::SubsetManifold(block.params.size(), constant));
     }
   }
+}
+
+BundleProblem::ObservationRange BundleProblem::ObservationsOf(size_t k) const {
+  const PointObservation* data = observations_.data();
+  const size_t end = k + 1 < points_.size() ? points_[k + 1].first_observation
+                                            : observations_.size();
+  return {data + points_[k].first_observation, data + end};
 }
 
 bool BundleProblem::IsPoint(const double* parameters) const {

@@ -21,17 +21,23 @@ namespace adasfm {
 class BundleProblem final : private ceres::EvaluationCallback {
  public:
   // The options are valid. Images without a residual do not take part, nor do
-  // points behind all but one of their cameras.
+  // points behind all but one of their cameras. Points may be kept apart from
+  // the Ceres problem, which then has neither them nor their observations, as
+  // long as these depend on one pose alone: no intrinsics, no mounts.
   BundleProblem(const PriorBundleAdjustmentOptions& options,
                 const PriorBundleAdjustmentProblem& problem,
-                const colmap::Reconstruction& reconstruction);
+                const colmap::Reconstruction& reconstruction,
+                bool may_keep_points_apart = false);
   BundleProblem(const BundleProblem&) = delete;
   BundleProblem& operator=(const BundleProblem&) = delete;
 
   // Images whose poses are adjusted.
   int NumImages() const { return num_adjusted_images_; }
   int NumPoints() const { return static_cast<int>(points_.size()); }
-  int NumResiduals() const { return problem_->NumResiduals(); }
+  int NumResiduals() const {
+    return problem_->NumResiduals() +
+           2 * static_cast<int>(observations_.size());
+  }
   // Those that take part in a residual.
   std::vector<image_t> ConstantImages() const;
 
@@ -59,8 +65,26 @@ class BundleProblem final : private ceres::EvaluationCallback {
   // In the order in which they were added.
   const std::vector<PriorBlock>& PriorBlocks() const { return prior_blocks_; }
   bool IsPoint(const double* parameters) const;
+  // In order of image ids.
+  std::vector<AdjustedPose>& Poses() { return poses_; }
   // To the parameters as they are.
   void UpdatePoses();
+
+  // Of those kept apart.
+  size_t NumPointsApart() const { return points_apart_ ? points_.size() : 0; }
+  Eigen::Vector3d& PointApart(size_t k) { return points_[k].xyz; }
+  // In order of image ids.
+  struct ObservationRange {
+    const PointObservation* first = nullptr;
+    const PointObservation* last = nullptr;
+    const PointObservation* begin() const { return first; }
+    const PointObservation* end() const { return last; }
+  };
+  ObservationRange ObservationsOf(size_t k) const;
+  // Null: plain squares.
+  const ceres::LossFunction* ReprojectionLoss() const {
+    return reprojection_loss_.get();
+  }
 
   // Points are eliminated first.
   std::shared_ptr<ceres::ParameterBlockOrdering> Ordering();
@@ -82,6 +106,7 @@ class BundleProblem final : private ceres::EvaluationCallback {
   struct PointBlock {
     colmap::point3D_t id = 0;
     Eigen::Vector3d xyz;
+    size_t first_observation = 0;  // Where they are kept apart.
   };
   struct CameraBlock {
     std::vector<double> params;
@@ -147,6 +172,8 @@ class BundleProblem final : private ceres::EvaluationCallback {
   std::vector<AdjustedPose> poses_;
   std::map<camera_t, AdjustedPose> mounts_;
   std::vector<PointBlock> points_;
+  bool points_apart_ = false;
+  std::vector<PointObservation> observations_;  // Kept apart.
   // Parameters of shared_errors.h; those used by a prior take part.
   static constexpr size_t kExtrinsicRotation = 0;
   static constexpr size_t kDrivingDirection = 1;

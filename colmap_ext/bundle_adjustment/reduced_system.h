@@ -27,8 +27,7 @@ struct ReducedPriorRows {
 // complement): a step x of poses, shared errors and intrinsics costs
 //   x^T rest x / 2 + rest_gradient^T x
 //   + sum over the rows r, J of priors of |r + J x|^2 / 2.
-// Constant parameters have no columns; the others follow each other as the
-// problem's residuals name them first.
+// Its columns are those of bundle_reducer.h.
 struct ReducedSystem {
   // Keypoints, and what is neither keypoint nor prior between two images: what
   // is believed of shared errors and mounts, positions. The lower triangle,

@@ -6,6 +6,7 @@
 #include <ceres/sized_cost_function.h>
 
 #include <Eigen/Core>
+#include <algorithm>
 
 #include "colmap_ext/bundle_adjustment/adjusted_pose.h"
 
@@ -25,62 +26,72 @@ inline constexpr double kMinProjectionDepth = 1e-6;
 // project: a constant, so that steps are judged by it but not drawn by it.
 inline constexpr double kBehindCameraResidual = 1e3;
 
-// r = W (pi(R (X - C)) - x), x and W of the keypoint, in sigmas.
-// Parameters: AdjustedPose::parameters (6), X in the world (3). The pose is
-// read from the object, which must be up to date.
-class ReprojectionCost final : public ceres::SizedCostFunction<2, 6, 3> {
- public:
-  ReprojectionCost(const NormalizedKeypoint& keypoint, const AdjustedPose* pose)
-      : keypoint_(keypoint), pose_(pose) {}
+// One observation of a point, r = W (pi(R (X - C)) - x), x and W of the
+// keypoint, in sigmas. The pose is read from the object, which must be up to
+// date.
+struct PointObservation {
+  NormalizedKeypoint keypoint;
+  const AdjustedPose* pose = nullptr;
 
-  bool Evaluate(double const* const* parameters, double* residuals,
-                double** jacobians) const final {
-    const Eigen::Map<const Eigen::Vector3d> point(parameters[1]);
-    const Eigen::Vector3d x_in_cam = pose_->rotation * (point - pose_->center);
+  // The residual, and where asked for its derivatives by the parameters of the
+  // pose (2 x 6) and by X (2 x 3), row by row.
+  void Evaluate(const Eigen::Vector3d& point, double* residuals,
+                double* by_pose, double* by_point) const {
+    const Eigen::Vector3d x_in_cam = pose->rotation * (point - pose->center);
     Eigen::Map<Eigen::Vector2d> residual(residuals);
     if (!(x_in_cam.z() > kMinProjectionDepth)) {
       residual.setConstant(kBehindCameraResidual);
-      SetZero(jacobians);
-      return true;
+      if (by_pose != nullptr) std::fill_n(by_pose, 12, 0.0);
+      if (by_point != nullptr) std::fill_n(by_point, 6, 0.0);
+      return;
     }
     const double inverse_depth = 1.0 / x_in_cam.z();
     const Eigen::Vector2d projected = x_in_cam.head<2>() * inverse_depth;
-    const Eigen::Matrix2d& whitened = keypoint_.whitened_from_normalized;
-    residual = whitened * (projected - keypoint_.normalized);
-    if (jacobians == nullptr) return true;
+    const Eigen::Matrix2d& whitened = keypoint.whitened_from_normalized;
+    residual = whitened * (projected - keypoint.normalized);
+    if (by_pose == nullptr && by_point == nullptr) return;
 
     Eigen::Matrix<double, 2, 3> residual_from_cam;
     residual_from_cam.leftCols<2>() = whitened * inverse_depth;
     residual_from_cam.col(2) = whitened * projected * -inverse_depth;
     const Eigen::Matrix<double, 2, 3> residual_from_world =
-        residual_from_cam * pose_->rotation;
-    if (jacobians[0] != nullptr) {
+        residual_from_cam * pose->rotation;
+    if (by_pose != nullptr) {
       // dx = -Hat(x) Jl dw - R dc; a row n of -Hat(x) is (x cross n)^T.
       Eigen::Map<Eigen::Matrix<double, 2, 6, Eigen::RowMajor>> jacobian(
-          jacobians[0]);
+          by_pose);
       Eigen::Matrix<double, 2, 3> from_turn;
       from_turn.row(0) = x_in_cam.cross(residual_from_cam.row(0).transpose());
       from_turn.row(1) = x_in_cam.cross(residual_from_cam.row(1).transpose());
-      jacobian.leftCols<3>().noalias() = from_turn * pose_->left_jacobian;
+      jacobian.leftCols<3>().noalias() = from_turn * pose->left_jacobian;
       jacobian.rightCols<3>() = -residual_from_world;
     }
-    if (jacobians[1] != nullptr) {
+    if (by_point != nullptr) {
       Eigen::Map<Eigen::Matrix<double, 2, 3, Eigen::RowMajor>> jacobian(
-          jacobians[1]);
+          by_point);
       jacobian = residual_from_world;
     }
+  }
+};
+
+// The same for Ceres. Parameters: AdjustedPose::parameters (6), X in the world
+// (3).
+class ReprojectionCost final : public ceres::SizedCostFunction<2, 6, 3> {
+ public:
+  ReprojectionCost(const NormalizedKeypoint& keypoint, const AdjustedPose* pose)
+      : observation_{keypoint, pose} {}
+
+  bool Evaluate(double const* const* parameters, double* residuals,
+                double** jacobians) const final {
+    const bool has_jacobians = jacobians != nullptr;
+    observation_.Evaluate(Eigen::Map<const Eigen::Vector3d>(parameters[1]),
+                          residuals, has_jacobians ? jacobians[0] : nullptr,
+                          has_jacobians ? jacobians[1] : nullptr);
     return true;
   }
 
  private:
-  static void SetZero(double** jacobians) {
-    if (jacobians == nullptr) return;
-    if (jacobians[0] != nullptr) std::fill_n(jacobians[0], 12, 0.0);
-    if (jacobians[1] != nullptr) std::fill_n(jacobians[1], 6, 0.0);
-  }
-
-  NormalizedKeypoint keypoint_;
-  const AdjustedPose* pose_;
+  PointObservation observation_;
 };
 
 // The same with the camera's intrinsics as third parameter, for automatic

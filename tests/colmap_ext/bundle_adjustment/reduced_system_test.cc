@@ -13,13 +13,19 @@
 namespace adasfm {
 namespace {
 
-// The parameters that are not constant as the residuals name them first, then
-// the points.
+// The parameters that are not constant, poses first, then the points; each as
+// the residuals name them first, poses in the order of images.
 std::vector<double*> ListParameters(BundleProblem* bundle) {
   ceres::Problem& problem = *bundle->CeresProblem();
   std::vector<ceres::ResidualBlockId> ids;
   problem.GetResidualBlocks(&ids);
   std::vector<double*> listed, points;
+  for (AdjustedPose& pose : bundle->Poses()) {
+    if (problem.HasParameterBlock(pose.parameters) &&
+        !problem.IsParameterBlockConstant(pose.parameters)) {
+      listed.push_back(pose.parameters);
+    }
+  }
   for (const ceres::ResidualBlockId id : ids) {
     std::vector<double*> blocks;
     problem.GetParameterBlocksForResidualBlock(id, &blocks);
@@ -67,11 +73,9 @@ DenseSolution SolveDensely(BundleProblem* bundle, int size) {
   return {step.head(size), columns.topRows(size)};
 }
 
-TEST(ReducedSystem, HasTheStepAndTheCovarianceOfTheWholeAdjustment) {
-  BundleWorldOptions world;
-  world.num_images = 8;
-  world.num_keypoints_per_image = 30;
-  const colmap::Reconstruction model = BuildBundleWorld(world);
+// With priors that have errors in common.
+PriorBundleAdjustmentProblem ProblemWithPriors(
+    const BundleWorldOptions& world, const colmap::Reconstruction& model) {
   PriorBundleAdjustmentProblem problem = ProblemOfAll(model);
   problem.priors = TruePriors(world);
   for (size_t k = 0; k < problem.priors.size(); ++k) {
@@ -79,6 +83,20 @@ TEST(ReducedSystem, HasTheStepAndTheCovarianceOfTheWholeAdjustment) {
     problem.priors[k].windows = {static_cast<int>(k / 4),
                                  static_cast<int>(k / 2)};
   }
+  return problem;
+}
+
+BundleWorldOptions SmallWorld() {
+  BundleWorldOptions world;
+  world.num_images = 8;
+  world.num_keypoints_per_image = 30;
+  return world;
+}
+
+TEST(ReducedSystem, HasTheStepAndTheCovarianceOfTheWholeAdjustment) {
+  const BundleWorldOptions world = SmallWorld();
+  const colmap::Reconstruction model = BuildBundleWorld(world);
+  const PriorBundleAdjustmentProblem problem = ProblemWithPriors(world, model);
   for (const bool refines_focal_length : {false, true}) {
     PriorBundleAdjustmentOptions options;
     options.reproj_loss_scale_px = 0.0;
@@ -109,6 +127,33 @@ TEST(ReducedSystem, HasTheStepAndTheCovarianceOfTheWholeAdjustment) {
         Eigen::MatrixXd::Identity(gradient.size(), gradient.size()));
     EXPECT_LT((covariance - dense.covariance).norm(),
               1e-6 * dense.covariance.norm());
+  }
+}
+
+TEST(ReducedSystem, IsTheSameWhenPointsAreKeptApart) {
+  BundleWorldOptions world = SmallWorld();
+  world.pixel_noise_px = 0.5;
+  colmap::Reconstruction model = BuildBundleWorld(world);
+  PerturbBundleWorld(2e-3, 0.05, 1, &model);
+  PriorBundleAdjustmentProblem problem = ProblemWithPriors(world, model);
+  problem.images.erase(3);
+  problem.constant_images = {3};
+  std::vector<std::unique_ptr<ReducedSystem>> systems;
+  for (const bool points_apart : {false, true}) {
+    BundleProblem bundle(PriorBundleAdjustmentOptions(), problem, model,
+                         points_apart);
+    EXPECT_EQ(bundle.NumPointsApart() > 0, points_apart);
+    systems.push_back(BuildReducedSystem(&bundle));
+  }
+  const Eigen::MatrixXd listed = systems[0]->rest;
+  const Eigen::MatrixXd apart = systems[1]->rest;
+  ASSERT_EQ(apart.rows(), listed.rows());
+  EXPECT_LT((apart - listed).norm(), 1e-12 * listed.norm());
+  EXPECT_LT((systems[1]->rest_gradient - systems[0]->rest_gradient).norm(),
+            1e-11 * systems[0]->rest_gradient.norm());
+  ASSERT_EQ(systems[1]->priors.size(), systems[0]->priors.size());
+  for (size_t k = 0; k < systems[0]->priors.size(); ++k) {
+    EXPECT_EQ(systems[1]->priors[k].columns, systems[0]->priors[k].columns);
   }
 }
 

@@ -1,0 +1,76 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "colmap_ext/bundle_adjustment/block_matrix.h"
+
+#include <algorithm>
+
+namespace adasfm {
+
+int BlockMatrix::AddBlock(int size) {
+  first_.push_back(num_columns_);
+  size_.push_back(size);
+  columns_.emplace_back();
+  num_columns_ += size;
+  return NumBlocks() - 1;
+}
+
+void BlockMatrix::Column::Sort() {
+  std::sort(rows.begin(), rows.end());
+  rows.erase(std::unique(rows.begin(), rows.end()), rows.end());
+  num_sorted = rows.size();
+}
+
+void BlockMatrix::AddPair(int block1, int block2) {
+  if (block1 == block2) return;
+  // Points that follow each other are seen by the same images: what comes again
+  // and again is taken out before it doubles the list.
+  constexpr size_t kMinNumUnsorted = 64;
+  Column& column = columns_[std::min(block1, block2)];
+  column.rows.push_back(std::max(block1, block2));
+  if (column.rows.size() > 2 * column.num_sorted + kMinNumUnsorted) {
+    column.Sort();
+  }
+}
+
+void BlockMatrix::Allocate() {
+  offsets_.assign(NumBlocks(), {});
+  Eigen::VectorXi num_rows(num_columns_);
+  for (int block = 0; block < NumBlocks(); ++block) {
+    columns_[block].Sort();
+    columns_[block].rows.shrink_to_fit();
+    int num_below = 0;
+    for (const int row : columns_[block].rows) {
+      offsets_[block].push_back(num_below);
+      num_below += size_[row];
+    }
+    for (int col = 0; col < size_[block]; ++col) {
+      num_rows[first_[block] + col] = size_[block] - col + num_below;
+    }
+  }
+  matrix_.resize(num_columns_, num_columns_);
+  matrix_.resizeNonZeros(num_rows.sum());
+  int next = 0;
+  for (int block = 0; block < NumBlocks(); ++block) {
+    for (int col = first_[block]; col < first_[block] + size_[block]; ++col) {
+      matrix_.outerIndexPtr()[col] = next;
+      const auto add_rows = [&](int begin, int end) {
+        for (int row = begin; row < end; ++row) {
+          matrix_.innerIndexPtr()[next++] = row;
+        }
+      };
+      add_rows(col, first_[block] + size_[block]);
+      for (const int row : columns_[block].rows) {
+        add_rows(first_[row], first_[row] + size_[row]);
+      }
+    }
+  }
+  matrix_.outerIndexPtr()[num_columns_] = next;
+  matrix_.coeffs().setZero();
+}
+
+int BlockMatrix::OffsetOf(int row_block, int col_block) const {
+  const std::vector<int>& rows = columns_[col_block].rows;
+  const auto row = std::lower_bound(rows.begin(), rows.end(), row_block);
+  return offsets_[col_block][row - rows.begin()];
+}
+
+}  // namespace adasfm

@@ -1,0 +1,132 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "colmap_ext/bundle_adjustment/minimize_bundle.h"
+
+#include <Eigen/CholmodSupport>
+#include <algorithm>
+#include <cmath>
+
+#include "colmap_ext/bundle_adjustment/bundle_reducer.h"
+
+namespace adasfm {
+namespace {
+
+// Of the decrease that the linearised residuals predict.
+constexpr double kMinRelativeDecrease = 1e-3;
+constexpr double kMaxRadius = 1e16;
+constexpr double kMinRadius = 1e-32;
+
+class TrustRegion {
+ public:
+  explicit TrustRegion(double radius) : radius_(radius) {}
+  double Radius() const { return radius_; }
+
+  void Accept(double relative_decrease) {
+    radius_ /=
+        std::max(1.0 / 3.0, 1.0 - std::pow(2.0 * relative_decrease - 1.0, 3));
+    radius_ = std::min(kMaxRadius, radius_);
+    divisor_ = 2.0;
+  }
+  void Reject() {
+    radius_ /= divisor_;
+    divisor_ *= 2.0;
+  }
+
+ private:
+  double radius_;
+  double divisor_ = 2.0;
+};
+
+class BundleMinimizer {
+ public:
+  BundleMinimizer(const MinimizeBundleOptions& options, BundleProblem* bundle)
+      : options_(options),
+        reducer_(bundle, options.num_threads),
+        region_(options.initial_radius) {
+    factorization_.cholmod().print = 0;  // The caller says what failed.
+    factorization_.analyzePattern(reducer_.Matrix().Matrix());
+  }
+
+  MinimizeBundleSummary Run() {
+    for (summary_.num_iterations = 1;; ++summary_.num_iterations) {
+      if (summary_.num_iterations > options_.max_num_iterations) {
+        return Finish(true, "iterations used up");
+      }
+      cost_ = reducer_.Linearize(1.0 / region_.Radius());
+      if (summary_.num_iterations == 1) summary_.initial_cost = cost_;
+      if (reducer_.LargestGradient() <= options_.tolerance) {
+        return Finish(true, "no gradient is left");
+      }
+      if (!std::isfinite(cost_)) return Finish(false, "the cost is infinite");
+      if (Iterate()) return summary_;
+      if (region_.Radius() <= kMinRadius) {
+        return Finish(true, "no step is small enough");
+      }
+    }
+  }
+
+ private:
+  MinimizeBundleSummary Finish(bool success, const std::string& message) {
+    summary_.success = success;
+    summary_.final_cost = cost_;
+    summary_.message = message;
+    return summary_;
+  }
+
+  // Whether it has come to an end.
+  bool Iterate() {
+    factorization_.factorize(reducer_.Matrix().Matrix());
+    const bool is_definite = factorization_.info() == Eigen::Success;
+    Eigen::VectorXd step;
+    if (is_definite) step = factorization_.solve(-reducer_.Gradient());
+    if (!is_definite || !step.allFinite()) return EndsWithInvalidStep();
+    const BundleReducer::Step moved = reducer_.Move(step);
+    if (!(moved.predicted_decrease > 0.0)) {
+      reducer_.TakeBack();
+      return EndsWithInvalidStep();
+    }
+    num_invalid_steps_ = 0;
+    const double new_cost = reducer_.Cost();
+    const double decrease = cost_ - new_cost;
+    const bool is_short = std::sqrt(moved.squared_length) <=
+                          options_.tolerance * (std::sqrt(moved.squared_norm) +
+                                                options_.tolerance);
+    if (is_short || std::abs(decrease) <= options_.function_tolerance * cost_) {
+      reducer_.TakeBack();
+      Finish(true, "converged");
+      return true;
+    }
+    const double relative_decrease = decrease / moved.predicted_decrease;
+    if (relative_decrease > kMinRelativeDecrease) {
+      region_.Accept(relative_decrease);
+      cost_ = new_cost;
+    } else {
+      reducer_.TakeBack();
+      region_.Reject();
+    }
+    return false;
+  }
+
+  bool EndsWithInvalidStep() {
+    region_.Reject();
+    if (++num_invalid_steps_ < options_.max_num_invalid_steps) return false;
+    Finish(false, "too many invalid steps");
+    return true;
+  }
+
+  const MinimizeBundleOptions options_;
+  BundleReducer reducer_;
+  TrustRegion region_;
+  Eigen::CholmodSupernodalLLT<Eigen::SparseMatrix<double>> factorization_;
+  MinimizeBundleSummary summary_;
+  double cost_ = 0.0;
+  int num_invalid_steps_ = 0;
+};
+
+}  // namespace
+
+MinimizeBundleSummary MinimizeBundle(const MinimizeBundleOptions& options,
+                                     BundleProblem* bundle) {
+  return BundleMinimizer(options, bundle).Run();
+}
+
+}  // namespace adasfm

@@ -1,0 +1,42 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <string>
+
+namespace adasfm {
+
+class BundleProblem;
+
+struct MinimizeBundleOptions {
+  int max_num_iterations = 50;
+  // Relative change of the cost at which the minimum is found.
+  double function_tolerance = 1e-5;
+  // Of gradients and, relative to the parameters, of steps.
+  double tolerance = 1e-12;
+  // Of the trust region at first; the damping is its inverse.
+  double initial_radius = 1e4;
+  int max_num_invalid_steps = 10;  // One after another.
+  int num_threads = 1;
+};
+
+struct MinimizeBundleSummary {
+  // Whether the parameters may be used: they never cost more than before.
+  bool success = false;
+  // The start counts as one.
+  int num_iterations = 0;
+  double initial_cost = 0.0;
+  double final_cost = 0.0;
+  std::string message;
+};
+
+// Moves the parameters of a problem that keeps its points apart to the minimum
+// of its cost.
+//
+// Method: Levenberg-Marquardt with the rules of Ceres for damping, acceptance
+// and end, so that both make the same steps; the normal equations of
+// bundle_reducer.h, factorised by CHOLMOD.
+// On failure, where no step is possible, the parameters are the best found.
+MinimizeBundleSummary MinimizeBundle(const MinimizeBundleOptions& options,
+                                     BundleProblem* bundle);
+
+}  // namespace adasfm
