@@ -4,6 +4,7 @@
 #include <string>
 
 #include "colmap_ext/commands/registry.h"
+#include "colmap_ext/host/frame_files.h"
 #include "colmap_ext/host/model.h"
 #include "colmap_ext/host/model_folder.h"
 #include "colmap_ext/io/georeference_file.h"
@@ -31,10 +32,18 @@ Status WriteInFrame(const GeoreferencerOptions& options) {
   if (!target.ok()) return target.status();
   StatusOr<colmap::Reconstruction> model = ReadModel(options.input_path);
   if (!model.ok()) return model.status();
+  StatusOr<ModelFrames> frames = ReadFrameFiles(options.input_path);
+  if (!frames.ok()) return frames.status();
   TransformReconstruction(target->target_from_enu, &*model);
+  for (auto& [camera_id, camera] : frames->rigs.cameras) {
+    if (!camera.cam_from_rig) continue;
+    camera.cam_from_rig->translation *= target->target_from_enu.scale;
+  }
   Status status = PrepareOutputFolder(options.output_path);
   if (status.ok()) status = CheckModelFolder(options.output_path);
-  if (status.ok()) status = WriteBinaryModel(*model, options.output_path);
+  if (status.ok()) {
+    status = WriteBinaryModel(*model, options.output_path, *frames);
+  }
   if (!status.ok()) return status;
   std::cout << "Model in " << target->description << " written to "
             << options.output_path << std::endl;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "colmap_ext/host/database.h"
 #include "colmap_ext/host/features.h"
-#include "core/sqlite.h"
+#include "colmap_ext/host/host_features.h"
 
 namespace adasfm {
 
@@ -16,17 +16,13 @@ static Status MissingRows(const std::string& database_path,
 Status CheckFeatures(const std::string& database_path) {
   try {
     SqliteConnection database(database_path, SqliteConnection::Mode::kRead);
-    SqliteStatement statement(
-        &database,
-        "SELECT COUNT(*), MIN(name), (SELECT COUNT(*) FROM images) FROM images "
-        "WHERE image_id NOT IN (SELECT image_id FROM keypoints) OR "
-        "image_id NOT IN (SELECT image_id FROM descriptors)");
-    if (!statement.Step() || statement.Int(0) == 0) return Status::Ok();
+    const std::vector<std::string> names = ImagesWithoutFeatures(&database);
+    if (names.empty()) return Status::Ok();
     return MissingRows(database_path, "the features of",
-                       std::to_string(statement.Int(0)) + " of " +
-                           std::to_string(statement.Int(2)) +
+                       std::to_string(names.size()) + " of " +
+                           std::to_string(ReadImages(&database).size()) +
                            " images are missing (the first one is " +
-                           statement.Text(1) + ")",
+                           names.front() + ")",
                        "features.log");
   } catch (const SqliteError& error) {
     return Status::Error(database_path + ": " + error.what());

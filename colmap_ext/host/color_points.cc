@@ -3,8 +3,6 @@
 
 #include <filesystem>
 #include <string>
-#include <utility>
-#include <vector>
 
 #include "colmap_ext/host/model.h"
 #include "colmap_ext/host/model_folder.h"
@@ -15,23 +13,19 @@ namespace adasfm {
 Status ColorPoints(const std::string& image_path,
                    const std::string& output_path,
                    const std::string& log_path) {
-  std::vector<colmap::Reconstruction> models;
-  std::error_code error;
-  for (int k = 0;
-       std::filesystem::exists(output_path + "/" + std::to_string(k), error);
-       ++k) {
-    StatusOr<colmap::Reconstruction> model =
-        ReadModel(output_path + "/" + std::to_string(k));
+  for (int k = 0;; ++k) {
+    const std::string path = output_path + "/" + std::to_string(k);
+    std::error_code error;
+    if (!std::filesystem::exists(path, error)) return Status::Ok();
+    StatusOr<colmap::Reconstruction> model = ReadModel(path);
     if (!model.ok()) return model.status();
-    models.push_back(std::move(*model));
+    {
+      const CaptureOutput capture(log_path, "Could not read");
+      model->ExtractColorsForAllImages(image_path);
+    }
+    const Status status = ReplacePoints(*model, path);
+    if (!status.ok()) return status;
   }
-  std::vector<const colmap::Reconstruction*> pointers;
-  for (colmap::Reconstruction& model : models) {
-    const CaptureOutput capture(log_path, "Could not read");
-    model.ExtractColorsForAllImages(image_path);
-    pointers.push_back(&model);
-  }
-  return WriteModelFolder(output_path, pointers);
 }
 
 }  // namespace adasfm

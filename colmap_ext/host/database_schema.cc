@@ -56,6 +56,11 @@ std::vector<std::string> FindNewerTables(SqliteConnection* database) {
   return tables;
 }
 
+bool IsHalfConvertible(SqliteConnection* database) {
+  return HasColumn(database, "pose_priors", "image_id") &&
+         !HasColumn(database, "pose_priors", "position_covariance");
+}
+
 Status CheckLibraryOpens(const std::string& database_path) {
   std::error_code error;
   const uintmax_t size = std::filesystem::file_size(database_path, error);

@@ -25,6 +25,10 @@ Status CheckColumns(const std::string& path, SqliteConnection* database);
 // file that has any: it would stamp its version and end the process.
 std::vector<std::string> FindNewerTables(SqliteConnection* database);
 
+// Whether the file has COLMAP 3.10's form, which COLMAP 4 leaves half
+// converted: its pose_priors lack the column position_covariance.
+bool IsHalfConvertible(SqliteConnection* database);
+
 // Why the linked library must not open the file, to follow its name; empty when
 // it may. The answer of each host/vN.
 std::string WhyLibraryMustNotOpen(SqliteConnection* database);

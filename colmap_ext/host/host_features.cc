@@ -75,17 +75,6 @@ bool UsesHostGpu(const FeatureOptions& options, const std::string& program) {
   return ReadHostHelp(program, "help").find("with CUDA") != std::string::npos;
 }
 
-std::vector<std::string> ImagesWithoutFeatures(SqliteConnection* database) {
-  SqliteStatement statement(
-      database,
-      "SELECT name FROM images WHERE image_id NOT IN (SELECT image_id FROM "
-      "keypoints) OR image_id NOT IN (SELECT image_id FROM descriptors) "
-      "ORDER BY name");
-  std::vector<std::string> names;
-  while (statement.Step()) names.push_back(statement.Text(0));
-  return names;
-}
-
 int64_t Count(SqliteConnection* database, const std::string& from) {
   SqliteStatement statement(database, "SELECT count(*) FROM " + from);
   statement.Step();
@@ -119,6 +108,17 @@ StatusOr<ImageRegistration> ReadRegistration(
   } catch (const SqliteError& error) {
     return Status::Error(database_path + ": " + error.what());
   }
+}
+
+std::vector<std::string> ImagesWithoutFeatures(SqliteConnection* database) {
+  SqliteStatement statement(
+      database,
+      "SELECT name FROM images WHERE image_id NOT IN (SELECT image_id FROM "
+      "keypoints) OR image_id NOT IN (SELECT image_id FROM descriptors) "
+      "ORDER BY name");
+  std::vector<std::string> names;
+  while (statement.Step()) names.push_back(statement.Text(0));
+  return names;
 }
 
 Status ExtractFeaturesByHost(const FeatureOptions& options,

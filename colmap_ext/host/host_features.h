@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "colmap_ext/host/features.h"
+#include "core/sqlite.h"
 
 namespace adasfm {
 
@@ -21,7 +22,11 @@ bool UsesHostProgram();
 StatusOr<ImageRegistration> ReadRegistration(
     const std::vector<std::string>& names, const std::string& database_path);
 
-// Of the images without keypoints or descriptors.
+// Their names, in order: images without keypoints or descriptors. Throws
+// SqliteError.
+std::vector<std::string> ImagesWithoutFeatures(SqliteConnection* database);
+
+// Of those images.
 Status ExtractFeaturesByHost(const FeatureOptions& options,
                              const std::string& image_path,
                              const std::string& database_path,

@@ -169,9 +169,7 @@ std::string FindHostConflict(const std::string& host_path,
              ", which stamps its own version on the file and cannot read it; "
              "set ADASFM_HOST_COLMAP to the COLMAP that made it";
     }
-    if (*version >= Version(4, 0) &&
-        HasColumn(&database, "pose_priors", "image_id") &&
-        !HasColumn(&database, "pose_priors", "position_covariance")) {
+    if (*version >= Version(4, 0) && IsHalfConvertible(&database)) {
       return database_path + " is of COLMAP 3.10, which COLMAP " + host +
              " fails to convert; this helps: sqlite3 " + database_path +
              " 'ALTER TABLE pose_priors ADD COLUMN position_covariance BLOB'";

@@ -63,13 +63,16 @@ class BinaryWalker {
   uint64_t num_bytes_left_ = 0;
 };
 
-bool IsCamerasFile(const std::string& path) {
+// newer_model becomes the name of the first camera model that the linked
+// library lacks and a newer COLMAP has.
+bool WalkCameras(const std::string& path, std::string* newer_model) {
   BinaryWalker walker(path);
   uint64_t count = 0;
   if (!walker.Read(&count)) return false;
   for (uint64_t i = 0; i < count; ++i) {
     int32_t model_id = 0;
     if (!walker.Skip(4) || !walker.Read(&model_id)) return false;
+    if (IsNewerCameraModel(model_id)) *newer_model = CameraModelName(model_id);
     const std::optional<int> num_params = CameraModelNumParams(model_id);
     if (!num_params || !walker.Skip(16) || !walker.SkipArray(*num_params, 8)) {
       return false;
@@ -78,21 +81,9 @@ bool IsCamerasFile(const std::string& path) {
   return walker.AtEnd();
 }
 
-// The name of the first camera model that the linked library lacks and a newer
-// COLMAP has; empty without one.
-std::string FindNewerCameraModel(const std::string& path) {
-  BinaryWalker walker(path);
-  uint64_t count = 0;
-  walker.Read(&count);
-  int32_t model_id = 0;
-  while (walker.Skip(4) && walker.Read(&model_id)) {
-    if (IsNewerCameraModel(model_id)) return CameraModelName(model_id);
-    const std::optional<int> num_params = CameraModelNumParams(model_id);
-    if (!num_params || !walker.Skip(16) || !walker.SkipArray(*num_params, 8)) {
-      break;
-    }
-  }
-  return "";
+bool IsCamerasFile(const std::string& path) {
+  std::string newer_model;
+  return WalkCameras(path, &newer_model);
 }
 
 bool IsImagesFile(const std::string& path) {
@@ -174,8 +165,8 @@ StatusOr<colmap::Reconstruction> ReadModel(const std::string& path) {
   }
   if (is_binary) {
     const fs::path folder(path);
-    const std::string newer =
-        FindNewerCameraModel((folder / "cameras.bin").string());
+    std::string newer;
+    WalkCameras((folder / "cameras.bin").string(), &newer);
     if (!newer.empty()) {
       return Status::Error("the model in " + path +
                            " has a camera of the model " + newer +

@@ -43,17 +43,8 @@ Status WriteModels(const std::vector<const colmap::Reconstruction*>& models,
   for (size_t i = 0; i < models.size(); ++i) {
     const fs::path path = temporary / std::to_string(i);
     fs::create_directories(path);
-    const Status status = WriteBinaryModel(*models[i], path.string());
+    const Status status = WriteBinaryModel(*models[i], path.string(), frames);
     if (!status.ok()) return status;
-    if (frames.frames.empty()) continue;
-    if (!WriteFrameFiles(*models[i], frames, path.string())) {
-      return Status::Error("cannot write the frames of a model to " +
-                           path.string() + "; check the free space");
-    }
-    for (const char* name : {"rigs.bin", "frames.bin"}) {
-      const Status synced = SyncToDisk((path / name).string());
-      if (!synced.ok()) return synced;
-    }
   }
   return Status::Ok();
 }
@@ -78,7 +69,12 @@ Status ReplaceModels(const fs::path& temporary, const fs::path& folder,
 }  // namespace
 
 Status WriteBinaryModel(const colmap::Reconstruction& model,
-                        const std::string& path) {
+                        const std::string& path, const ModelFrames& frames) {
+  const std::vector<std::string> frame_files = {path + "/rigs.bin",
+                                                path + "/frames.bin"};
+  std::error_code none;
+  // Those of a model that was here before would say other images.
+  for (const std::string& file : frame_files) fs::remove(file, none);
   model.WriteBinary(path);
   const std::pair<const char*, uint64_t> files[] = {
       {"cameras.bin", model.NumCameras()},
@@ -93,7 +89,37 @@ Status WriteBinaryModel(const colmap::Reconstruction& model,
     const Status status = SyncToDisk(file);
     if (!status.ok()) return status;
   }
+  if (!frames.frames.empty()) {
+    if (!WriteFrameFiles(model, frames, path)) {
+      return Status::Error("cannot write the frames of a model to " + path +
+                           "; check the free space");
+    }
+    for (const std::string& file : frame_files) {
+      const Status status = SyncToDisk(file);
+      if (!status.ok()) return status;
+    }
+  }
   return SyncToDisk(path);
+}
+
+Status ReplacePoints(const colmap::Reconstruction& model,
+                     const std::string& path) {
+  const fs::path temporary = fs::path(path).parent_path() / kTemporaryName;
+  Status status;
+  try {
+    fs::remove_all(temporary);
+    fs::create_directory(temporary);
+    status = WriteBinaryModel(model, temporary.string());
+    if (status.ok()) {
+      fs::rename(temporary / "points3D.bin", fs::path(path) / "points3D.bin");
+      status = SyncToDisk(path);
+    }
+    fs::remove_all(temporary);
+  } catch (const fs::filesystem_error& error) {
+    return Status::Error("cannot write to " + path + ": " +
+                         error.code().message());
+  }
+  return status;
 }
 
 Status WriteModelFolder(

@@ -13,15 +13,20 @@ namespace adasfm {
 // Writes a model's binary files into a folder that exists, reads them back as
 // far as COLMAP's reader needs them sound, and waits until they are on the
 // disk. COLMAP itself reports no failed write. The error names file and cause.
+// With `frames` (frames.h), rigs.bin and frames.bin too.
 Status WriteBinaryModel(const colmap::Reconstruction& model,
-                        const std::string& path);
+                        const std::string& path,
+                        const ModelFrames& frames = {});
+
+// Replaces points3D.bin in the folder of this model; what else is there stays.
+Status ReplacePoints(const colmap::Reconstruction& model,
+                     const std::string& path);
 
 // Writes COLMAP models as output_path/0, output_path/1, ... in binary. All are
 // complete under a temporary name before the first of them appears; numbered
 // models that an earlier run left beyond the last one are removed, and nothing
-// else in the folder is touched. With `frames` (frames.h), rigs.bin and
-// frames.bin too. An error when the disk is full or not writable, and as
-// CheckModelFolders.
+// else in the folder is touched. `frames` as above. An error when the disk is
+// full or not writable, and as CheckModelFolders.
 Status WriteModelFolder(
     const std::string& output_path,
     const std::vector<const colmap::Reconstruction*>& models,

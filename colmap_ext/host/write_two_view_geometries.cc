@@ -3,18 +3,13 @@
 
 #include "colmap_ext/host/database.h"
 #include "colmap_ext/host/two_view.h"
+#include "colmap_ext/io/double_blob.h"
 #include "core/so3.h"
 
 namespace adasfm {
 namespace {
 
 using RowMajorMatrix3d = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
-
-template <typename Matrix>
-void BindMatrix(SqliteStatement* statement, int parameter,
-                const Matrix& matrix) {
-  statement->BindBlob(parameter, matrix.data(), matrix.size() * sizeof(double));
-}
 
 void WriteTwoViewGeometry(const colmap::Camera& camera1,
                           const colmap::Camera& camera2,
@@ -36,10 +31,10 @@ void WriteTwoViewGeometry(const colmap::Camera& camera1,
   statement->BindBlob(3, row.inlier_matches.data(),
                       row.inlier_matches.size() * sizeof(FeatureMatch));
   statement->BindInt(4, kCalibratedConfiguration);
-  BindMatrix(statement, 5, F);
-  BindMatrix(statement, 6, E);
-  BindMatrix(statement, 7, qvec);
-  BindMatrix(statement, 8, tvec);
+  BindDoubles(statement, 5, F.data(), 9);
+  BindDoubles(statement, 6, E.data(), 9);
+  BindDoubles(statement, 7, qvec.data(), 4);
+  BindDoubles(statement, 8, tvec.data(), 3);
   statement->Step();
 }
 

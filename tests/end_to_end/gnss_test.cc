@@ -9,7 +9,9 @@
 
 #include "colmap_ext/database/prior_tables.h"
 #include "colmap_ext/evaluation/evaluation.h"
+#include "colmap_ext/host/frame_files.h"
 #include "colmap_ext/host/model.h"
+#include "colmap_ext/host/model_folder.h"
 #include "colmap_ext/host/pose_conversion.h"
 #include "colmap_ext/io/georeference_file.h"
 #include "core/geodesy.h"
@@ -127,7 +129,15 @@ TEST_F(GnssTest, PositionsAlone) {
     Reconstruct();
     EXPECT_LT(RmsError(folder_.File("sparse")), 0.3) << seed;
   }
-  // The same model in ECEF.
+  // The same model in ECEF, with the ids of frames and rigs that it has.
+  ModelFrames frames;
+  for (const auto& [image_id, pose] :
+       CamsFromWorld(*ReadModel(folder_.File("sparse/0")))) {
+    frames.frames[image_id] = {image_id + 100, 7};
+  }
+  ASSERT_TRUE(WriteBinaryModel(*ReadModel(folder_.File("sparse/0")),
+                               folder_.File("sparse/0"), frames)
+                  .ok());
   ASSERT_EQ(
       Call("adasfm_georeferencer --input_path " + folder_.File("sparse/0") +
            " --output_path " + folder_.File("ecef"))
@@ -144,6 +154,12 @@ TEST_F(GnssTest, PositionsAlone) {
                   .norm(),
               1e-6);
   }
+  const auto kept = ReadFrameFiles(folder_.File("ecef"));
+  ASSERT_TRUE(kept.ok());
+  ASSERT_EQ(kept->frames.size(), frames.frames.size());
+  EXPECT_EQ(kept->frames.begin()->second.frame_id,
+            frames.frames.begin()->second.frame_id);
+  EXPECT_EQ(kept->frames.begin()->second.rig_id, 7);
 }
 
 // Those that COLMAP 3.8 takes from EXIF.

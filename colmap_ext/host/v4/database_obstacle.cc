@@ -3,13 +3,8 @@
 
 namespace adasfm {
 
-// COLMAP 4 turns all other files into its own form; these it leaves half
-// converted.
 std::string WhyLibraryMustNotOpen(SqliteConnection* database) {
-  if (!database->HasTable("pose_priors") ||
-      HasColumn(database, "pose_priors", "position_covariance")) {
-    return "";
-  }
+  if (!IsHalfConvertible(database)) return "";
   return " was written by COLMAP 3.10, whose pose_priors COLMAP 4 cannot read; "
          "add the column position_covariance BLOB to that table";
 }

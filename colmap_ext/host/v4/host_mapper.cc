@@ -111,11 +111,11 @@ std::vector<image_t> HostMapper::FindNextImages(int min_num_visible_points) {
   struct Candidate {
     image_t image_id;
     bool is_tried;
-    size_t num_visible;
+    int num_visible;
   };
   std::vector<Candidate> candidates;
   for (const auto& [image_id, image] : reconstruction_.Images()) {
-    const size_t num_visible = NumVisiblePoints(image_id);
+    const int num_visible = static_cast<int>(NumVisiblePoints(image_id));
     if (image.HasPose() || num_visible < min_num_visible_points) continue;
     candidates.push_back(
         {image_id, host_->tried.count(image_id) > 0, num_visible});
@@ -158,7 +158,7 @@ bool HostMapper::RegisterNextImage(image_t image_id, double max_reproj_error_px,
           reconstruction_.Point3D(other.point3D_id).xyz);
     }
   }
-  if (points.pixels.size() < min_num_inliers) return false;
+  if (static_cast<int>(points.pixels.size()) < min_num_inliers) return false;
   colmap::AbsolutePoseEstimationOptions options;
   options.ransac_options.max_error = max_reproj_error_px;
   options.ransac_options.min_inlier_ratio = kMinInlierRatio;
@@ -171,7 +171,7 @@ bool HostMapper::RegisterNextImage(image_t image_id, double max_reproj_error_px,
   if (!colmap::EstimateAbsolutePose(options, points.pixels,
                                     points.points_in_world, &pose, &camera,
                                     &num_inliers, &inlier_mask) ||
-      num_inliers < min_num_inliers ||
+      static_cast<int>(num_inliers) < min_num_inliers ||
       !colmap::RefineAbsolutePose({}, inlier_mask, points.pixels,
                                   points.points_in_world, &pose, &camera)) {
     return false;

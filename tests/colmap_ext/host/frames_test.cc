@@ -6,6 +6,8 @@
 #include <cstring>
 
 #include "colmap_ext/datasets/write_synthetic_world.h"
+#include "colmap_ext/host/color_points.h"
+#include "colmap_ext/host/frame_files.h"
 #include "colmap_ext/host/model.h"
 #include "colmap_ext/host/model_folder.h"
 #include "colmap_ext/host/pose_conversion.h"
@@ -133,7 +135,8 @@ TEST_F(FramesTest, FilesSayTheIdsAndPosesOfRegisteredImages) {
   EXPECT_FALSE(WriteModelFolder(folder_.Path(), {&model}, frames).ok());
 }
 
-TEST_F(FramesTest, FilesSayTheRigOfTheModel) {
+// A model of the two cameras of a rig, with three images in two frames.
+colmap::Reconstruction WriteRigModel(const std::string& folder) {
   const Rigid3d pose1(Eigen::Quaterniond(0.5, 0.5, -0.5, 0.5),
                       Eigen::Vector3d(1.0, 2.0, 3.0));
   const Rigid3d mount(Eigen::Quaterniond::Identity(),
@@ -160,8 +163,12 @@ TEST_F(FramesTest, FilesSayTheRigOfTheModel) {
     frames.rigs.images[image_id] = {camera_id, (image_id + 1) / 2};
     frames.frames[image_id] = {(image_id + 1) / 2, 3};
   }
-  ASSERT_TRUE(WriteModelFolder(folder_.Path(), {&model}, frames).ok());
+  EXPECT_TRUE(WriteModelFolder(folder, {&model}, frames).ok());
+  return model;
+}
 
+TEST_F(FramesTest, FilesSayTheRigOfTheModel) {
+  WriteRigModel(folder_.Path());
   std::string rigs = ReadBytes(folder_.File("0/rigs.bin"));
   EXPECT_EQ(Take<uint64_t>(&rigs), 1);
   EXPECT_EQ(Take<uint32_t>(&rigs), 3);
@@ -194,6 +201,45 @@ TEST_F(FramesTest, FilesSayTheRigOfTheModel) {
     }
   }
   EXPECT_TRUE(file.empty());
+}
+
+TEST_F(FramesTest, FilesAreReadAsWritten) {
+  EXPECT_TRUE(ReadFrameFiles(folder_.Path())->frames.empty());
+  const colmap::Reconstruction model = WriteRigModel(folder_.Path());
+  const std::string rigs = ReadBytes(folder_.File("0/rigs.bin"));
+  const std::string file = ReadBytes(folder_.File("0/frames.bin"));
+  const StatusOr<ModelFrames> frames = ReadFrameFiles(folder_.File("0"));
+  ASSERT_TRUE(frames.ok()) << frames.status().message();
+  ASSERT_TRUE(WriteModelFolder(folder_.File("again"), {&model}, *frames).ok());
+  EXPECT_EQ(ReadBytes(folder_.File("again/0/rigs.bin")), rigs);
+  EXPECT_EQ(ReadBytes(folder_.File("again/0/frames.bin")), file);
+  for (size_t size = 0; size < file.size(); size += 7) {
+    folder_.Write("0/frames.bin", file.substr(0, size));
+    EXPECT_FALSE(ReadFrameFiles(folder_.File("0")).ok()) << size;
+  }
+  // What is no camera belongs to no model.
+  std::string imu = file;
+  imu[8 + 2 * 4 + 7 * 8 + 4] = 1;
+  folder_.Write("0/frames.bin", imu);
+  EXPECT_TRUE(ReadFrameFiles(folder_.File("0"))->frames.empty());
+}
+
+TEST_F(FramesTest, FilesStayWhenPointsAreColoured) {
+  WriteRigModel(folder_.Path());
+  const std::string rigs = ReadBytes(folder_.File("0/rigs.bin"));
+  const std::string file = ReadBytes(folder_.File("0/frames.bin"));
+  ASSERT_TRUE(ColorPoints(folder_.File("photos"), folder_.Path(),
+                          folder_.File("colors.log"))
+                  .ok());
+  EXPECT_EQ(ReadBytes(folder_.File("0/rigs.bin")), rigs);
+  EXPECT_EQ(ReadBytes(folder_.File("0/frames.bin")), file);
+}
+
+TEST_F(FramesTest, FilesOfAnotherModelGo) {
+  const colmap::Reconstruction model = WriteRigModel(folder_.Path());
+  ASSERT_TRUE(WriteBinaryModel(model, folder_.File("0")).ok());
+  EXPECT_FALSE(std::filesystem::exists(folder_.File("0/rigs.bin")));
+  EXPECT_FALSE(std::filesystem::exists(folder_.File("0/frames.bin")));
 }
 
 TEST_F(FramesTest, ModelsWithUnknownCamerasAreNamed) {
