@@ -12,7 +12,6 @@ namespace adasfm {
 namespace {
 
 constexpr double kMinImagePeriodS = 1e-3;
-constexpr double kMinImuRateHz = 40.0;
 constexpr double kMaxScaleError = 0.2;
 constexpr double kMaxScaleFactor = 2.0;
 
@@ -33,17 +32,6 @@ Status CheckCoverage(const std::vector<timestamp_t>& times_ns,
         "the images are %.3g s apart; their times look like microseconds: "
         "multiply them by 1000 (nanoseconds are expected)",
         period_s));
-  }
-  std::vector<timestamp_t> imu_times_ns;
-  for (const ImuSample& sample : logs.imu) {
-    imu_times_ns.push_back(sample.timestamp_ns);
-  }
-  const double imu_period_s = ComputeMedianPeriod(imu_times_ns);
-  if (imu_period_s > 1.0 / kMinImuRateHz) {
-    warnings->push_back(FormatFigures(
-        "the IMU runs at %.3g Hz; below %.3g Hz turns and bumps between its "
-        "samples are lost: record it faster",
-        1.0 / imu_period_s, kMinImuRateHz));
   }
   if (logs.wheel.empty() && logs.odometry.empty()) return Status::Ok();
   const bool is_wheel = !logs.wheel.empty();

@@ -15,8 +15,8 @@ namespace adasfm {
 // of the images, in order, on the IMU's clock.
 
 // An error when the images or the wheels are on another clock: images less than
-// 1 ms apart, a wheel log that covers no image. Warnings for a wheel log that
-// covers less than half of the images, and an IMU below 40 Hz.
+// 1 ms apart, a wheel log that covers no image. A warning for a wheel log that
+// covers less than half of the images.
 Status CheckCoverage(const std::vector<timestamp_t>& times_ns,
                      const MotionLogs& logs,
                      std::vector<std::string>* warnings);

@@ -20,6 +20,11 @@ constexpr double kMinFactor = 1.2;
 // A figure this much too small is another sensor's, or in another unit.
 constexpr double kWrongFactor = 5.0;
 
+// On the drives measured a gyroscope loses a third of what it would lose at
+// half its rate. From this factor on that is as much as its noise.
+constexpr double kMaxHalfRateLoss = 3.0;
+constexpr double kMaxGapPeriods = 4.0;
+
 // The smoother's residuals move a figure by no more than this, and by more than
 // estimates of some hundred residuals err.
 constexpr double kMaxNoiseFactor = 5.0;
@@ -111,6 +116,53 @@ void Raise(const char* name, double shown, double min_factor, double* figure,
   *figure = shown;
 }
 
+// By how much integrals over a second change without every other reading, as
+// the density of a white noise that changes them so; of white noise that is its
+// own density. 0 when the log is too short.
+double HalfRateLoss(const Readings& readings) {
+  if (readings.values.size() < 3) return 0.0;
+  const double max_step_s = kMaxGapPeriods * readings.PeriodS();
+  const auto seconds = [&](size_t begin, size_t end) {
+    return SecondsFromNs(readings.times_ns[end] - readings.times_ns[begin]);
+  };
+  Eigen::Vector3d change = Eigen::Vector3d::Zero();
+  double sum = 0.0, change_s = 0.0, sum_s = 0.0;
+  for (size_t i = 0; i + 2 < readings.values.size(); i += 2) {
+    const double step_s = seconds(i, i + 2);
+    if (step_s > max_step_s) continue;
+    const Eigen::Vector3d& first = readings.values[i];
+    const Eigen::Vector3d& last = readings.values[i + 2];
+    const Eigen::Vector3d& middle = readings.values[i + 1];
+    // The midpoint rule with the middle one, less that without.
+    change += 0.5 * (seconds(i, i + 1) * (first + middle) +
+                     seconds(i + 1, i + 2) * (middle + last) -
+                     step_s * (first + last));
+    change_s += step_s;
+    if (change_s < kStretchS) continue;
+    sum += change.squaredNorm() / readings.num_axes;
+    sum_s += change_s;
+    change.setZero();
+    change_s = 0.0;
+  }
+  if (sum_s < kMinNumStretches * kStretchS) return 0.0;
+  return std::sqrt(sum / sum_s);
+}
+
+// What is lost between the samples, where it is more than noise.
+void AddRateLoss(const Readings& rates, double* density,
+                 std::vector<std::string>* warnings) {
+  const double loss = HalfRateLoss(rates);
+  if (loss <= kMaxHalfRateLoss * *density) return;
+  const double raised = std::hypot(*density, loss / kMaxHalfRateLoss);
+  warnings->push_back(
+      FormatFigures("the gyroscope's %.3g Hz are slow for this drive: at half "
+                    "of that its rotations change by %.3g rad/sqrt(s), ",
+                    1.0 / rates.PeriodS(), loss) +
+      FormatFigures("where noise explains %.3g; %.3g is used: record it faster",
+                    *density, raised));
+  *density = raised;
+}
+
 // Moves a factor by another, up to max_factor; whether it moved enough to
 // matter.
 bool MoveFactor(double by, double max_factor, double* factor) {
@@ -135,6 +187,7 @@ void RaiseNoiseFigures(const MotionLogs& logs, SensorCalibration* calibration,
         &noise.gyroscope_noise_density, warnings);
   Raise("accelerometer_noise_density", LeastDensity(forces), kMinFactor,
         &noise.accelerometer_noise_density, warnings);
+  AddRateLoss(rates, &noise.gyroscope_noise_density, warnings);
   if (CountsTicks(calibration->wheel_type) || logs.wheel.size() < 2) return;
   Readings speeds;
   speeds.num_axes = 1;

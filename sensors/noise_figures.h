@@ -11,8 +11,8 @@
 
 namespace adasfm {
 
-// The white noise that logs themselves show, where the stated figures are too
-// small: densities of the IMU, sigma of a wheel's speed.
+// The noise that logs themselves show, where the stated figures are too small:
+// densities of the IMU, sigma of a wheel's speed.
 //
 // Method. White noise adds the same to the spectrum at all frequencies, motion
 // and vibration only add to it. Second differences of means over 1, 4 and 16
@@ -25,6 +25,12 @@ namespace adasfm {
 // sensor's or in another unit: it is said in `warnings`. One above is kept,
 // since a log may be filtered, and its errors (scale, alignment, time stamps)
 // be more than noise.
+//
+// What a gyroscope misses between its samples depends on the drive, not on the
+// rate alone. Its rotations over a second are compared with those from every
+// other sample: white noise changes them by its own density, motion by three
+// times what the rate loses (at 96, 24 and 10 Hz 0.02, 0.3 and 2 of the noise
+// on KITTI 07). A loss above the noise is added to it, and said.
 //
 // A log of fewer than eight stretches changes nothing.
 void RaiseNoiseFigures(const MotionLogs& logs, SensorCalibration* calibration,

@@ -29,6 +29,8 @@ namespace po = boost::program_options;
 
 constexpr char kOutOfMemory[] =
     "out of memory; use fewer threads, or fewer images at a time";
+constexpr char kTooFewThreads[] =
+    "the system gives too few threads; use a smaller --num_threads";
 
 // Messages of other libraries may have several lines; an error has one.
 std::string OneLine(std::string message) {
@@ -73,11 +75,13 @@ void WriteToStderr(const char* text) {
   try {
     const std::exception_ptr exception = std::current_exception();
     if (exception) std::rethrow_exception(exception);
-    WriteToStderr(
-        "the system gives too few threads; use a smaller "
-        "--num_threads");
+    WriteToStderr(kTooFewThreads);
   } catch (const std::bad_alloc&) {
     WriteToStderr(kOutOfMemory);
+  } catch (const std::system_error& error) {
+    WriteToStderr(error.code() == std::errc::resource_unavailable_try_again
+                      ? kTooFewThreads
+                      : error.what());
   } catch (const std::exception& error) {
     WriteToStderr(error.what());
   } catch (...) {

@@ -12,6 +12,7 @@
 #include "colmap_ext/database/prior_tables.h"
 #include "colmap_ext/database/two_view_geometry_backup.h"
 #include "colmap_ext/host/database.h"
+#include "colmap_ext/io/folder_lock.h"
 #include "colmap_ext/io/output_files.h"
 #include "core/sqlite.h"
 
@@ -246,10 +247,16 @@ StatusOr<MergedDatabase> MergeDatabases(
     named.emplace_back("an input", input.path);
   }
   Status status = CheckOutputIsNoInput(output_path, named);
+  if (status.ok()) status = CheckOutputFile(output_path);
+  if (!status.ok()) return status;
+  // Two runs would write to the same temporary file.
+  const fs::path folder = fs::path(output_path).parent_path();
+  const auto lock =
+      FolderLock::Acquire(folder.empty() ? "." : folder.string(),
+                          FolderLock::Mode::kExclusive, kMergerLockName);
+  if (!lock.ok()) return lock.status();
   const bool is_new = !fs::exists(output_path);
-  if (status.ok()) {
-    status = is_new ? CheckOutputFile(output_path) : CheckDatabase(output_path);
-  }
+  if (!is_new) status = CheckDatabase(output_path);
   if (!status.ok()) return status;
   try {
     if (!is_new) return Merge(options, inputs, output_path, is_new);

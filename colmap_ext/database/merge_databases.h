@@ -25,6 +25,9 @@ struct MergeDatabasesOptions {
   bool share_cameras = true;
 };
 
+// Of the lock (folder_lock.h) in the output's folder.
+inline constexpr char kMergerLockName[] = ".adasfm_merger.lock";
+
 struct MergedDatabase {
   // What the output has.
   int64_t num_cameras = 0;
@@ -46,7 +49,8 @@ struct MergedDatabase {
 // Works by columns and without COLMAP's library, on databases of COLMAP 3.6 to
 // 4.2 that all have the same columns. An error, and no change, for other
 // columns or tables, for rows of the same image or pair that differ, and for
-// databases that adasfm_global has rewritten.
+// databases that adasfm_global has rewritten. One run at a time writes into a
+// folder; a second one is an error that names the first.
 StatusOr<MergedDatabase> MergeDatabases(
     const MergeDatabasesOptions& options,
     const std::vector<DatabaseToMerge>& inputs, const std::string& output_path);

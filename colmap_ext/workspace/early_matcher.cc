@@ -7,6 +7,7 @@
 #include <chrono>
 #include <exception>
 #include <set>
+#include <system_error>
 
 #include "colmap_ext/pairs/predict_motions.h"
 #include "colmap_ext/workspace/early_database.h"
@@ -57,7 +58,12 @@ EarlyMatcher::~EarlyMatcher() {
 }
 
 void EarlyMatcher::Start() {
-  if (!thread_.joinable()) thread_ = std::thread([this] { Run(); });
+  if (thread_.joinable()) return;
+  try {
+    thread_ = std::thread([this] { Run(); });
+  } catch (const std::system_error&) {
+    // No thread is left; the next call may get one.
+  }
 }
 
 void EarlyMatcher::Finish() {

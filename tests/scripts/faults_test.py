@@ -5,6 +5,7 @@ wrong once."""
 
 import errno
 import os
+import resource
 import shutil
 import subprocess
 import sys
@@ -17,10 +18,36 @@ sys.path.insert(0, CHECKS)
 
 from faulting.shim import build_shim
 from faulting.trials import count_calls, inject
-from faulting.world import World
+from faulting.world import Process, World, digests
 
 COMMANDS = ['adasfm_synthesizer', 'adasfm_prior_importer', 'adasfm_global',
             'adasfm_mapper']
+
+
+class ChecksTest(unittest.TestCase):
+
+  def setUp(self):
+    self.folder = tempfile.mkdtemp(prefix='adasfm-faults-test-')
+
+  def tearDown(self):
+    shutil.rmtree(self.folder)
+
+  def test_durations_in_a_log_do_not_count(self):
+    path = os.path.join(self.folder, 'features.log')
+    found = []
+    for text in ('Elapsed time: 0.015 [minutes]', 'Elapsed time: 0.017'):
+      with open(path, 'w') as file:
+        file.write(text)
+      found.append(digests(self.folder))
+    self.assertEqual(*found)
+    os.remove(path)
+    self.assertNotEqual(digests(self.folder), found[0])
+
+  def test_a_limit_of_files_leaves_what_is_said(self):
+    outcome = Process('/bin/sh', self.folder, '-c', [
+        'yes "disk I/O error" | head -n 9999 >&2; echo "ERROR: full" >&2; '
+        'exit 1'], limits=[(resource.RLIMIT_FSIZE, 100)]).wait()
+    self.assertFalse(outcome.require_answer())
 
 
 class FaultsTest(unittest.TestCase):
@@ -69,7 +96,11 @@ class FaultsTest(unittest.TestCase):
 
   def test_no_threads(self):
     for command in COMMANDS[2:]:
-      inject(self.world, self.shim, command, 'thread:1:%d:keep' % errno.EAGAIN)
+      for call in (1, 3):
+        outcome = inject(self.world, self.shim, command,
+                         'thread:%d:%d:keep' % (call, errno.EAGAIN))
+        self.assertTrue(outcome.code == 0 or 'threads' in outcome.error,
+                        outcome)
 
   def test_short_campaign(self):
     done = subprocess.run(

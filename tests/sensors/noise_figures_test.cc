@@ -3,10 +3,12 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "core/random.h"
 #include "core/so3.h"
+#include "sensors/io/format_figures.h"
 #include "tests/testing/sensors/synthetic_dataset.h"
 
 namespace adasfm {
@@ -124,6 +126,89 @@ TEST(NoiseFigures, FarTooSmallOnesAreSaid) {
   EXPECT_NEAR(data.calibration.imu_noise.gyroscope_noise_density, truth,
               0.2 * truth);
   EXPECT_NEAR(data.calibration.wheel_speed_noise, 0.05, 0.02);
+}
+
+// Rates about one axis that swing at five frequencies for 20 s, then rest.
+struct Swinging {
+  double highest_hz = 0.0;
+
+  double Rate(double time_s) const {
+    const double envelope = std::max(0.0, std::sin(2.0 * kPi * time_s / 40.0));
+    double rate = 0.0;
+    for (int i = 1; i <= 5; ++i) {
+      rate += std::cos(2.0 * kPi * highest_hz * std::sqrt(i / 5.0) * time_s +
+                       i * i);
+    }
+    return 0.5 * envelope * envelope * rate;
+  }
+
+  // Over a second.
+  double Angle(double begin_s) const {
+    constexpr int kNumSteps = 2000;
+    double angle = 0.0;
+    for (int i = 0; i < kNumSteps; ++i) {
+      angle += Rate(begin_s + (i + 0.5) / kNumSteps) / kNumSteps;
+    }
+    return angle;
+  }
+
+  std::vector<ImuSample> Samples(int rate_hz) const {
+    Random random(3);
+    std::vector<ImuSample> samples;
+    for (int i = 0; i < 40 * rate_hz; ++i) {
+      const double time_s = static_cast<double>(i) / rate_hz;
+      ImuSample sample;
+      sample.timestamp_ns = std::llround(1e9 * time_s);
+      sample.angular_velocity =
+          Eigen::Vector3d(0.0, 0.0, Rate(time_s)) + random.GaussianVector(1e-4);
+      sample.specific_force =
+          Eigen::Vector3d(0.0, 0.0, 9.81) + random.GaussianVector(1e-3);
+      samples.push_back(sample);
+    }
+    return samples;
+  }
+
+  // What the midpoint rule errs by in a second, as the density of each axis.
+  double Loss(const std::vector<ImuSample>& samples, int rate_hz) const {
+    double sum = 0.0;
+    for (int second = 0; second < 39; ++second) {
+      double angle = 0.0;
+      for (int k = second * rate_hz; k < (second + 1) * rate_hz; ++k) {
+        angle += 0.5 / rate_hz *
+                 (samples[k].angular_velocity.z() +
+                  samples[k + 1].angular_velocity.z());
+      }
+      const double error = angle - Angle(second);
+      sum += error * error / 3.0;
+    }
+    return std::sqrt(sum / 39.0);
+  }
+};
+
+TEST(NoiseFigures, WhatAGyroscopeMissesBetweenItsSamplesIsAdded) {
+  ImuNoise stated;
+  stated.gyroscope_noise_density = 2e-4;
+  struct Case {
+    double highest_hz;
+    int rate_hz;
+    bool is_slow;
+  };
+  for (const Case& c : std::vector<Case>{{0.5, 25, false},
+                                         {5.0, 200, false},
+                                         {3.0, 50, false},
+                                         {5.0, 50, true},
+                                         {12.0, 50, true},
+                                         {1.2, 10, true}}) {
+    const Swinging motion = {c.highest_hz};
+    const std::vector<ImuSample> samples = motion.Samples(c.rate_hz);
+    const double density = RaiseToLog(samples, stated).gyroscope_noise_density;
+    const double loss = motion.Loss(samples, c.rate_hz);
+    SCOPED_TRACE(FormatFigures("%g Hz at %g Hz", c.highest_hz, c.rate_hz) +
+                 FormatFigures(": loss %g, density %g", loss, density));
+    EXPECT_EQ(density > stated.gyroscope_noise_density, c.is_slow);
+    EXPECT_LT(loss, 1.2 * density);
+    EXPECT_TRUE(!c.is_slow || density < 1.5 * loss);
+  }
 }
 
 TEST(NoiseFigures, RightOnesOfRealLogsAreNotAccused) {

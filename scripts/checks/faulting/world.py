@@ -8,6 +8,7 @@ import shutil
 import signal
 import sqlite3
 import subprocess
+import threading
 import time
 
 NUM_IMAGES = '30'
@@ -99,13 +100,17 @@ class Process:
                           (resource.RLIMIT_CORE, 0), *limits):
         resource.setrlimit(name, (value, value))
     self.command = command
-    self.error_path = os.path.join(os.path.dirname(folder), 'stderr_%s_%d' % (
-        command, id(self)))
-    with open(self.error_path, 'wb') as error:
-      self.process = subprocess.Popen(
-          [colmap, command, *arguments], cwd=folder, stdin=subprocess.DEVNULL,
-          stdout=subprocess.DEVNULL, stderr=error, preexec_fn=prepare,
-          env=dict(os.environ, **(environment or {})), start_new_session=True)
+    self.process = subprocess.Popen(
+        [colmap, command, *arguments], cwd=folder, stdin=subprocess.DEVNULL,
+        stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, preexec_fn=prepare,
+        env=dict(os.environ, **(environment or {})), start_new_session=True)
+    # Not a file: a limit of file sizes would cut what is said about it.
+    self.error = b''
+    self.reader = threading.Thread(target=self.read_error)
+    self.reader.start()
+
+  def read_error(self):
+    self.error = self.process.stderr.read()
 
   def wait(self, kill_after=None):
     """Kills at that time; Wrong when the process does not end by itself."""
@@ -125,10 +130,10 @@ class Process:
       pause = min(0.02, 1.5 * pause)
     code = os.waitstatus_to_exitcode(status)
     self.process.returncode = code  # for Popen, which did not wait itself
-    with open(self.error_path, encoding='utf8', errors='replace') as file:
-      error = file.read()
-    os.remove(self.error_path)
-    return Outcome(code, error, usage.ru_maxrss, self.command)
+    self.reader.join()
+    self.process.stderr.close()
+    return Outcome(code, self.error.decode('utf8', 'replace'),
+                   usage.ru_maxrss, self.command)
 
 
 def digest(path):
@@ -150,7 +155,8 @@ def digest(path):
 
 
 def digests(folder):
-  """Of all files but locks and what SQLite keeps beside a database."""
+  """Of all files but locks and what SQLite keeps beside a database. Logs count
+  as being there: they tell how long the work took, and what was done twice."""
   found = {}
   for parent, _, names in os.walk(folder):
     for name in names:
@@ -158,7 +164,8 @@ def digests(folder):
       if name.startswith('.adasfm') or name.endswith(('-wal', '-shm',
                                                       '-journal')):
         continue
-      found[os.path.relpath(path, folder)] = digest(path)
+      found[os.path.relpath(path, folder)] = (
+          'log' if name.endswith('.log') else digest(path))
   return found
 
 

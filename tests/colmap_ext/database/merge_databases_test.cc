@@ -10,6 +10,7 @@
 #include "colmap_ext/database/two_view_geometry_backup.h"
 #include "colmap_ext/datasets/write_synthetic_world.h"
 #include "colmap_ext/host/database.h"
+#include "colmap_ext/io/folder_lock.h"
 #include "tests/testing/colmap_ext/file_size_limit.h"
 #include "tests/testing/colmap_ext/reshape_database.h"
 #include "tests/testing/colmap_ext/temporary_folder.h"
@@ -373,6 +374,13 @@ TEST_F(MergeDatabasesTest, RewrittenDatabasesAreRefused) {
       {ImagePair(world_.images[0].image_id, world_.images[1].image_id)});
   ASSERT_TRUE(status.ok()) << status.message();
   ExpectError({{rewritten, ""}}, folder_.File("new.db"), "adasfm_restorer");
+}
+
+TEST_F(MergeDatabasesTest, ASecondRunIsRefused) {
+  const auto lock = FolderLock::Acquire(
+      folder_.Path(), FolderLock::Mode::kExclusive, kMergerLockName);
+  ASSERT_TRUE(lock.ok()) << lock.status().message();
+  ExpectError({{whole_, ""}}, folder_.File("new.db"), "in use by");
 }
 
 TEST_F(MergeDatabasesTest, AFullDiskLeavesTheOutputAsItWas) {
