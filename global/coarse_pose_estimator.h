@@ -36,7 +36,7 @@ class CoarsePoseEstimator {
   void FilterLoops();
   VisualSteps CompleteSteps() const;
   bool IsSequence(const OdometryChain& chain) const;
-  DriveOdometry BuildDriveOdometry(std::string* summary) const;
+  TrajectoryOdometry BuildTrajectoryOdometry(std::string* summary) const;
   int AddSensors();
   std::vector<RelativePosePrior> AllPriors() const;
   void EstimateRotations();
@@ -49,7 +49,7 @@ class CoarsePoseEstimator {
   GlobalPositions EstimatePositionsOf(const std::vector<image_t>& images) const;
   bool HasMetresEverywhere() const;
   int SplitWhereSizeIsUnknown();
-  int ReportUnverifiedJoins();
+  int ReportUnconfirmedClosures();
   int EstimateComponent(const std::vector<image_t>& images);
   int RemoveEdgesOffPositions();
   EdgeLengths EstimateLengths() const;

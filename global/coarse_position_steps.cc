@@ -38,7 +38,7 @@ void CoarsePoseEstimator::EstimatePositions() {
     num_images += component.cams_from_world.size();
   }
   const int num_removed = RemoveEdgesOffPositions();
-  const int num_joins = ReportUnverifiedJoins();
+  const int num_joins = ReportUnconfirmedClosures();
   EndStep(
       "translation averaging",
       std::to_string(num_images) + " images in " +
@@ -88,7 +88,7 @@ bool CoarsePoseEstimator::HasMetresEverywhere() const {
 // Returns the number of edges removed.
 int CoarsePoseEstimator::SplitWhereSizeIsUnknown() {
   // Photos in any order have no parts that could stay apart.
-  if (!result_.loop_closures.joins_were_split || lengths_.lengths.empty() ||
+  if (!result_.loop_closures.segments_were_split || lengths_.lengths.empty() ||
       HasMetresEverywhere()) {
     return 0;
   }
@@ -115,17 +115,18 @@ int CoarsePoseEstimator::SplitWhereSizeIsUnknown() {
 }
 
 // Those that were made all the same, with the component that hangs on them.
-int CoarsePoseEstimator::ReportUnverifiedJoins() {
+int CoarsePoseEstimator::ReportUnconfirmedClosures() {
   // Fewer images are no part of a drive.
   constexpr int kMinNumImages = 10;
   int num_joins = 0;
-  if (result_.loop_closures.joins_were_split) return num_joins;
-  for (const UnverifiedJoin& join : result_.loop_closures.unverified_joins) {
+  if (result_.loop_closures.segments_were_split) return num_joins;
+  for (const UnconfirmedClosure& join :
+       result_.loop_closures.unconfirmed_closures) {
     if (join.num_images < kMinNumImages) continue;
     for (CoarseComponent& component : result_.components) {
       if (component.cams_from_world.count(join.image_id1) &&
           component.cams_from_world.count(join.image_id2)) {
-        component.unverified_joins.push_back(join);
+        component.unconfirmed_closures.push_back(join);
         ++num_joins;
       }
     }

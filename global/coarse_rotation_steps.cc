@@ -7,7 +7,7 @@
 #include "core/prior_lengths.h"
 #include "core/so3.h"
 #include "global/coarse_pose_estimator.h"
-#include "global/loop_closures/drop_contradicted_steps.h"
+#include "global/loop_closures/reject_visual_odometry.h"
 #include "global/odometry/visual_steps.h"
 #include "global/rotation_averaging/filter_edges_by_rotation.h"
 
@@ -95,38 +95,39 @@ void CoarsePoseEstimator::FilterLoops() {
   }
   lengths_ = EstimateLengths();
   std::string steps_summary;
-  const DriveOdometry odometry = BuildDriveOdometry(&steps_summary);
+  const TrajectoryOdometry odometry = BuildTrajectoryOdometry(&steps_summary);
   LoopClosureOptions options = options_.loops;
   // Photos in any order have no parts that could stay apart.
-  options.split_unverified_joins &=
+  options.split_unconfirmed_closures &=
       !priors_.empty() || IsSequence(odometry.chain);
   result_.loop_closures = FilterLoopClosures(options, odometry, &graph_);
   const LoopClosureReport& report = result_.loop_closures;
   // What came through removed pairs is forgotten.
-  if (report.joins_were_split && report.num_pairs_of_unverified_joins > 0) {
+  if (report.segments_were_split &&
+      report.num_pairs_of_unconfirmed_closures > 0) {
     lengths_ = EdgeLengths();
   }
   std::string summary = std::to_string(report.num_tested) + " pairs tested, " +
                         std::to_string(report.num_contradicting) +
                         " contradict the odometry; " +
-                        std::to_string(report.num_loops) + " loops, " +
-                        std::to_string(report.num_false_loops) + " false (" +
-                        std::to_string(report.num_pairs_of_false_loops) +
+                        std::to_string(report.num_clusters) + " loops, " +
+                        std::to_string(report.num_false_clusters) + " false (" +
+                        std::to_string(report.num_pairs_of_false_clusters) +
                         " more pairs)" + steps_summary;
-  if (report.num_confirmed_joins + report.unverified_joins.size() > 0) {
-    summary += "; " + std::to_string(report.num_parts) + " parts, " +
-               std::to_string(report.num_confirmed_joins) +
+  if (report.num_confirmed_closures + report.unconfirmed_closures.size() > 0) {
+    summary += "; " + std::to_string(report.num_segments) + " segments, " +
+               std::to_string(report.num_confirmed_closures) +
                " joins confirmed, " +
-               std::to_string(report.unverified_joins.size()) +
-               (report.joins_were_split ? " not made" : " not confirmed");
+               std::to_string(report.unconfirmed_closures.size()) +
+               (report.segments_were_split ? " not made" : " not confirmed");
   }
   EndStep("loop closures", summary);
 }
 
 // The priors, completed by vision where the sensors did not see every step.
-DriveOdometry CoarsePoseEstimator::BuildDriveOdometry(
+TrajectoryOdometry CoarsePoseEstimator::BuildTrajectoryOdometry(
     std::string* summary) const {
-  DriveOdometry odometry;
+  TrajectoryOdometry odometry;
   odometry.priors = priors_;
   odometry.chain = chain_;
   EdgeLengths lengths = lengths_;
@@ -135,19 +136,16 @@ DriveOdometry CoarsePoseEstimator::BuildDriveOdometry(
     OdometryChainOptions options = options_.chain;
     if (!HasLengths(priors_)) {
       options.scale_drift_ratio = options_.visual_steps.scale_drift_ratio;
-      options.driving_direction_sigma_rad = 0.0;
     }
-    if (priors_.empty()) options.extrinsic_rotation_sigma_rad = 0.0;
-    const int num_dropped =
-        DropContradictedSteps(options_.visual_steps, options_.loops, options,
-                              graph_, priors_.size(), &steps);
+    const int num_rejected =
+        RejectVisualOdometry(options_.visual_steps, options_.loops, options,
+                             graph_, priors_.size(), &steps);
     odometry.chain = OdometryChain(steps.priors, options, frame_priors_);
     odometry.unit = steps.unit_m;
     lengths = steps.lengths;
     *summary = "; vision added " + std::to_string(steps.num_by_vision) +
-               " steps, gave " + std::to_string(num_dropped) + " of them up, " +
-               std::to_string(steps.num_coasting) +
-               " are taken to go on as before";
+               " odometry edges, of which " + std::to_string(num_rejected) +
+               " were rejected";
   }
   odometry.lengths.resize(graph_.edges.size());
   if (lengths.metric) odometry.lengths = lengths.lengths;

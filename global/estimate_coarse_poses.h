@@ -69,7 +69,7 @@ struct CoarseComponent {
   bool positions_converged = false;
   double sdp_optimality = 0.0;
   // Where nothing tells look-alike places apart; none with odometry throughout.
-  std::vector<UnverifiedJoin> unverified_joins;
+  std::vector<UnconfirmedClosure> unconfirmed_closures;
 };
 
 struct CoarseStep {

@@ -18,9 +18,9 @@ using Json = nlohmann::ordered_json;
 constexpr int kMinNumReportedPairs = 3;
 
 Json JoinsJson(const SceneData& scene,
-               const std::vector<UnverifiedJoin>& joins) {
+               const std::vector<UnconfirmedClosure>& joins) {
   Json json = Json::array();
-  for (const UnverifiedJoin& join : joins) {
+  for (const UnconfirmedClosure& join : joins) {
     json.push_back({{"name1", scene.images.at(join.image_id1).name},
                     {"name2", scene.images.at(join.image_id2).name},
                     {"pairs", join.num_pairs},
@@ -32,17 +32,17 @@ Json JoinsJson(const SceneData& scene,
 Json LoopClosuresJson(const LoopClosureReport& report) {
   return {{"pairs_tested", report.num_tested},
           {"pairs_contradicting", report.num_contradicting},
-          {"loops", report.num_loops},
-          {"false_loops", report.num_false_loops},
-          {"pairs_of_false_loops", report.num_pairs_of_false_loops}};
+          {"loops", report.num_clusters},
+          {"false_loops", report.num_false_clusters},
+          {"pairs_of_false_loops", report.num_pairs_of_false_clusters}};
 }
 
 Json PartJoinsJson(const SceneData& scene, const LoopClosureReport& report) {
-  return {{"parts", report.num_parts},
-          {"confirmed", report.num_confirmed_joins},
-          {"pairs_removed", report.num_pairs_of_unverified_joins},
-          {"not_made", report.joins_were_split
-                           ? JoinsJson(scene, report.unverified_joins)
+  return {{"parts", report.num_segments},
+          {"confirmed", report.num_confirmed_closures},
+          {"pairs_removed", report.num_pairs_of_unconfirmed_closures},
+          {"not_made", report.segments_were_split
+                           ? JoinsJson(scene, report.unconfirmed_closures)
                            : Json::array()}};
 }
 
@@ -61,7 +61,7 @@ Json WeakPlacesJson(const SceneData& scene, const CoarsePoses& poses) {
 }
 
 std::string DescribeSplitJoin(const SceneData& scene,
-                              const UnverifiedJoin& join) {
+                              const UnconfirmedClosure& join) {
   std::ostringstream text;
   text << "a part of " << join.num_images << " images may join another where "
        << join.num_pairs << " pairs like "
@@ -122,7 +122,7 @@ Json ModelJson(const SceneData& scene, const CoarseComponent& component,
           {"pair_agreement", model.pair_agreement.share},
           {"least_pair_agreement", model.pair_agreement.least_image_share},
           {"rotation_optimality", component.sdp_optimality},
-          {"unverified_joins", JoinsJson(scene, component.unverified_joins)},
+          {"unverified_joins", JoinsJson(scene, component.unconfirmed_closures)},
           {"mapper_start", MapperStartJson(model.mapper_start)},
           {"adjustments", rounds}};
 }
@@ -315,13 +315,13 @@ std::vector<std::string> ListGlobalWarnings(const SceneData& scene,
     warnings.push_back(text.str());
   }
   const LoopClosureReport& loops = result.poses.loop_closures;
-  for (const UnverifiedJoin& join : loops.unverified_joins) {
-    if (loops.joins_were_split && join.num_pairs >= kMinNumReportedPairs) {
+  for (const UnconfirmedClosure& join : loops.unconfirmed_closures) {
+    if (loops.segments_were_split && join.num_pairs >= kMinNumReportedPairs) {
       warnings.push_back(DescribeSplitJoin(scene, join));
     }
   }
   for (const CoarseComponent& component : result.poses.components) {
-    for (const UnverifiedJoin& join : component.unverified_joins) {
+    for (const UnconfirmedClosure& join : component.unconfirmed_closures) {
       std::ostringstream text;
       text << "a part of " << join.num_images
            << " images is joined to the rest at one place only ("

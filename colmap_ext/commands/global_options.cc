@@ -87,9 +87,6 @@ void GlobalOptionAdder::AddLoops() {
       &stage_->poses.visual_steps.length_error_ratio,
       "1 sigma of the drift of lengths where vision completes the odometry, as "
       "a ratio");
-  Add("max_extrapolation_s", &stage_->poses.visual_steps.max_coasting_s,
-      "motion that nothing sees is taken to go on for so long, to gate loops "
-      "[s]");
   LoopClosureOptions* loops = &stage_->poses.loops;
   Add("loop_significance", &loops->significance,
       "a true pair contradicts the odometry, or another loop, with this "
@@ -99,14 +96,13 @@ void GlobalOptionAdder::AddLoops() {
   Add("loop_pair_length_log_sigma", &loops->pair_length_log_sigma,
       "least error of a pair's length, 1 sigma of its logarithm");
   Add("loop_unit_log_sigma", &loops->unit_log_sigma,
-      "error of the unit of a part without metres, 1 sigma of its logarithm");
+      "error of the unit of a segment without metres, 1 sigma of its logarithm");
   Add("max_sequence_gap", &loops->max_sequence_gap,
       "images at most this far apart in the order of capture follow each "
       "other; pairs of others are loop closures");
-  Add("closure_min_num_pairs", &loops->min_num_pairs,
-      "pairs of each of the two loop closures that joining two parts needs");
   Add("closure_min_turn_deg", &loops->min_turn_deg,
-      "these lie before and behind a turn of so much [deg]");
+      "joining two segments needs loop closures before and behind a turn of so "
+      "much [deg]");
 }
 
 void GlobalOptionAdder::AddPositions() {
@@ -165,7 +161,7 @@ void GlobalOptionAdder::AddAblations() {
       "start from a spanning tree");
   Add("use_loop_gating", &stage_->poses.loops.enabled,
       "remove false loop closures");
-  Add("split_unconfirmed_closures", &stage_->poses.loops.split_unverified_joins,
+  Add("split_unconfirmed_closures", &stage_->poses.loops.split_unconfirmed_closures,
       "parts of a drive (with sensor priors, or images in order) that only "
       "loop closures at one place join become models of their own");
   Add("use_visual_odometry", &stage_->poses.visual_steps.enabled,
@@ -210,8 +206,6 @@ void AddGlobalOptions(GlobalStageOptions* stage, CommandOptions* command) {
       {"correct_camera_mount", "correct_camera_imu_rotation"},
       {"visual_step_length_error", "visual_odometry_length_error"},
       {"use_visual_steps", "use_visual_odometry"},
-      {"max_coasting_s", "max_extrapolation_s"},
-      {"join_min_num_pairs", "closure_min_num_pairs"},
       {"join_min_turn_deg", "closure_min_turn_deg"},
       {"split_unverified_joins", "split_unconfirmed_closures"}};
   for (const auto& [old_name, name] : old_names) {

@@ -3,63 +3,66 @@
 
 #include <algorithm>
 #include <array>
+#include <cstdlib>
 #include <map>
 #include <numeric>
 #include <stdexcept>
+#include <tuple>
 #include <utility>
 
 #include "core/option_checker.h"
-#include "global/loop_closures/consistent_sets.h"
-#include "global/loop_closures/drive_parts.h"
-#include "global/loop_closures/loop_groups.h"
+#include "global/loop_closures/consistent_set.h"
 #include "global/loop_closures/pair_motion.h"
+#include "global/loop_closures/trajectory_segments.h"
 
 namespace adasfm {
 namespace {
 
-// Sets that are grown, from the heaviest loops.
-constexpr int kMaxNumSeeds = 20;
-// Loops whose consistency is tested, the heaviest ones: two million cycles,
-// some seconds. The odometry's test must do for the others.
-constexpr size_t kMaxNumLoops = 2000;
+// Clusters between two segments that are tested for consistency, the heaviest
+// ones: two million cycles, some seconds. Others are not confirmed.
+constexpr size_t kMaxNumClusters = 2000;
+
+// Pairs between the same two windows of images.
+struct ClosureCluster {
+  std::vector<int> edges;
+  // Those that the odometry does not contradict, and the best of them: with a
+  // length if there are any, with most inliers. It leads from image i to image
+  // j, indices of ViewGraph::images; i lies in the segment of the smaller
+  // index.
+  int num_kept = 0;
+  int best = -1;
+  int i = 0;
+  int j = 0;
+  PairMotion j_from_i;
+};
 
 class LoopClosureFilter {
  public:
   LoopClosureFilter(const LoopClosureOptions& options,
-                    const DriveOdometry& odometry, ViewGraph* graph)
-      : options_(options), odometry_(odometry), graph_(*graph) {}
+                    const TrajectoryOdometry& odometry, ViewGraph* graph)
+      : options_(options),
+        odometry_(odometry),
+        graph_(*graph),
+        segments_(FindTrajectorySegments(options, odometry.priors,
+                                         odometry.chain, *graph)) {}
 
   LoopClosureReport Run() {
-    report_.joins_were_split = options_.split_unverified_joins;
-    MeasurePairs();
+    report_.segments_were_split = options_.split_unconfirmed_closures;
+    for (const int num_images : segments_.num_images) {
+      report_.num_segments += num_images >= kMinNumSegmentImages;
+    }
     TestPairsByOdometry();
-    parts_ =
-        FindDriveParts(options_, odometry_.priors, odometry_.chain, graph_);
-    for (const int num_images : parts_.num_images) {
-      report_.num_parts += num_images >= kMinNumPartImages;
-    }
-    std::vector<bool> is_excluded;
-    for (const EdgeRemoval removal : removals_) {
-      is_excluded.push_back(removal != EdgeRemoval::kKept);
-    }
-    std::map<std::array<int, 4>, std::vector<int>> edges_of;
-    for (size_t e = 0; e < graph_.edges.size(); ++e) {
-      const auto parts = PartsOf(e);
-      if (has_pair_[e] && (parts.first != parts.second || IsLoop(e))) {
-        const auto pieces = PiecesOf(e);
-        edges_of[{parts.first, parts.second, pieces.first, pieces.second}]
-            .push_back(e);
-      }
-    }
-    for (const auto& [key, edges] : edges_of) {
-      const std::vector<LoopGroup> groups =
-          GroupLoops(options_, odometry_.chain, graph_, parts_, pairs_,
-                     is_excluded, edges, UnitLogSigma({key[0], key[1]}));
-      if (key[0] == key[1]) {
-        FilterLoops(groups);
+    std::map<std::pair<int, int>, std::vector<ClosureCluster>> between;
+    for (const ClosureCluster& cluster : ClusterClosures()) {
+      const auto segments = SegmentsOf(cluster.edges.front());
+      if (segments.first == segments.second) {
+        Vote(cluster);
       } else {
-        FilterJoin({key[0], key[1]}, groups);
+        between[segments].push_back(cluster);
       }
+    }
+    for (const auto& [segments, clusters] : between) {
+      FilterBetween(segments, clusters);
     }
     for (size_t e = 0; e < graph_.edges.size(); ++e) {
       if (graph_.edges[e].IsKept()) graph_.edges[e].removal = removals_[e];
@@ -72,40 +75,25 @@ class LoopClosureFilter {
     return graph_.CaptureGap(graph_.edges[e]) > options_.max_sequence_gap;
   }
 
-  std::pair<int, int> PartsOf(int e) const {
+  // The smaller index first.
+  std::pair<int, int> SegmentsOf(int e) const {
     const ViewGraphEdge& edge = graph_.edges[e];
-    return std::minmax(parts_.part_of[graph_.IndexOf(edge.image_id1)],
-                       parts_.part_of[graph_.IndexOf(edge.image_id2)]);
-  }
-
-  // Of the odometry: loops between other pieces are consistent with each other
-  // as far as anybody knows. Joins are looked at between whole parts.
-  std::pair<int, int> PiecesOf(int e) const {
-    const auto parts = PartsOf(e);
-    if (parts.first != parts.second) return {0, 0};
-    return std::minmax({odometry_.chain.Piece(graph_.edges[e].image_id1),
-                        odometry_.chain.Piece(graph_.edges[e].image_id2)});
-  }
-
-  void MeasurePairs() {
-    for (size_t e = 0; e < graph_.edges.size(); ++e) {
-      const ViewGraphEdge& edge = graph_.edges[e];
-      has_pair_.push_back(edge.IsKept() && edge.has_rotation &&
-                          edge.source != EdgeSource::kSensor);
-      pairs_.push_back(has_pair_[e] ? MeasurePair(options_, edge,
-                                                  odometry_.lengths.at(e),
-                                                  odometry_.unit)
-                                    : PairMotion());
-    }
+    return std::minmax({segments_.segment_of[graph_.IndexOf(edge.image_id1)],
+                        segments_.segment_of[graph_.IndexOf(edge.image_id2)]});
   }
 
   // 1.
   void TestPairsByOdometry() {
     removals_.assign(graph_.edges.size(), EdgeRemoval::kKept);
     for (size_t e = 0; e < graph_.edges.size(); ++e) {
+      const ViewGraphEdge& edge = graph_.edges[e];
+      has_pair_.push_back(edge.IsKept() && edge.has_rotation &&
+                          edge.source != EdgeSource::kSensor);
+      pairs_.emplace_back();
       if (!has_pair_[e]) continue;
-      const ChiSquare pose =
-          TestByOdometry(odometry_.chain, graph_.edges[e], pairs_[e]);
+      pairs_[e] =
+          MeasurePair(options_, edge, odometry_.lengths[e], odometry_.unit);
+      const ChiSquare pose = TestByOdometry(odometry_.chain, edge, pairs_[e]);
       report_.num_tested += pose.dof > 0;
       if (pose.Probability() >= options_.significance) continue;
       ++report_.num_contradicting;
@@ -114,136 +102,156 @@ class LoopClosureFilter {
     }
   }
 
-  // By group, those that are left after step 1.
-  std::vector<int> CountPairs(const std::vector<LoopGroup>& groups) const {
-    std::vector<int> counts;
-    for (const LoopGroup& group : groups) {
-      counts.push_back(std::count_if(
-          group.edges.begin(), group.edges.end(),
-          [this](int e) { return removals_[e] == EdgeRemoval::kKept; }));
-    }
-    return counts;
-  }
-
-  // Returns how many pairs it removed.
-  int Remove(const LoopGroup& group, EdgeRemoval removal) {
-    int num_removed = 0;
-    for (const int e : group.edges) {
-      if (removals_[e] != EdgeRemoval::kKept) continue;
-      removals_[e] = removal;
-      ++num_removed;
-    }
-    return num_removed;
-  }
-
-  // The unit of parts without metres is not known.
-  double UnitLogSigma(const std::pair<int, int>& parts) const {
-    const auto [first, second] = parts;
-    return first == second ||
-                   (parts_.is_metric[first] && parts_.is_metric[second])
-               ? 0.0
-               : options_.unit_log_sigma;
-  }
-
-  // Sets of consistent groups, heaviest first. Groups without a common odometry
-  // count as consistent or not.
-  std::vector<std::vector<int>> FindSets(const std::vector<LoopGroup>& groups,
-                                         double unit_log_sigma,
-                                         bool without_odometry) const {
-    ConsistencyMatrix is_consistent(groups.size(),
-                                    std::vector<bool>(groups.size(), true));
-    for (size_t a = 0; a < groups.size(); ++a) {
-      for (size_t b = a + 1; b < groups.size(); ++b) {
-        is_consistent[a][b] = is_consistent[b][a] =
-            AreConsistent(options_, odometry_.chain, graph_, groups[a],
-                          groups[b], unit_log_sigma)
-                .value_or(without_odometry);
+  std::vector<ClosureCluster> ClusterClosures() const {
+    std::map<std::array<int64_t, 4>, ClosureCluster> clusters;
+    for (size_t e = 0; e < graph_.edges.size(); ++e) {
+      const auto segments = SegmentsOf(e);
+      if (!has_pair_[e] || (segments.first == segments.second && !IsLoop(e))) {
+        continue;
       }
+      int i = graph_.IndexOf(graph_.edges[e].image_id1);
+      int j = graph_.IndexOf(graph_.edges[e].image_id2);
+      const auto place = [this](int image) {
+        return std::make_pair(segments_.segment_of[image],
+                              segments_.rank_of[image]);
+      };
+      const bool is_inverse = place(i) > place(j);
+      if (is_inverse) std::swap(i, j);
+      const int window = options_.max_sequence_gap + 1;
+      ClosureCluster& cluster = clusters[{segments.first, segments.second,
+                                          segments_.rank_of[i] / window,
+                                          segments_.rank_of[j] / window}];
+      cluster.edges.push_back(e);
+      if (removals_[e] != EdgeRemoval::kKept) continue;
+      ++cluster.num_kept;
+      if (cluster.best >= 0 && Quality(e) <= Quality(cluster.best)) continue;
+      cluster.best = e;
+      cluster.i = i;
+      cluster.j = j;
+      cluster.j_from_i = is_inverse ? pairs_[e].Inverse() : pairs_[e];
     }
-    return FindConsistentSets(is_consistent, CountPairs(groups), kMaxNumSeeds);
+    std::vector<ClosureCluster> list;
+    for (auto& [key, cluster] : clusters) list.push_back(std::move(cluster));
+    return list;
+  }
+
+  std::pair<bool, int> Quality(int e) const {
+    return {pairs_[e].translation == PairMotion::Translation::kFull,
+            graph_.edges[e].num_inliers};
+  }
+
+  // Returns how many pairs of the cluster went from one state to another.
+  int Change(const ClosureCluster& cluster, EdgeRemoval from, EdgeRemoval to) {
+    int num_changed = 0;
+    for (const int e : cluster.edges) {
+      if (removals_[e] != from) continue;
+      removals_[e] = to;
+      ++num_changed;
+    }
+    return num_changed;
   }
 
   // 2.
-  void FilterLoops(const std::vector<LoopGroup>& all_groups) {
-    report_.num_loops += all_groups.size();
-    std::vector<LoopGroup> groups;
-    const std::vector<int> num_left = CountPairs(all_groups);
-    for (size_t g = 0; g < all_groups.size(); ++g) {
-      if (2 * num_left[g] > static_cast<int>(all_groups[g].edges.size())) {
-        groups.push_back(all_groups[g]);
-      } else {
-        RemoveLoop(all_groups[g]);
-      }
+  void Vote(const ClosureCluster& cluster) {
+    ++report_.num_clusters;
+    if (2 * cluster.num_kept > static_cast<int>(cluster.edges.size())) {
+      Change(cluster, EdgeRemoval::kOdometry, EdgeRemoval::kOdometryPose);
+      return;
     }
-    if (groups.empty()) return;
-    std::stable_sort(groups.begin(), groups.end(),
-                     [](const LoopGroup& a, const LoopGroup& b) {
-                       return a.edges.size() > b.edges.size();
-                     });
-    if (groups.size() > kMaxNumLoops) groups.resize(kMaxNumLoops);
-    const std::vector<int> consistent = FindSets(groups, 0.0, true).front();
-    for (size_t g = 0; g < groups.size(); ++g) {
-      if (!std::binary_search(consistent.begin(), consistent.end(), g)) {
-        RemoveLoop(groups[g]);
-        continue;
-      }
-      for (const int e : groups[g].edges) {
-        if (removals_[e] == EdgeRemoval::kOdometry) {
-          removals_[e] = EdgeRemoval::kOdometryPose;
-        }
-      }
-    }
-  }
-
-  void RemoveLoop(const LoopGroup& group) {
-    ++report_.num_false_loops;
-    report_.num_pairs_of_false_loops += Remove(group, EdgeRemoval::kFalseLoop);
+    ++report_.num_false_clusters;
+    report_.num_pairs_of_false_clusters +=
+        Change(cluster, EdgeRemoval::kKept, EdgeRemoval::kFalseLoop);
   }
 
   // 3.
-  void FilterJoin(const std::pair<int, int>& parts,
-                  const std::vector<LoopGroup>& groups) {
-    std::vector<int> confirmed;
-    for (const std::vector<int>& set : FindJoins(parts, groups)) {
-      if (!HasTwoPlaces(groups, set)) continue;
-      confirmed = set;
-      break;
+  void FilterBetween(const std::pair<int, int>& segments,
+                     std::vector<ClosureCluster> clusters) {
+    clusters.erase(std::remove_if(clusters.begin(), clusters.end(),
+                                  [](const ClosureCluster& cluster) {
+                                    return cluster.num_kept == 0;
+                                  }),
+                   clusters.end());
+    if (clusters.empty()) return;
+    std::stable_sort(clusters.begin(), clusters.end(),
+                     [](const ClosureCluster& a, const ClosureCluster& b) {
+                       return a.num_kept > b.num_kept;
+                     });
+    std::vector<int> set = FindSet(segments, clusters);
+    if (HasTwoPlaces(clusters, set)) {
+      ++report_.num_confirmed_closures;
+    } else {
+      set.clear();
+      report_.unconfirmed_closures.push_back(Describe(segments, clusters));
     }
-    const UnverifiedJoin join = DescribeJoin(parts, groups);
-    if (!confirmed.empty()) {
-      ++report_.num_confirmed_joins;
-    } else if (join.num_pairs > 0) {
-      report_.unverified_joins.push_back(join);
-    }
-    if (!options_.split_unverified_joins) return;
-    for (size_t g = 0; g < groups.size(); ++g) {
-      if (std::binary_search(confirmed.begin(), confirmed.end(), g)) continue;
-      report_.num_pairs_of_unverified_joins +=
-          Remove(groups[g], EdgeRemoval::kUnverifiedJoin);
+    if (!options_.split_unconfirmed_closures) return;
+    for (size_t c = 0; c < clusters.size(); ++c) {
+      if (std::binary_search(set.begin(), set.end(), c)) continue;
+      report_.num_pairs_of_unconfirmed_closures += Change(
+          clusters[c], EdgeRemoval::kKept, EdgeRemoval::kUnverifiedJoin);
     }
   }
 
-  // Photos in any order have no odometry that could tell.
-  std::vector<std::vector<int>> FindJoins(
-      const std::pair<int, int>& parts,
-      const std::vector<LoopGroup>& groups) const {
-    if (options_.split_unverified_joins) {
-      return FindSets(groups, UnitLogSigma(parts), false);
+  // All of them for photos in any order, which have no odometry that could
+  // tell.
+  std::vector<int> FindSet(const std::pair<int, int>& segments,
+                           const std::vector<ClosureCluster>& clusters) const {
+    const size_t size = std::min(clusters.size(), kMaxNumClusters);
+    if (!options_.split_unconfirmed_closures) {
+      std::vector<int> all(clusters.size());
+      std::iota(all.begin(), all.end(), 0);
+      return all;
     }
-    std::vector<int> all(groups.size());
-    std::iota(all.begin(), all.end(), 0);
-    return {all};
+    const bool has_units = segments_.is_metric[segments.first] &&
+                           segments_.is_metric[segments.second];
+    const double unit_log_sigma = has_units ? 0.0 : options_.unit_log_sigma;
+    ConsistencyMatrix is_consistent(size, std::vector<bool>(size, true));
+    std::vector<int> weights;
+    for (size_t a = 0; a < size; ++a) {
+      weights.push_back(clusters[a].num_kept);
+      for (size_t b = a + 1; b < size; ++b) {
+        is_consistent[a][b] = is_consistent[b][a] =
+            AreConsistent(clusters[a], clusters[b], unit_log_sigma);
+      }
+    }
+    return FindConsistentSet(is_consistent, weights);
   }
 
-  bool HasTwoPlaces(const std::vector<LoopGroup>& groups,
+  // The cycle through both clusters and the odometry at both of their ends, by
+  // its chi-square. unit_log_sigma: of the unit of the second segment in that
+  // of the first.
+  bool AreConsistent(const ClosureCluster& a, const ClosureCluster& b,
+                     double unit_log_sigma) const {
+    const auto image = [this](int index) { return graph_.images[index]; };
+    const OdometryChain& chain = odometry_.chain;
+    if (!chain.IsConnected(image(a.i), image(b.i)) ||
+        !chain.IsConnected(image(a.j), image(b.j))) {
+      return false;
+    }
+    const ChainMotion first = chain.Motion(image(b.i), image(a.i));
+    const ChainMotion second = chain.Motion(image(a.j), image(b.j));
+    if (!first.has_rotation || !second.has_rotation) return false;
+    UncertainMotion predicted =
+        UncertainMotion{second.cam2_from_cam1, second.covariance} *
+        a.j_from_i.motion *
+        UncertainMotion{first.cam2_from_cam1, first.covariance};
+    const Eigen::Vector3d by_unit =
+        unit_log_sigma * second.cam2_from_cam1.translation;
+    predicted.covariance.bottomRightCorner<3, 3>() +=
+        by_unit * by_unit.transpose();
+    const bool has_position =
+        first.has_position && second.has_position &&
+        a.j_from_i.translation == PairMotion::Translation::kFull;
+    return TestPair(b.j_from_i, predicted, has_position).Probability() >=
+           options_.significance;
+  }
+
+  // The condition under which the motion between two segments is observable.
+  bool HasTwoPlaces(const std::vector<ClosureCluster>& clusters,
                     const std::vector<int>& set) const {
-    const std::vector<int> num_pairs = CountPairs(groups);
     for (const int a : set) {
-      if (num_pairs[a] < options_.min_num_pairs) continue;
       for (const int b : set) {
-        if (num_pairs[b] >= options_.min_num_pairs &&
-            parts_.AreApart(options_, groups[a].i, groups[b].i) &&
-            parts_.AreApart(options_, groups[a].j, groups[b].j)) {
+        if (AreApart(clusters[a].i, clusters[b].i) &&
+            AreApart(clusters[a].j, clusters[b].j)) {
           return true;
         }
       }
@@ -251,30 +259,34 @@ class LoopClosureFilter {
     return false;
   }
 
-  UnverifiedJoin DescribeJoin(const std::pair<int, int>& parts,
-                              const std::vector<LoopGroup>& groups) const {
-    UnverifiedJoin join;
-    join.num_images = std::min(parts_.num_images[parts.first],
-                               parts_.num_images[parts.second]);
+  bool AreApart(int i, int j) const {
+    return std::abs(segments_.rank_of[i] - segments_.rank_of[j]) >
+               options_.max_sequence_gap &&
+           segments_.heading_of[i] != segments_.heading_of[j];
+  }
+
+  UnconfirmedClosure Describe(
+      const std::pair<int, int>& segments,
+      const std::vector<ClosureCluster>& clusters) const {
+    UnconfirmedClosure closure;
+    closure.num_images = std::min(segments_.num_images[segments.first],
+                                  segments_.num_images[segments.second]);
     int max_num_inliers = -1;
-    for (const LoopGroup& group : groups) {
-      for (const int e : group.edges) {
-        if (removals_[e] != EdgeRemoval::kKept) continue;
-        ++join.num_pairs;
-        const ViewGraphEdge& edge = graph_.edges[e];
-        if (edge.num_inliers <= max_num_inliers) continue;
-        max_num_inliers = edge.num_inliers;
-        join.image_id1 = edge.image_id1;
-        join.image_id2 = edge.image_id2;
-      }
+    for (const ClosureCluster& cluster : clusters) {
+      closure.num_pairs += cluster.num_kept;
+      const ViewGraphEdge& edge = graph_.edges[cluster.best];
+      if (edge.num_inliers <= max_num_inliers) continue;
+      max_num_inliers = edge.num_inliers;
+      closure.image_id1 = edge.image_id1;
+      closure.image_id2 = edge.image_id2;
     }
-    return join;
+    return closure;
   }
 
   const LoopClosureOptions& options_;
-  const DriveOdometry& odometry_;
+  const TrajectoryOdometry& odometry_;
   ViewGraph& graph_;
-  DriveParts parts_;
+  TrajectorySegments segments_;
   std::vector<bool> has_pair_;  // by edge
   std::vector<PairMotion> pairs_;
   std::vector<EdgeRemoval> removals_;
@@ -292,12 +304,11 @@ bool LoopClosureOptions::IsValid(std::string* error) const {
                  {"min_turn_deg", min_turn_deg}})
       .NotNegative({{"unit_log_sigma", unit_log_sigma}})
       .AtLeast(1, "max_sequence_gap", max_sequence_gap)
-      .AtLeast(1, "min_num_pairs", min_num_pairs)
       .AllHold();
 }
 
 LoopClosureReport FilterLoopClosures(const LoopClosureOptions& options,
-                                     const DriveOdometry& odometry,
+                                     const TrajectoryOdometry& odometry,
                                      ViewGraph* graph) {
   std::string error;
   if (!options.IsValid(&error)) {

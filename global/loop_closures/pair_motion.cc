@@ -52,7 +52,7 @@ double ChiSquare::Probability() const {
 }
 
 PairMotion PairMotion::Inverse() const {
-  return {motion.Inverse(), translation, position_sigma};
+  return {motion.Inverse(), translation};
 }
 
 PairMotion MeasurePair(const LoopClosureOptions& options,
@@ -63,19 +63,14 @@ PairMotion MeasurePair(const LoopClosureOptions& options,
   const double floor = kPositionSigmaRatio * unit;
   const double angle = DegToRad(options.pair_angle_sigma_deg);
   PairMotion pair;
-  pair.position_sigma = floor;
   pair.motion.cam2_from_cam1.rotation = edge.cam2_from_cam1.rotation;
   const double rotation_sigma = std::hypot(edge.rotation_sigma_rad, angle);
   pair.motion.covariance.topLeftCorner<3, 3>() =
       rotation_sigma * rotation_sigma * Eigen::Matrix3d::Identity();
   auto translation_covariance =
       pair.motion.covariance.bottomRightCorner<3, 3>();
-  if (!edge.has_baseline) {
-    pair.translation = Translation::kFull;
-    translation_covariance = floor * floor * Eigen::Matrix3d::Identity();
-    return pair;
-  }
-  if (!edge.has_translation) return pair;
+  // Without a baseline the direction says nothing.
+  if (!edge.has_translation || !edge.has_baseline) return pair;
   const Eigen::Vector3d direction =
       edge.cam2_from_cam1.translation.normalized();
   const double across = std::hypot(edge.direction_sigma_rad, angle);
@@ -115,8 +110,6 @@ ChiSquare TestPair(const PairMotion& pair, const UncertainMotion& predicted,
     translation *= length;
     covariance.bottomRows<3>() *= length;
     covariance.rightCols<3>() *= length;
-    covariance.bottomRightCorner<3, 3>().diagonal().array() +=
-        pair.position_sigma * pair.position_sigma;
     // A pair that points away has no length that fits.
     if (length > 0.0) {
       dof = 5;

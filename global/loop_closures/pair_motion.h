@@ -29,9 +29,6 @@ struct PairMotion {
   };
   UncertainMotion motion;
   Translation translation = Translation::kNone;
-  // 1 sigma that the place always has, in the unit of the odometry; part of the
-  // covariance where the length is known.
-  double position_sigma = 0.0;
 
   PairMotion Inverse() const;
 };

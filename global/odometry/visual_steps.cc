@@ -125,59 +125,6 @@ void FillPosition(const VisualStepOptions& options, const ViewGraphEdge& edge,
       prior);
 }
 
-// The steps in the order of the chain; neighbours in time follow each other.
-std::vector<RelativePosePrior*> InOrder(
-    const OdometryChain& chain, std::vector<RelativePosePrior>* priors) {
-  std::vector<RelativePosePrior*> steps;
-  for (RelativePosePrior& prior : *priors) {
-    if (chain.IsConnected(prior.image_id1, prior.image_id2)) {
-      steps.push_back(&prior);
-    }
-  }
-  std::sort(steps.begin(), steps.end(), [&chain](const auto* a, const auto* b) {
-    return chain.Index(a->image_id2) < chain.Index(b->image_id2);
-  });
-  return steps;
-}
-
-// In the camera's frame; none without a time.
-std::optional<Eigen::Vector3d> Velocity(const RelativePosePrior& step) {
-  if (!step.HasTranslation() || step.dt_ns <= 0) return std::nullopt;
-  return step.cam2_from_cam1.translation / SecondsFromNs(step.dt_ns);
-}
-
-// Runs of steps without a position, between steps that have one: the motion
-// goes on with the mean of both velocities.
-int Coast(const VisualStepOptions& options,
-          const std::vector<RelativePosePrior*>& steps) {
-  int num_coasting = 0;
-  for (size_t begin = 1; begin < steps.size(); ++begin) {
-    if (steps[begin]->HasTranslation()) continue;
-    size_t end = begin;
-    double seconds = 0.0;
-    for (; end < steps.size() && !steps[end]->HasTranslation(); ++end) {
-      seconds += SecondsFromNs(steps[end]->dt_ns);
-    }
-    if (end == steps.size()) break;
-    const auto before = Velocity(*steps[begin - 1]);
-    const auto behind = Velocity(*steps[end]);
-    if (seconds <= options.max_coasting_s && before && behind) {
-      const Eigen::Vector3d velocity = 0.5 * (*before + *behind);
-      for (size_t k = begin; k < end; ++k) {
-        if (!steps[k]->HasRotation()) continue;
-        const Eigen::Vector3d way = SecondsFromNs(steps[k]->dt_ns) * velocity;
-        SetTranslation(way,
-                       std::pow(options.coasting_error_ratio, 2) *
-                           way.squaredNorm() * Eigen::Matrix3d::Identity(),
-                       steps[k]);
-        ++num_coasting;
-      }
-    }
-    begin = end;
-  }
-  return num_coasting;
-}
-
 double MedianLength(const std::vector<RelativePosePrior>& priors) {
   std::vector<double> lengths;
   for (const RelativePosePrior& prior : priors) {
@@ -194,10 +141,8 @@ bool VisualStepOptions::IsValid(std::string* error) const {
       .AtLeast(1, "max_num_steps", max_num_steps)
       .Positive({{"length_error_ratio", length_error_ratio},
                  {"direction_error_deg", direction_error_deg},
-                 {"rotation_error_deg", rotation_error_deg},
-                 {"coasting_error_ratio", coasting_error_ratio}})
-      .NotNegative({{"max_coasting_s", max_coasting_s},
-                    {"scale_drift_ratio", scale_drift_ratio}})
+                 {"rotation_error_deg", rotation_error_deg}})
+      .NotNegative({{"scale_drift_ratio", scale_drift_ratio}})
       .Within(0, 1, "max_contradicting_ratio", max_contradicting_ratio)
       .AllHold();
 }
@@ -216,7 +161,7 @@ VisualSteps AddVisualSteps(const VisualStepOptions& options,
       length_options, SequenceGraph(graph, chain, options.max_num_steps),
       known_lengths_m, correspondences);
 
-  // 1. Steps that vision sees; a standstill's error is in terms of the others.
+  // Steps that vision sees; a standstill's error is in terms of the others.
   std::vector<RelativePosePrior*> standstills;
   std::map<ImagePair, double> known_lengths = known_lengths_m;
   for (RelativePosePrior& prior : steps.priors) {
@@ -240,12 +185,6 @@ VisualSteps AddVisualSteps(const VisualStepOptions& options,
                    sigma * sigma * Eigen::Matrix3d::Identity(), prior);
     ++steps.num_by_vision;
   }
-  // 2. Steps that nothing sees. Without metres the unit behind them is another
-  // one than before.
-  if (lengths.metric) {
-    steps.num_coasting = Coast(options, InOrder(chain, &steps.priors));
-  }
-
   if (!lengths.metric) steps.unit_m = MedianLength(steps.priors);
   steps.lengths = EstimateEdgeLengths(length_options, graph, known_lengths,
                                       correspondences);

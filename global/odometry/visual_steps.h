@@ -27,14 +27,9 @@ struct VisualStepOptions {
   // 1 sigma of the change of scale at each step where there are no priors to
   // hold it (OdometryChainOptions::scale_drift_ratio).
   double scale_drift_ratio = 0.01;
-  // Without vision a drive goes on as before, up to this share of the way, per
-  // axis, 1 sigma; and for so long only.
-  double coasting_error_ratio = 0.3;
-  double max_coasting_s = 10.0;
-  // DropContradictedSteps: the share of the pairs across a step, and of those
-  // within a run of steps, that may contradict the chain.
-  double max_contradicting_ratio = 0.5;
-  double max_run_contradicting_ratio = 0.05;
+  // RejectVisualOdometry: the share of the pairs within a run of visual
+  // odometry that may contradict the chain.
+  double max_contradicting_ratio = 0.05;
 
   bool IsValid(std::string* error) const;
 };
@@ -49,16 +44,14 @@ struct VisualSteps {
   // length of a step.
   double unit_m = 1.0;
   int num_by_vision = 0;
-  int num_coasting = 0;
 };
 
 // Completes the odometry for the gating of loops. Where a step of the chain has
 // no position (an IMU without wheels, wheels that end) vision gives direction
 // and length, in metres as far as metres of other steps spread through shared
-// points, else in a unit of the scene; where vision sees nothing the motion of
-// the steps before and behind is taken to go on. Where the chain is interrupted
-// (a gap of the logs) or there is none, neighbours in the order of capture
-// continue it that share a pair. The result serves to exclude pairs and never
+// points, else in a unit of the scene. Where the chain is interrupted (a gap of
+// the logs) or there is none, neighbours in the order of capture continue it
+// that share a pair. The result serves to exclude pairs and never
 // as an edge. known_lengths_m: metres of the priors' pairs, as for
 // EstimateEdgeLengths. frame_priors: as for OdometryChain; followers make no
 // steps.

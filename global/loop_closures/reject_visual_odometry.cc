@@ -1,0 +1,83 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "global/loop_closures/reject_visual_odometry.h"
+
+#include <algorithm>
+#include <map>
+#include <set>
+
+#include "global/loop_closures/pair_motion.h"
+
+namespace adasfm {
+namespace {
+
+// An odometry edge is named by the chain's index of its later image. By edge,
+// the first one of its run.
+std::map<int, int> FindRuns(const OdometryChain& chain,
+                            const VisualSteps& steps,
+                            size_t num_sensor_priors) {
+  std::set<int> edges;
+  for (size_t k = num_sensor_priors; k < steps.priors.size(); ++k) {
+    edges.insert(chain.Index(steps.priors[k].image_id2));
+  }
+  std::map<int, int> run_of;
+  for (const int edge : edges) {
+    const auto previous = run_of.find(edge - 1);
+    run_of[edge] = previous == run_of.end() ? edge : previous->second;
+  }
+  return run_of;
+}
+
+struct Tally {
+  int num_pairs = 0;
+  int num_contradicting = 0;
+};
+
+}  // namespace
+
+int RejectVisualOdometry(const VisualStepOptions& options,
+                         const LoopClosureOptions& loop_options,
+                         const OdometryChainOptions& chain_options,
+                         const ViewGraph& graph, size_t num_sensor_priors,
+                         VisualSteps* steps) {
+  const OdometryChain chain(steps->priors, chain_options);
+  const std::map<int, int> run_of = FindRuns(chain, *steps, num_sensor_priors);
+  std::map<int, Tally> tallies;  // by run
+  for (size_t e = 0; e < graph.edges.size(); ++e) {
+    const ViewGraphEdge& edge = graph.edges[e];
+    if (!edge.IsKept() || !edge.has_rotation ||
+        edge.source == EdgeSource::kSensor ||
+        !chain.IsConnected(edge.image_id1, edge.image_id2)) {
+      continue;
+    }
+    const auto [begin, end] =
+        std::minmax({chain.Index(edge.image_id1), chain.Index(edge.image_id2)});
+    const auto first = run_of.find(begin + 1);
+    const auto last = run_of.find(end);
+    if (end - begin < 2 || end - begin > options.max_num_steps ||
+        first == run_of.end() || last == run_of.end() ||
+        first->second != last->second) {
+      continue;
+    }
+    const ChiSquare pose =
+        TestByOdometry(chain, edge,
+                       MeasurePair(loop_options, edge, steps->lengths.lengths[e],
+                                   steps->unit_m));
+    if (pose.dof == 0) continue;
+    Tally& tally = tallies[first->second];
+    ++tally.num_pairs;
+    tally.num_contradicting += pose.Probability() < loop_options.significance;
+  }
+  const auto is_rejected = [&](const RelativePosePrior& prior) {
+    const Tally& tally = tallies[run_of.at(chain.Index(prior.image_id2))];
+    return tally.num_contradicting >
+           options.max_contradicting_ratio * tally.num_pairs;
+  };
+  const auto rejected =
+      std::remove_if(steps->priors.begin() + num_sensor_priors,
+                     steps->priors.end(), is_rejected);
+  const int num_rejected = static_cast<int>(steps->priors.end() - rejected);
+  steps->priors.erase(rejected, steps->priors.end());
+  return num_rejected;
+}
+
+}  // namespace adasfm

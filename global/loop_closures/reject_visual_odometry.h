@@ -1,0 +1,28 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstddef>
+
+#include "global/loop_closures/loop_closure_options.h"
+#include "global/odometry/odometry_chain.h"
+#include "global/odometry/visual_steps.h"
+#include "global/view_graph/view_graph.h"
+
+namespace adasfm {
+
+// Rejects visual odometry that its own pairs contradict: photos in any order
+// and a hand-held camera must exclude no pair, while a drive that was filmed in
+// order keeps its chain.
+// Inputs: steps->priors; those from num_sensor_priors on are by vision alone.
+// Method. A run is a sequence of visual odometry edges that follow each other.
+// It goes when more than options.max_contradicting_ratio of the pairs within
+// it, 2 to options.max_num_steps edges long, fail the chi-square test against
+// the chain.
+// Returns the number of odometry edges rejected. On failure: nothing to fail.
+int RejectVisualOdometry(const VisualStepOptions& options,
+                         const LoopClosureOptions& loop_options,
+                         const OdometryChainOptions& chain_options,
+                         const ViewGraph& graph, size_t num_sensor_priors,
+                         VisualSteps* steps);
+
+}  // namespace adasfm

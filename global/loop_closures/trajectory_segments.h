@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "core/relative_pose_prior.h"
+#include "global/loop_closures/loop_closure_options.h"
+#include "global/odometry/odometry_chain.h"
+#include "global/view_graph/view_graph.h"
+
+namespace adasfm {
+
+// Smaller segments belong to that with which they share most pairs.
+inline constexpr int kMinNumSegmentImages = 3;
+
+// The segments of a trajectory: images between which priors with a position, or
+// pairs of images that follow each other, lead from one to the next. All
+// vectors are in the order of ViewGraph::images.
+struct TrajectorySegments {
+  // The index of one image of the segment, the same for all of them.
+  std::vector<int> segment_of;
+  // By the same index; 0 for all others.
+  std::vector<int> num_images;
+  // By the same index: a prior with a position gives metres.
+  std::vector<bool> is_metric;
+  // ViewGraph::CaptureRank.
+  std::vector<int64_t> rank_of;
+  // Counts the turns of the odometry: a new heading begins where the camera
+  // looks min_turn_deg away from where it looked at the beginning of the last.
+  std::vector<int> heading_of;
+};
+
+TrajectorySegments FindTrajectorySegments(
+    const LoopClosureOptions& options,
+    const std::vector<RelativePosePrior>& priors, const OdometryChain& chain,
+    const ViewGraph& graph);
+
+}  // namespace adasfm
