@@ -268,10 +268,8 @@ PriorBundleAdjustmentSummary AdjustBundle(
   AssignWindows(options.shared_errors, &with_windows.priors);
   const bool has_small_factor = HasSmallFactor(options.max_num_images_sparse,
                                                problem.images, *reconstruction);
-  BundleProblem bundle(
-      options, with_windows, *reconstruction,
-      has_small_factor && static_cast<int>(problem.images.size()) >
-                              options.max_num_images_dense);
+  BundleProblem bundle(options, with_windows, *reconstruction,
+                       /*may_keep_points_apart=*/has_small_factor);
   summary.num_images = bundle.NumImages();
   summary.num_points = bundle.NumPoints();
   summary.num_residuals = bundle.NumResiduals();

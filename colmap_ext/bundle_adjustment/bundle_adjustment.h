@@ -99,8 +99,8 @@ struct PriorBundleAdjustmentOptions {
   // Several threads of the solver add in changing order: results then agree up
   // to rounding only. One thread repeats them bit by bit. -1: all.
   int num_threads = 1;
-  // Up to this many images the reduced camera system is solved densely, up to
-  // the second number by sparse Cholesky, beyond that iteratively.
+  // Where Ceres solves (docs/reference/math.md), up to so many images densely;
+  // what has a larger factor than the second number of them iteratively.
   int max_num_images_dense = 50;
   int max_num_images_sparse = 4000;
 

@@ -296,8 +296,7 @@ TEST(AdjustBundleTest, EverySizeOfSolverGivesTheSame) {
   BundleWorldOptions world;
   world.pixel_noise_px = 0.5;
   std::vector<double> costs;
-  for (const auto& [dense, sparse] :
-       {std::pair(50, 4000), std::pair(0, 4000), std::pair(0, 0)}) {
+  for (const auto& [dense, sparse] : {std::pair(50, 4000), std::pair(0, 0)}) {
     colmap::Reconstruction reconstruction = BuildBundleWorld(world);
     PerturbBundleWorld(2e-3, 0.05, 1, &reconstruction);
     PriorBundleAdjustmentOptions options = ConvergeFully();
@@ -307,41 +306,7 @@ TEST(AdjustBundleTest, EverySizeOfSolverGivesTheSame) {
         AdjustBundle(options, ProblemOfAll(reconstruction), &reconstruction)
             .final_cost);
   }
-  EXPECT_NEAR(costs[1], costs[0], 1e-4 * costs[0]);
-  EXPECT_NEAR(costs[2], costs[0], 1e-2 * costs[0]);
-}
-
-// Points eliminated one by one, without a Jacobian, or by Ceres: the same
-// steps.
-TEST(AdjustBundleTest, MakesTheStepsOfCeres) {
-  BundleWorldOptions world;
-  world.pixel_noise_px = 0.5;
-  for (const double position_error_m : {0.05, 2.0}) {
-    std::vector<colmap::Reconstruction> models;
-    std::vector<PriorBundleAdjustmentSummary> summaries;
-    for (const int max_num_images_dense : {50, 0}) {
-      models.push_back(BuildBundleWorld(world));
-      PerturbBundleWorld(2e-2, position_error_m, 1, &models.back());
-      PriorBundleAdjustmentProblem problem = ProblemOfAll(models.back());
-      problem.priors = TruePriors(world);
-      PriorBundleAdjustmentOptions options;
-      options.max_num_images_dense = max_num_images_dense;
-      summaries.push_back(AdjustBundle(options, problem, &models.back()));
-      ASSERT_TRUE(summaries.back().success);
-    }
-    EXPECT_GT(summaries[1].num_iterations, 3);
-    EXPECT_EQ(summaries[1].num_iterations, summaries[0].num_iterations);
-    EXPECT_EQ(summaries[1].num_residuals, summaries[0].num_residuals);
-    EXPECT_NEAR(summaries[1].initial_cost, summaries[0].initial_cost,
-                1e-10 * summaries[0].initial_cost);
-    EXPECT_NEAR(summaries[1].final_cost, summaries[0].final_cost,
-                1e-6 * summaries[0].final_cost);
-    for (const image_t id : models[0].RegImageIds()) {
-      EXPECT_LT(
-          (models[1].Image(id).Tvec() - models[0].Image(id).Tvec()).norm(),
-          1e-5);
-    }
-  }
+  EXPECT_NEAR(costs[1], costs[0], 1e-2 * costs[0]);
 }
 
 // The solver's threads add in changing order: equal but for rounding.
