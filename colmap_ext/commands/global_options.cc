@@ -96,7 +96,8 @@ void GlobalOptionAdder::AddLoops() {
   Add("loop_pair_length_log_sigma", &loops->pair_length_log_sigma,
       "least error of a pair's length, 1 sigma of its logarithm");
   Add("loop_unit_log_sigma", &loops->unit_log_sigma,
-      "error of the unit of a segment without metres, 1 sigma of its logarithm");
+      "error of the unit of a segment without metres, 1 sigma of its "
+      "logarithm");
   Add("max_sequence_gap", &loops->max_sequence_gap,
       "images at most this far apart in the order of capture follow each "
       "other; pairs of others are loop closures");
@@ -161,7 +162,8 @@ void GlobalOptionAdder::AddAblations() {
       "start from a spanning tree");
   Add("use_loop_gating", &stage_->poses.loops.enabled,
       "remove false loop closures");
-  Add("split_unconfirmed_closures", &stage_->poses.loops.split_unconfirmed_closures,
+  Add("split_unconfirmed_closures",
+      &stage_->poses.loops.split_unconfirmed_closures,
       "parts of a drive (with sensor priors, or images in order) that only "
       "loop closures at one place join become models of their own");
   Add("use_visual_odometry", &stage_->poses.visual_steps.enabled,

@@ -19,9 +19,9 @@ std::vector<int> FindConsistentSet(const ConsistencyMatrix& is_consistent,
   }
   std::vector<int> clique;
   while (!candidates.empty()) {
-    const int best =
-        *std::max_element(candidates.begin(), candidates.end(),
-                          [&](int a, int b) { return possible[a] < possible[b]; });
+    const int best = *std::max_element(
+        candidates.begin(), candidates.end(),
+        [&](int a, int b) { return possible[a] < possible[b]; });
     clique.push_back(best);
     std::vector<int> left;
     for (const int a : candidates) {

@@ -7,7 +7,6 @@
 #include <map>
 #include <numeric>
 #include <stdexcept>
-#include <tuple>
 #include <utility>
 
 #include "core/option_checker.h"
@@ -22,18 +21,22 @@ namespace {
 // ones: two million cycles, some seconds. Others are not confirmed.
 constexpr size_t kMaxNumClusters = 2000;
 
+// A pair from image i to image j, indices of ViewGraph::images; i lies in the
+// segment of the smaller index or, within a segment, earlier.
+struct Closure {
+  int i = 0;
+  int j = 0;
+  PairMotion j_from_i;
+};
+
 // Pairs between the same two windows of images.
 struct ClosureCluster {
   std::vector<int> edges;
   // Those that the odometry does not contradict, and the best of them: with a
-  // length if there are any, with most inliers. It leads from image i to image
-  // j, indices of ViewGraph::images; i lies in the segment of the smaller
-  // index.
+  // length if there are any, with most inliers.
   int num_kept = 0;
-  int best = -1;
-  int i = 0;
-  int j = 0;
-  PairMotion j_from_i;
+  int best_edge = -1;
+  Closure best;
 };
 
 class LoopClosureFilter {
@@ -109,30 +112,38 @@ class LoopClosureFilter {
       if (!has_pair_[e] || (segments.first == segments.second && !IsLoop(e))) {
         continue;
       }
-      int i = graph_.IndexOf(graph_.edges[e].image_id1);
-      int j = graph_.IndexOf(graph_.edges[e].image_id2);
-      const auto place = [this](int image) {
-        return std::make_pair(segments_.segment_of[image],
-                              segments_.rank_of[image]);
-      };
-      const bool is_inverse = place(i) > place(j);
-      if (is_inverse) std::swap(i, j);
-      const int window = options_.max_sequence_gap + 1;
-      ClosureCluster& cluster = clusters[{segments.first, segments.second,
-                                          segments_.rank_of[i] / window,
-                                          segments_.rank_of[j] / window}];
+      const Closure closure = MakeClosure(e);
+      // Votes take large windows; between segments one window is one place.
+      const int window = segments.first == segments.second
+                             ? 2 * options_.max_sequence_gap + 1
+                             : options_.max_sequence_gap + 1;
+      ClosureCluster& cluster =
+          clusters[{segments.first, segments.second,
+                    segments_.rank_of[closure.i] / window,
+                    segments_.rank_of[closure.j] / window}];
       cluster.edges.push_back(e);
       if (removals_[e] != EdgeRemoval::kKept) continue;
       ++cluster.num_kept;
-      if (cluster.best >= 0 && Quality(e) <= Quality(cluster.best)) continue;
-      cluster.best = e;
-      cluster.i = i;
-      cluster.j = j;
-      cluster.j_from_i = is_inverse ? pairs_[e].Inverse() : pairs_[e];
+      if (cluster.best_edge >= 0 && Quality(e) <= Quality(cluster.best_edge)) {
+        continue;
+      }
+      cluster.best_edge = e;
+      cluster.best = closure;
     }
     std::vector<ClosureCluster> list;
     for (auto& [key, cluster] : clusters) list.push_back(std::move(cluster));
     return list;
+  }
+
+  Closure MakeClosure(int e) const {
+    const int i = graph_.IndexOf(graph_.edges[e].image_id1);
+    const int j = graph_.IndexOf(graph_.edges[e].image_id2);
+    const auto place = [this](int image) {
+      return std::make_pair(segments_.segment_of[image],
+                            segments_.rank_of[image]);
+    };
+    if (place(i) > place(j)) return {j, i, pairs_[e].Inverse()};
+    return {i, j, pairs_[e]};
   }
 
   std::pair<bool, int> Quality(int e) const {
@@ -185,10 +196,25 @@ class LoopClosureFilter {
     }
     if (!options_.split_unconfirmed_closures) return;
     for (size_t c = 0; c < clusters.size(); ++c) {
-      if (std::binary_search(set.begin(), set.end(), c)) continue;
-      report_.num_pairs_of_unconfirmed_closures += Change(
-          clusters[c], EdgeRemoval::kKept, EdgeRemoval::kUnverifiedJoin);
+      const bool is_confirmed = std::binary_search(set.begin(), set.end(), c);
+      for (const int e : clusters[c].edges) {
+        if (removals_[e] != EdgeRemoval::kKept ||
+            (is_confirmed && AreConsistent(clusters[c].best, MakeClosure(e),
+                                           UnitLogSigma(segments)))) {
+          continue;
+        }
+        removals_[e] = EdgeRemoval::kUnverifiedJoin;
+        ++report_.num_pairs_of_unconfirmed_closures;
+      }
     }
+  }
+
+  // Of the second segment's unit in that of the first.
+  double UnitLogSigma(const std::pair<int, int>& segments) const {
+    return segments_.is_metric[segments.first] &&
+                   segments_.is_metric[segments.second]
+               ? 0.0
+               : options_.unit_log_sigma;
   }
 
   // All of them for photos in any order, which have no odometry that could
@@ -201,25 +227,21 @@ class LoopClosureFilter {
       std::iota(all.begin(), all.end(), 0);
       return all;
     }
-    const bool has_units = segments_.is_metric[segments.first] &&
-                           segments_.is_metric[segments.second];
-    const double unit_log_sigma = has_units ? 0.0 : options_.unit_log_sigma;
     ConsistencyMatrix is_consistent(size, std::vector<bool>(size, true));
     std::vector<int> weights;
     for (size_t a = 0; a < size; ++a) {
       weights.push_back(clusters[a].num_kept);
       for (size_t b = a + 1; b < size; ++b) {
-        is_consistent[a][b] = is_consistent[b][a] =
-            AreConsistent(clusters[a], clusters[b], unit_log_sigma);
+        is_consistent[a][b] = is_consistent[b][a] = AreConsistent(
+            clusters[a].best, clusters[b].best, UnitLogSigma(segments));
       }
     }
     return FindConsistentSet(is_consistent, weights);
   }
 
-  // The cycle through both clusters and the odometry at both of their ends, by
-  // its chi-square. unit_log_sigma: of the unit of the second segment in that
-  // of the first.
-  bool AreConsistent(const ClosureCluster& a, const ClosureCluster& b,
+  // The cycle through both closures and the odometry at both of their ends, by
+  // its chi-square.
+  bool AreConsistent(const Closure& a, const Closure& b,
                      double unit_log_sigma) const {
     const auto image = [this](int index) { return graph_.images[index]; };
     const OdometryChain& chain = odometry_.chain;
@@ -250,8 +272,8 @@ class LoopClosureFilter {
                     const std::vector<int>& set) const {
     for (const int a : set) {
       for (const int b : set) {
-        if (AreApart(clusters[a].i, clusters[b].i) &&
-            AreApart(clusters[a].j, clusters[b].j)) {
+        if (AreApart(clusters[a].best.i, clusters[b].best.i) &&
+            AreApart(clusters[a].best.j, clusters[b].best.j)) {
           return true;
         }
       }
@@ -274,7 +296,7 @@ class LoopClosureFilter {
     int max_num_inliers = -1;
     for (const ClosureCluster& cluster : clusters) {
       closure.num_pairs += cluster.num_kept;
-      const ViewGraphEdge& edge = graph_.edges[cluster.best];
+      const ViewGraphEdge& edge = graph_.edges[cluster.best_edge];
       if (edge.num_inliers <= max_num_inliers) continue;
       max_num_inliers = edge.num_inliers;
       closure.image_id1 = edge.image_id1;

@@ -60,11 +60,12 @@ struct LoopClosureReport {
 //    the same two windows of images, votes: when most contradict, all go
 //    (kFalseLoop); when most do not, those that do have a wrong pose of a true
 //    place (kOdometryPose);
-// 3. between two segments no odometry contradicts. The pairs outside of a heavy
-//    pairwise consistent set of clusters go, and all of them unless it holds
-//    two places beyond a turn from each other at both ends (kUnverifiedJoin): a
-//    single place always fits, and a straight street that looks alike all along
-//    fits everywhere. Off with split_unconfirmed_closures.
+// 3. between two segments no odometry contradicts. Pairs that are inconsistent
+//    with the best one of their cluster go, those outside of a heavy pairwise
+//    consistent set of clusters, and all of them unless it holds two places
+//    beyond a turn from each other at both ends (kUnverifiedJoin): a single
+//    place always fits, and a straight street that looks alike all along fits
+//    everywhere. Off with split_unconfirmed_closures.
 // What holds each rule, and what was tried beside: docs/reference/global.md,
 // False loop closures. On failure: throws std::invalid_argument for invalid
 // options, or where there is not one length per edge.

@@ -20,8 +20,8 @@ struct LoopClosureOptions {
   // metres: the scene is as deep there as elsewhere, within a factor of two.
   double unit_log_sigma = 0.35;
   // Images at most this far apart in the order of capture follow each other;
-  // pairs of others are loop closures, and those between the same two windows
-  // of so many images (and one) are one cluster.
+  // pairs of others are loop closures. It also sets the windows of clusters:
+  // twice this and one within a segment, this and one between segments.
   int max_sequence_gap = 10;
   // Segments that only loop closures join stay models of their own unless the
   // closures confirm each other. Off: they are joined, and reported.

@@ -60,8 +60,8 @@ int RejectVisualOdometry(const VisualStepOptions& options,
     }
     const ChiSquare pose =
         TestByOdometry(chain, edge,
-                       MeasurePair(loop_options, edge, steps->lengths.lengths[e],
-                                   steps->unit_m));
+                       MeasurePair(loop_options, edge,
+                                   steps->lengths.lengths[e], steps->unit_m));
     if (pose.dof == 0) continue;
     Tally& tally = tallies[first->second];
     ++tally.num_pairs;

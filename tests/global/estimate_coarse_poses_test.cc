@@ -211,7 +211,7 @@ TEST(EstimateCoarsePoses, JoinsNothingBehindABlackoutWithoutSensors) {
       num_split += result.components.size() > 1;
       for (const CoarseComponent& component : result.components) {
         EXPECT_TRUE(component.positions_converged) << "seed " << seed;
-        EXPECT_TRUE(component.unverified_joins.empty());
+        EXPECT_TRUE(component.unconfirmed_closures.empty());
         // At most 240 m of road before any bundle adjustment: 0.5 %.
         EXPECT_LT(ComputeAlignedErrors(component.cams_from_world, problem.truth,
                                        AlignmentOptions())

@@ -41,7 +41,6 @@ const std::vector<GlobalCase>& Cases() {
       OPTION("gyro_bias_sigma_rad_s", 0.001, poses.chain.gyro_bias_sigma_rad_s),
       OPTION("visual_odometry_length_error", 0.2,
              poses.visual_steps.length_error_ratio),
-      OPTION("max_extrapolation_s", 3, poses.visual_steps.max_coasting_s),
       OPTION("loop_significance", 1e-4, poses.loops.significance),
       OPTION("loop_pair_angle_sigma_deg", 1, poses.loops.pair_angle_sigma_deg),
       OPTION("loop_pair_length_log_sigma", 0.1,
@@ -50,7 +49,6 @@ const std::vector<GlobalCase>& Cases() {
       OPTION("max_num_position_iterations", 7,
              poses.positions.max_num_iterations),
       OPTION("max_sequence_gap", 5, poses.loops.max_sequence_gap),
-      OPTION("closure_min_num_pairs", 5, poses.loops.min_num_pairs),
       OPTION("closure_min_turn_deg", 40, poses.loops.min_turn_deg),
       OPTION("min_angle_floor_deg", 2, structure.min_angle_floor_deg),
       OPTION("min_num_points_per_image", 10,
@@ -79,7 +77,7 @@ const std::vector<GlobalCase>& Cases() {
       OPTION("use_sdp_start", 1, poses.rotations.use_sdp_start),
       OPTION("use_loop_gating", 0, poses.loops.enabled),
       OPTION("split_unconfirmed_closures", 0,
-             poses.loops.split_unverified_joins),
+             poses.loops.split_unconfirmed_closures),
       OPTION("use_visual_odometry", 0, poses.visual_steps.enabled),
       OPTION("refine_relative_poses", 0, poses.relative_poses.enabled),
       OPTION("correct_camera_imu_rotation", 0, poses.camera_mount.enabled),
@@ -110,16 +108,16 @@ TEST(GlobalOptionsTest, TheHelpNamesAll) {
 TEST(GlobalOptionsTest, OldNamesAreTaken) {
   GlobalStageOptions stage;
   testing::internal::CaptureStderr();
-  EXPECT_TRUE(
-      ParseWords<GlobalStageOptions>({"--AdaSfmGlobal.max_coasting_s=3",
-                                      "--AdaSfmGlobal.join_min_turn_deg", "40"},
-                                     AddGlobalOptions, &stage)
-          .ok());
+  EXPECT_TRUE(ParseWords<GlobalStageOptions>(
+                  {"--AdaSfmGlobal.visual_step_length_error=0.3",
+                   "--AdaSfmGlobal.join_min_turn_deg", "40"},
+                  AddGlobalOptions, &stage)
+                  .ok());
   const std::string notes = testing::internal::GetCapturedStderr();
-  EXPECT_EQ(stage.poses.visual_steps.max_coasting_s, 3.0);
+  EXPECT_EQ(stage.poses.visual_steps.length_error_ratio, 0.3);
   EXPECT_EQ(stage.poses.loops.min_turn_deg, 40.0);
-  EXPECT_NE(notes.find("--AdaSfmGlobal.max_coasting_s is "
-                       "--AdaSfmGlobal.max_extrapolation_s now"),
+  EXPECT_NE(notes.find("--AdaSfmGlobal.visual_step_length_error is "
+                       "--AdaSfmGlobal.visual_odometry_length_error now"),
             std::string::npos)
       << notes;
   // Of a project file too.

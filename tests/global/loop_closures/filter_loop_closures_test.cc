@@ -35,7 +35,7 @@ Rigid3d TruePose(int k) {
 struct LoopProblem {
   ViewGraph graph;
   std::vector<bool> is_alias;
-  DriveOdometry odometry;
+  TrajectoryOdometry odometry;
 };
 
 void AddEdge(int i, int j, const Rigid3d& seen, bool is_alias, bool has_length,
@@ -110,8 +110,8 @@ TEST(FilterLoopClosures, KeepsTrueLoopsAndDropsLookAlikes) {
     const LoopClosureReport report = FilterLoopClosures(
         LoopClosureOptions(), problem.odometry, &problem.graph);
     ExpectOnlyAliasesRemoved(problem, seed);
-    EXPECT_GT(report.num_false_loops, 0);
-    EXPECT_EQ(report.num_parts, 1);
+    EXPECT_GT(report.num_false_clusters, 0);
+    EXPECT_EQ(report.num_segments, 1);
     EXPECT_EQ(report.num_tested, problem.graph.edges.size());
     for (const ViewGraphEdge& edge : problem.graph.edges) {
       EXPECT_NE(edge.removal, EdgeRemoval::kOdometryPose);
@@ -126,7 +126,7 @@ TEST(FilterLoopClosures, DropsUntestablePairsOfAFalseLoop) {
     LoopProblem problem = BuildProblem(seed, 0.5);
     const LoopClosureReport report = FilterLoopClosures(
         LoopClosureOptions(), problem.odometry, &problem.graph);
-    EXPECT_GT(report.num_pairs_of_false_loops, 0);
+    EXPECT_GT(report.num_pairs_of_false_clusters, 0);
     ExpectOnlyAliasesRemoved(problem, seed);
   }
 }
@@ -158,67 +158,21 @@ TEST(FilterLoopClosures, AWrongPoseOfATruePlaceIsNoFalseLoop) {
   }
 }
 
-// Odometry that errs by 14 m a lap excludes no pair, but look-alikes of a
-// parallel street, 30 m beside, do not agree with the true loops around them.
-TEST(FilterLoopClosures, AParallelStreetIsInconsistentWithTrueLoops) {
-  for (uint64_t seed = 1; seed <= 3; ++seed) {
-    Random random(seed);
-    LoopProblem problem;
-    OdometryChainOptions chain_options;
-    chain_options.persistent_translation_ratio = 0.0;
-    std::vector<RelativePosePrior> priors;
-    for (int k = 0; k < 2 * kLap; ++k) {
-      problem.graph.images.push_back(k + 1);
-      if (k + 1 == 2 * kLap) break;
-      priors.push_back(BuildPrior(
-          k + 1, k + 2, ComputeCam2FromCam1(TruePose(k), TruePose(k + 1)), 3e-4,
-          0.7, &random));
-    }
-    problem.odometry.chain = OdometryChain(priors, chain_options);
-    problem.odometry.priors = priors;
-    for (int i = 0; i < kLap; ++i) {
-      const int j = i + kLap;
-      const bool is_alias = i >= 40 && i < 52;
-      if (i % 2 > 0) continue;
-      // The alias looks like the place 30 m to the side.
-      Rigid3d seen = ComputeCam2FromCam1(TruePose(i), TruePose(j + 1));
-      if (is_alias) seen.translation.x() += 30.0;
-      AddEdge(i, j + 1, seen, is_alias, true, &problem);
-    }
-    LoopProblem without_truth = problem;
-    const LoopClosureReport report = FilterLoopClosures(
-        LoopClosureOptions(), problem.odometry, &problem.graph);
-    EXPECT_EQ(report.num_contradicting, 0) << "seed " << seed;
-    ExpectOnlyAliasesRemoved(problem, seed);
-    // It is the true loops that tell.
-    for (size_t e = 0; e < without_truth.graph.edges.size(); ++e) {
-      if (!without_truth.is_alias[e]) {
-        without_truth.graph.edges[e].removal = EdgeRemoval::kFewInliers;
-      }
-    }
-    FilterLoopClosures(LoopClosureOptions(), without_truth.odometry,
-                       &without_truth.graph);
-    for (size_t e = 0; e < without_truth.graph.edges.size(); ++e) {
-      EXPECT_EQ(without_truth.graph.edges[e].IsKept(),
-                static_cast<bool>(without_truth.is_alias[e]));
-    }
-  }
-}
-
 TEST(FilterLoopClosures, LeavesPhotosAlone) {
   LoopProblem problem = BuildProblem(1, 1.0);
   problem.odometry.chain = OdometryChain();
   problem.odometry.priors.clear();
   LoopClosureOptions options;
-  options.split_unverified_joins = false;
+  options.split_unconfirmed_closures = false;
   const LoopClosureReport report =
       FilterLoopClosures(options, problem.odometry, &problem.graph);
   EXPECT_EQ(report.num_tested, 0);
   for (const ViewGraphEdge& edge : problem.graph.edges) {
     EXPECT_TRUE(edge.IsKept());
   }
-  EXPECT_THROW(FilterLoopClosures(options, DriveOdometry(), &problem.graph),
-               std::invalid_argument);
+  EXPECT_THROW(
+      FilterLoopClosures(options, TrajectoryOdometry(), &problem.graph),
+      std::invalid_argument);
 }
 
 }  // namespace

@@ -126,7 +126,7 @@ LoopClosureReport Filter(Drives* drives,
     step.flags = kPriorRotation | kPriorDirection | kPriorLength;
     steps.push_back(step);
   }
-  DriveOdometry odometry;
+  TrajectoryOdometry odometry;
   odometry.chain = OdometryChain(steps, OdometryChainOptions());
   odometry.lengths = drives->lengths;
   odometry.priors = drives->priors;
@@ -149,14 +149,14 @@ TEST(FilterLoopClosures, OnePlaceJoinsNothing) {
   Drives drives = BuildDrives();
   AddTruePlace(3, 18, &drives);
   const LoopClosureReport report = Filter(&drives);
-  EXPECT_EQ(report.num_parts, 2);
-  EXPECT_EQ(report.num_confirmed_joins, 0);
-  EXPECT_EQ(report.num_pairs_of_unverified_joins, 30);
-  ASSERT_EQ(report.unverified_joins.size(), 1);
-  EXPECT_EQ(report.unverified_joins[0].num_pairs, 30);
-  EXPECT_EQ(report.unverified_joins[0].num_images, kNumImages);
-  EXPECT_LE(report.unverified_joins[0].image_id1, kSecond);
-  EXPECT_GT(report.unverified_joins[0].image_id2, kSecond);
+  EXPECT_EQ(report.num_segments, 2);
+  EXPECT_EQ(report.num_confirmed_closures, 0);
+  EXPECT_EQ(report.num_pairs_of_unconfirmed_closures, 30);
+  ASSERT_EQ(report.unconfirmed_closures.size(), 1);
+  EXPECT_EQ(report.unconfirmed_closures[0].num_pairs, 30);
+  EXPECT_EQ(report.unconfirmed_closures[0].num_images, kNumImages);
+  EXPECT_LE(report.unconfirmed_closures[0].image_id1, kSecond);
+  EXPECT_GT(report.unconfirmed_closures[0].image_id2, kSecond);
   EXPECT_EQ(CountKeptJoins(drives.graph), 0);
   EXPECT_EQ(FindConnectedComponents(drives.graph).size(), 2);
 }
@@ -168,8 +168,8 @@ TEST(FilterLoopClosures, ASecondPlaceBehindATurnConfirms) {
     AddTruePlace(3, 10, &drives);
     AddTruePlace(45, 52, &drives);
     const LoopClosureReport report = Filter(&drives);
-    EXPECT_EQ(report.num_confirmed_joins, 1) << scale;
-    EXPECT_TRUE(report.unverified_joins.empty());
+    EXPECT_EQ(report.num_confirmed_closures, 1) << scale;
+    EXPECT_TRUE(report.unconfirmed_closures.empty());
     EXPECT_EQ(CountKeptJoins(drives.graph), 28) << scale;
   }
 }
@@ -181,8 +181,8 @@ TEST(FilterLoopClosures, AStraightStreetConfirmsNothing) {
     Drives drives = BuildDrives(1.0, num_images, 1000);
     AddPlace(0, num_images - 1, 0, 0, &drives, 1000);
     const LoopClosureReport report = Filter(&drives);
-    EXPECT_EQ(report.num_confirmed_joins, 0) << num_images;
-    EXPECT_EQ(report.unverified_joins.size(), 1);
+    EXPECT_EQ(report.num_confirmed_closures, 0) << num_images;
+    EXPECT_EQ(report.unconfirmed_closures.size(), 1);
     EXPECT_EQ(CountKeptJoins(drives.graph), 0) << num_images;
   }
 }
@@ -190,7 +190,7 @@ TEST(FilterLoopClosures, AStraightStreetConfirmsNothing) {
 TEST(FilterLoopClosures, LongRunsAroundCornersConfirmThemselves) {
   Drives drives = BuildDrives();
   AddTruePlace(5, 50, &drives);
-  EXPECT_EQ(Filter(&drives).num_confirmed_joins, 1);
+  EXPECT_EQ(Filter(&drives).num_confirmed_closures, 1);
   EXPECT_EQ(CountKeptJoins(drives.graph), 90);
 }
 
@@ -201,12 +201,12 @@ TEST(FilterLoopClosures, FalsePlacesGo) {
   AddPlace(4, 12, 22, 2, &drives);
   AddPlace(64, 72, -21, -1, &drives);
   Drives with_truth = drives;
-  EXPECT_EQ(Filter(&drives).num_confirmed_joins, 0);
+  EXPECT_EQ(Filter(&drives).num_confirmed_closures, 0);
   EXPECT_EQ(CountKeptJoins(drives.graph), 0);
 
   AddTruePlace(3, 10, &with_truth);
   AddTruePlace(45, 52, &with_truth);
-  EXPECT_EQ(Filter(&with_truth).num_confirmed_joins, 1);
+  EXPECT_EQ(Filter(&with_truth).num_confirmed_closures, 1);
   for (const ViewGraphEdge& edge : with_truth.graph.edges) {
     if (edge.image_id1 > kSecond || edge.image_id2 <= kSecond) continue;
     const int shift = edge.image_id2 - kSecond - edge.image_id1;
@@ -240,20 +240,20 @@ TEST(FilterLoopClosures, SensorsAndNeighboursMakeOnePart) {
   joined.priors.back().image_id2 = kSecond + 1;
   joined.priors.back().cam2_from_cam1 =
       ComputeCam2FromCam1(PoseOf(kNumImages), PoseOf(kSecond + 1));
-  EXPECT_EQ(Filter(&joined).num_parts, 1);
+  EXPECT_EQ(Filter(&joined).num_segments, 1);
   EXPECT_EQ(CountKeptJoins(joined.graph), 14);
   // A rotation alone leaves the places open.
   Drives turned = drives;
   turned.priors.push_back(joined.priors.back());
   turned.priors.back().flags = kPriorRotation;
-  EXPECT_EQ(Filter(&turned).num_parts, 2);
+  EXPECT_EQ(Filter(&turned).num_segments, 2);
   // Ids that follow each other.
   LoopClosureOptions options;
   options.max_sequence_gap = kSecond + 1 - kNumImages;
   AddPair(kNumImages, kSecond + 1,
           ComputeCam2FromCam1(PoseOf(kNumImages), PoseOf(kSecond + 1)),
           &drives);
-  EXPECT_EQ(Filter(&drives, options).num_parts, 1);
+  EXPECT_EQ(Filter(&drives, options).num_segments, 1);
 }
 
 // Every field decides something.
@@ -276,7 +276,7 @@ TEST(FilterLoopClosures, JoinOptionsDecide) {
     Drives copy = drives;
     LoopClosureOptions options;
     change(&options);
-    return Filter(&copy, options).num_confirmed_joins == 1;
+    return Filter(&copy, options).num_confirmed_closures == 1;
   };
   const auto as_it_is = [](LoopClosureOptions*) {};
   const Drives turned = build(0.14, 1.0);
@@ -289,26 +289,24 @@ TEST(FilterLoopClosures, JoinOptionsDecide) {
   const Drives places = build(0.0, 1.0);
   EXPECT_TRUE(confirms(places, as_it_is));
   EXPECT_FALSE(confirms(places, [](auto* o) { o->min_turn_deg = 181.0; }));
-  EXPECT_FALSE(confirms(places, [](auto* o) { o->min_num_pairs = 9; }));
   Drives joined = places;
   LoopClosureOptions keep;
   keep.min_turn_deg = 181.0;
-  keep.split_unverified_joins = false;
+  keep.split_unconfirmed_closures = false;
   const LoopClosureReport report = Filter(&joined, keep);
-  EXPECT_EQ(report.num_pairs_of_unverified_joins, 0);
-  ASSERT_EQ(report.unverified_joins.size(), 1);
-  EXPECT_EQ(report.unverified_joins[0].num_pairs, 21);
+  EXPECT_EQ(report.num_pairs_of_unconfirmed_closures, 0);
+  ASSERT_EQ(report.unconfirmed_closures.size(), 1);
+  EXPECT_EQ(report.unconfirmed_closures[0].num_pairs, 21);
   EXPECT_EQ(CountKeptJoins(joined.graph), 21);
-  for (int i = 0; i < 7; ++i) {
+  for (int i = 0; i < 6; ++i) {
     LoopClosureOptions options;
     std::string error;
     if (i == 0) options.max_sequence_gap = 0;
     if (i == 1) options.significance = 1.0;
     if (i == 2) options.min_turn_deg = 0.0;
-    if (i == 3) options.min_num_pairs = 0;
-    if (i == 4) options.pair_angle_sigma_deg = std::nan("");
-    if (i == 5) options.pair_length_log_sigma = -1.0;
-    if (i == 6) options.unit_log_sigma = -1.0;
+    if (i == 3) options.pair_angle_sigma_deg = std::nan("");
+    if (i == 4) options.pair_length_log_sigma = -1.0;
+    if (i == 5) options.unit_log_sigma = -1.0;
     EXPECT_FALSE(options.IsValid(&error)) << i;
     EXPECT_THROW(Filter(&joined, options), std::invalid_argument) << i;
   }

@@ -1,0 +1,94 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "global/loop_closures/reject_visual_odometry.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <vector>
+
+#include "core/so3.h"
+#include "tests/testing/global/test_scene.h"
+
+namespace adasfm {
+namespace {
+
+constexpr int kNumImages = 20;
+
+TestScene BuildScene(uint64_t seed) {
+  TestSceneOptions options;
+  options.num_images = kNumImages;
+  options.noise_px = 0.3;
+  options.max_gap = 6;
+  return BuildTestScene(options, seed);
+}
+
+VisualSteps AddSteps(const TestScene& scene,
+                     const std::vector<RelativePosePrior>& priors = {}) {
+  return AddVisualSteps(VisualStepOptions(), EdgeLengthOptions(), scene.graph,
+                        scene.correspondences, {}, priors);
+}
+
+int Reject(const TestScene& scene, VisualSteps* steps,
+           size_t num_sensor_priors = 0) {
+  return RejectVisualOdometry(VisualStepOptions(), LoopClosureOptions(),
+                              OdometryChainOptions(), scene.graph,
+                              num_sensor_priors, steps);
+}
+
+void Turn(double angle_rad, ViewGraphEdge* edge) {
+  edge->cam2_from_cam1.rotation = ExpSo3(Eigen::Vector3d(0.0, angle_rad, 0.0)) *
+                                  edge->cam2_from_cam1.rotation;
+}
+
+TEST(RejectVisualOdometry, ASequenceKeepsAll) {
+  for (uint64_t seed = 1; seed <= 5; ++seed) {
+    const TestScene scene = BuildScene(seed);
+    VisualSteps steps = AddSteps(scene);
+    ASSERT_EQ(steps.priors.size(), kNumImages - 1);
+    EXPECT_EQ(Reject(scene, &steps), 0) << "seed " << seed;
+    EXPECT_EQ(steps.priors.size(), kNumImages - 1);
+  }
+}
+
+// Odometry that a fifth of the short pairs contradict excludes nothing.
+TEST(RejectVisualOdometry, ContradictedOdometryGoes) {
+  for (uint64_t seed = 1; seed <= 5; ++seed) {
+    TestScene scene = BuildScene(seed);
+    Random random(seed);
+    for (ViewGraphEdge& edge : scene.graph.edges) {
+      const image_t gap = edge.image_id2 - edge.image_id1;
+      if (gap > 1 && random.Uniform(0.0, 1.0) < 0.2) Turn(0.4, &edge);
+    }
+    VisualSteps steps = AddSteps(scene);
+    EXPECT_EQ(Reject(scene, &steps), kNumImages - 1) << "seed " << seed;
+    EXPECT_TRUE(steps.priors.empty());
+    // Odometry of sensors stays, whatever vision says.
+    steps = AddSteps(scene);
+    EXPECT_EQ(Reject(scene, &steps, steps.priors.size()), 0);
+  }
+}
+
+// Between two runs lies an odometry edge of sensors: each run is judged by its
+// own pairs.
+TEST(RejectVisualOdometry, EachRunIsJudgedByItsOwnPairs) {
+  for (uint64_t seed = 1; seed <= 5; ++seed) {
+    TestScene scene = BuildScene(seed);
+    VisualSteps steps = AddSteps(scene);
+    const auto sensor = std::find_if(
+        steps.priors.begin(), steps.priors.end(),
+        [](const RelativePosePrior& prior) { return prior.image_id1 == 12; });
+    ASSERT_NE(sensor, steps.priors.end());
+    std::iter_swap(steps.priors.begin(), sensor);
+    for (ViewGraphEdge& edge : scene.graph.edges) {
+      const image_t gap = edge.image_id2 - edge.image_id1;
+      if (edge.image_id1 > 12 && gap == 3) Turn(0.4, &edge);
+    }
+    EXPECT_EQ(Reject(scene, &steps, 1), kNumImages - 13) << "seed " << seed;
+    for (const RelativePosePrior& prior : steps.priors) {
+      EXPECT_LE(prior.image_id1, 12);
+    }
+  }
+}
+
+}  // namespace
+}  // namespace adasfm
