@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "colmap_ext/bundle_adjustment/minimize_bundle.h"
 
+#include <omp.h>
+
 #include <Eigen/CholmodSupport>
 #include <algorithm>
 #include <cmath>
@@ -14,6 +16,19 @@ namespace {
 constexpr double kMinRelativeDecrease = 1e-3;
 constexpr double kMaxRadius = 1e16;
 constexpr double kMinRadius = 1e-32;
+
+// CHOLMOD takes OpenMP's threads, however many its caller may use.
+class WithoutOpenMpThreads {
+ public:
+  explicit WithoutOpenMpThreads(bool is_wanted)
+      : max_active_levels_(omp_get_max_active_levels()) {
+    if (is_wanted) omp_set_max_active_levels(0);
+  }
+  ~WithoutOpenMpThreads() { omp_set_max_active_levels(max_active_levels_); }
+
+ private:
+  const int max_active_levels_;
+};
 
 class TrustRegion {
  public:
@@ -126,6 +141,7 @@ class BundleMinimizer {
 
 MinimizeBundleSummary MinimizeBundle(const MinimizeBundleOptions& options,
                                      BundleProblem* bundle) {
+  const WithoutOpenMpThreads serial(options.num_threads == 1);
   return BundleMinimizer(options, bundle).Run();
 }
 

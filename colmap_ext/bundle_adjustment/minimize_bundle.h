@@ -16,7 +16,7 @@ struct MinimizeBundleOptions {
   // Of the trust region at first; the damping is its inverse.
   double initial_radius = 1e4;
   int max_num_invalid_steps = 10;  // One after another.
-  int num_threads = 1;
+  int num_threads = 1;             // 1: OpenMP has none either.
 };
 
 struct MinimizeBundleSummary {
