@@ -41,7 +41,7 @@ README_SETS = {
 }
 CLEANER_SETS = ['world-alias-300', 'world-hard-400', 'world-clean-300',
                 'kitti06-51', 'kitti07-160']
-# Each part of the paper counts on one of them.
+# Look-alikes, nothing hard, and two real motions.
 ABLATION_SETS = ['alias-300', 'clean-500', 'kitti07-160', 'world-kitti10-592']
 # The commands of COLMAP 4, and the names of the benchmark's methods for them.
 PEER_COMMANDS = {'mapper': 'colmap4_mapper',
