@@ -6,6 +6,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <atomic>
 #include <csignal>
 #include <cstdio>
 #include <cstdlib>
@@ -16,6 +17,7 @@
 #include <iostream>
 #include <new>
 #include <system_error>
+#include <thread>
 #include <vector>
 
 #include "colmap_ext/commands/progress_display.h"
@@ -54,13 +56,22 @@ void PrintError(const std::string& message) {
 }
 
 bool has_command_ended = false;
+std::atomic<bool> is_exit_reported{false};
 
 // COLMAP's database class and OpenMP end the process when something fails.
 void ReportExitOfLibrary() {
-  if (has_command_ended) return;
-  PrintError(
-      "a library stopped at the error above; mend its cause (space, memory or "
-      "threads that are short), then give the same command again");
+  if (!has_command_ended) {
+    PrintError(
+        "a library stopped at the error above; mend its cause (space, memory "
+        "or threads that are short), then give the same command again");
+  }
+  is_exit_reported = true;
+}
+
+// When two threads end the process at once, the second one passes over the
+// handler that the first one is in, and would end the process before its line.
+void WaitForReportOfExit() {
+  while (!is_exit_reported) std::this_thread::yield();
 }
 
 void WriteToStderr(const char* text) {
@@ -286,6 +297,7 @@ Status CommandOptions::Check(const std::function<Status()>& check) {
 
 int RunCommand(const Command& command, int argc, char** argv) {
   SetUpLogging(command.name);
+  std::atexit(&WaitForReportOfExit);  // The last one is called first.
   std::atexit(&ReportExitOfLibrary);
   const int code = CatchAndRun(command, argc, argv);
   has_command_ended = true;

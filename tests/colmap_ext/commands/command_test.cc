@@ -3,8 +3,11 @@
 
 #include <gtest/gtest.h>
 
+#include <atomic>
 #include <cstdlib>
 #include <new>
+#include <thread>
+#include <vector>
 
 namespace adasfm {
 namespace {
@@ -23,6 +26,29 @@ TEST(RunCommandDeathTest, NothingEndsInACoreDump) {
       testing::ExitedWithCode(1), "ERROR: adasfm_test: out of memory");
   EXPECT_EXIT(RunThat([](int, char**) -> Status { std::abort(); }),
               testing::ExitedWithCode(1), "ERROR: a library aborted");
+}
+
+// As OpenMP does when its threads cannot be had.
+Status ExitInTwoThreads(int, char**) {
+  std::atomic<int> num_waiting{2};
+  std::vector<std::thread> threads;
+  for (int i = 0; i < 2; ++i) {
+    threads.emplace_back([&num_waiting] {
+      --num_waiting;
+      while (num_waiting > 0) {
+      }
+      std::exit(EXIT_FAILURE);
+    });
+  }
+  for (std::thread& thread : threads) thread.join();
+  return Status::Ok();
+}
+
+TEST(RunCommandDeathTest, TheLineIsThereWhenTwoThreadsEndTheProcess) {
+  for (int i = 0; i < 200; ++i) {
+    EXPECT_EXIT(RunThat(ExitInTwoThreads), testing::ExitedWithCode(1),
+                "ERROR: a library stopped");
+  }
 }
 
 }  // namespace
