@@ -21,6 +21,14 @@ struct OptionCase {
   std::function<double(const Options&)> get;
 };
 
+// A case of "AdaSfm" name and the member of Options, where that is what a test
+// calls its struct.
+#define ADASFM_OPTION(name, value, member)                      \
+  {                                                             \
+    "AdaSfm" name, value,                                       \
+        [](const Options& all) -> double { return all.member; } \
+  }
+
 template <typename Options>
 using OptionAdder = void (*)(Options*, CommandOptions*);
 
