@@ -93,7 +93,8 @@ TEST(LinearAdjustment, ForeseesAnAdjustmentWithOtherSigmas) {
   options.reproj_loss_scale_px = 0.0;
   std::unique_ptr<ReducedSystem> system;
   ASSERT_TRUE(AdjustBundle(options, problem, &model, &system).success);
-  LinearAdjustment linear(*system, problem.priors, options.prior_loss_scale);
+  LinearAdjustment linear(system.get(), problem.priors,
+                          options.prior_loss_scale);
   options.prior_sigma_factors = {0.5, 2.0, 0.3, 1.0};
   PriorComponents foreseen;
   ASSERT_TRUE(linear.Solve(options.prior_sigma_factors, &foreseen));
