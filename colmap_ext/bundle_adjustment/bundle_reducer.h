@@ -38,6 +38,8 @@ class BundleReducer {
   double Linearize(double inverse_radius,
                    std::vector<ReducedPriorRows>* priors = nullptr);
   BlockMatrix& Matrix() { return matrix_; }
+  // The parameters of its blocks.
+  const std::vector<double*>& Parameters() const { return parameters_of_; }
   const Eigen::VectorXd& Gradient() const { return gradient_; }
   // Of all parameters, the points too.
   double LargestGradient() const { return largest_gradient_; }

@@ -7,8 +7,6 @@
 #include <algorithm>
 #include <vector>
 
-#include "colmap_ext/bundle_adjustment/ordered_cholesky.h"
-
 namespace adasfm {
 namespace {
 
@@ -68,9 +66,8 @@ TEST(BlockMatrixTest, ReordersWithoutFill) {
     EXPECT_EQ(matrix.SizeOf(number_of[block]), block == 0 ? 2 : 6);
   }
   matrix.Allocate();
-  const Eigen::Matrix<double, 6, 6> link = 0.1 * Eigen::MatrixXd::Ones(6, 6);
-  const Eigen::Matrix<double, 6, 2> to_first =
-      0.1 * Eigen::MatrixXd::Ones(6, 2);
+  const Eigen::MatrixXd link = Eigen::MatrixXd::Random(6, 6);
+  const Eigen::MatrixXd to_first = Eigen::MatrixXd::Random(6, 2);
   Eigen::MatrixXd expected =
       Eigen::MatrixXd::Zero(matrix.NumColumns(), matrix.NumColumns());
   const auto add = [&](int block1, int block2, const Eigen::MatrixXd& values) {
@@ -89,23 +86,14 @@ TEST(BlockMatrixTest, ReordersWithoutFill) {
   };
   for (int block = 0; block < kNumBlocks; ++block) {
     const int size = block == 0 ? 2 : 6;
-    add(block, block,
-        20.0 * Eigen::MatrixXd::Identity(size, size) +
-            Eigen::MatrixXd::Ones(size, size));
+    add(block, block, Eigen::MatrixXd::Ones(size, size));
     if (block > 0) add(block, 0, to_first);
     if (block > 1) add(block, block - 1, link);
   }
+  EXPECT_EQ(Eigen::MatrixXd(matrix.Matrix()),
+            Eigen::MatrixXd(expected.triangularView<Eigen::Lower>()));
   EXPECT_EQ(CountFill(matrix.Matrix()),
             matrix.Matrix().nonZeros() - matrix.NumColumns());
-
-  OrderedCholesky factorization;
-  factorization.compute(matrix.Matrix());
-  ASSERT_EQ(factorization.info(), Eigen::Success);
-  const Eigen::VectorXd right_hand_side =
-      Eigen::VectorXd::LinSpaced(matrix.NumColumns(), -1.0, 1.0);
-  EXPECT_LT((expected * factorization.solve(right_hand_side) - right_hand_side)
-                .norm(),
-            1e-12);
 }
 
 }  // namespace
