@@ -50,8 +50,8 @@ inline bool NeedsMatches(int refinement_round) { return refinement_round > 1; }
 // weak coarse motions. An image whose motion contradicts the priors on all
 // sides is put back to where the coarse model has it, without its points, so
 // that the result is not worse than the priors. An image that neither points
-// nor priors hold is left out in the end. A round that needs the scene's matches
-// releases them.
+// nor priors hold is left out in the end. A round that needs the scene's
+// matches releases them.
 void RefineModel(const RefineModelOptions& options,
                  const LocalMapperOptions& local, int round, MapperScene* scene,
                  RefineModelSummary* summary);
