@@ -53,11 +53,11 @@ def run_size(num_images, with_limit, args):
     record['limit'] = dict(measure(output, folder, args, log_path),
                            cpu_s=sum(u.cpu_seconds for u in steps.values()),
                            peak_mb=max(u.peak_mib for u in steps.values()) *
-                           1.048576)
+                           1.024)
   output, steps = run_adasfm(folder, folder, args, True, {})
   for name, usage in steps.items():
     record[name] = {'cpu_s': usage.cpu_seconds,
-                    'peak_mb': usage.peak_mib * 1.048576}
+                    'peak_mb': usage.peak_mib * 1.024}
   record['coarse'] = measure(os.path.join(folder, 'global', '0'), folder, args,
                              log_path)
   record['model'] = measure(output, folder, args, log_path)
