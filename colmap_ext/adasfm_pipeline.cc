@@ -233,7 +233,7 @@ StatusOr<CoarseModelReport> EstimateCoarseModel(
   CoarseModelReport report;
   const StatusOr<SceneSize> size = MeasureScene(database_path);
   if (!size.ok()) return size.status();
-  status = CheckMemory(EstimateGlobalMemoryBytes(*size), options.max_memory_gb,
+  status = CheckMemory(EstimateStageMemoryBytes(*size), options.max_memory_gb,
                        "AdaSfmGlobal.max_memory_gb", &report.warnings);
   if (!status.ok()) return status;
   const auto lock =

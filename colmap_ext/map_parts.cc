@@ -66,7 +66,7 @@ Status CheckMergeMemory(const MapOptions& options, const MapRequest& request,
   }
   const StatusOr<SceneSize> size = MeasureScene(request.database_path);
   if (!size.ok()) return size.status();
-  return CheckMemory(EstimateMergeMemoryBytes(*size),
+  return CheckMemory(EstimateStageMemoryBytes(*size),
                      options.stage.max_memory_gb, "AdaSfmMapper.max_memory_gb",
                      warnings);
 }

@@ -25,10 +25,8 @@ StatusOr<SceneSize> MeasureScene(const std::string& database_path);
 // Of reading and smoothing the logs. Bags are not counted: nothing says before
 // they are read how much of them are logs.
 double EstimateImportMemoryBytes(const PriorImportPaths& paths);
-// Of the adjustment of the coarse model, the stage's largest step.
-double EstimateGlobalMemoryBytes(const SceneSize& size);
-// Of the adjustment of the whole model, the mapper's largest step.
-double EstimateMergeMemoryBytes(const SceneSize& size);
+// Of adasfm_global, and of adasfm_mapper beside the parts that it makes.
+double EstimateStageMemoryBytes(const SceneSize& size);
 
 // An error where `bytes` are more than a positive max_memory_gb (1e9 bytes).
 // Without a budget (-1) a warning where they are more than is available.

@@ -154,7 +154,7 @@ class BalancedAdjustment {
     options.max_num_iterations = kNumIterationsBeforeSigmas;
     Add(AdjustBundle(options, problem_, &reconstruction_, &system_));
     if (!summary_.success) return;
-    LinearAdjustment linear(*system_, problem_.priors,
+    LinearAdjustment linear(system_.get(), problem_.priors,
                             options.prior_loss_scale);
     const std::optional<PriorSigmaEstimate> estimate =
         EstimatePriorSigmas(&linear);
@@ -195,7 +195,7 @@ class BalancedAdjustment {
     summary_.priors_in_balance =
         LargestMeanSquare(Components()) <= balance_.max_mean_square;
     if (system_) {
-      LinearAdjustment linear(*system_, problem_.priors,
+      LinearAdjustment linear(system_.get(), problem_.priors,
                               options_.prior_loss_scale);
       linear.Solve({1.0, 1.0, 1.0, 1.0}, &components_);
     }

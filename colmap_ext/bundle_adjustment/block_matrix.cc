@@ -1,9 +1,33 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "colmap_ext/bundle_adjustment/block_matrix.h"
 
+#include <Eigen/CholmodSupport>
 #include <algorithm>
+#include <new>
+#include <utility>
 
 namespace adasfm {
+namespace {
+
+class BlockAnalysis
+    : public Eigen::CholmodSupernodalLLT<Eigen::SparseMatrix<double>> {
+ public:
+  // The lower triangle; the values mean nothing.
+  explicit BlockAnalysis(const Eigen::SparseMatrix<double>& pattern) {
+    cholmod().print = 0;
+    cholmod().nmethods = 2;
+    cholmod().method[0].ordering = CHOLMOD_AMD;
+    cholmod().method[1].ordering = CHOLMOD_METIS;
+    analyzePattern(pattern);
+    if (m_cholmodFactor == nullptr) throw std::bad_alloc();
+  }
+  // By its new number, the old number of each block.
+  const int* Order() const {
+    return static_cast<const int*>(m_cholmodFactor->Perm);
+  }
+};
+
+}  // namespace
 
 int BlockMatrix::AddBlock(int size) {
   first_.push_back(num_columns_);
@@ -29,6 +53,31 @@ void BlockMatrix::AddPair(int block1, int block2) {
   if (column.rows.size() > 2 * column.num_sorted + kMinNumUnsorted) {
     column.Sort();
   }
+}
+
+std::vector<int> BlockMatrix::Reorder() {
+  Eigen::SparseMatrix<double> pattern(NumBlocks(), NumBlocks());
+  for (int col = 0; col < NumBlocks(); ++col) {
+    columns_[col].Sort();
+    pattern.startVec(col);
+    pattern.insertBack(col, col) = 1.0;
+    for (const int row : columns_[col].rows) pattern.insertBack(row, col) = 1.0;
+  }
+  pattern.finalize();
+  const BlockAnalysis analysis(pattern);
+  std::vector<int> number_of(NumBlocks());
+  BlockMatrix ordered;
+  for (int number = 0; number < NumBlocks(); ++number) {
+    const int block = analysis.Order()[number];
+    number_of[block] = ordered.AddBlock(size_[block]);
+  }
+  for (int block = 0; block < NumBlocks(); ++block) {
+    for (const int other : columns_[block].rows) {
+      ordered.AddPair(number_of[block], number_of[other]);
+    }
+  }
+  *this = std::move(ordered);
+  return number_of;
 }
 
 void BlockMatrix::Allocate() {

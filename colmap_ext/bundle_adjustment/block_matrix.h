@@ -9,7 +9,8 @@ namespace adasfm {
 
 // A symmetric sparse matrix as a sum of dense blocks, of which the lower
 // triangle is kept. Its pattern is known before its values, so that nothing but
-// the matrix itself takes memory: AddBlock, then AddPair, then Allocate.
+// the matrix itself takes memory: AddBlock, then AddPair, then Reorder, then
+// Allocate.
 class BlockMatrix {
  public:
   // Appends rows and columns; the index of the block.
@@ -21,6 +22,12 @@ class BlockMatrix {
 
   // Makes room for what two blocks have in common, if there is none yet.
   void AddPair(int block1, int block2);
+  // Numbers the blocks anew so that a Cholesky factor has little fill: in
+  // postorder, by minimum degree or nested dissection, which CHOLMOD finds. The
+  // new number of each. A graph of blocks takes a 36th of the memory of that of
+  // a matrix of poses, and a matrix in order is factorised without a copy
+  // (ordered_cholesky.h). Throws where memory is short.
+  std::vector<int> Reorder();
   // Fixes the pattern; all values are zero.
   void Allocate();
 

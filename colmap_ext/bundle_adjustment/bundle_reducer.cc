@@ -4,6 +4,7 @@
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 namespace adasfm {
 
@@ -14,6 +15,7 @@ BundleReducer::BundleReducer(BundleProblem* bundle, int num_threads)
   problem_.GetResidualBlocks(&ids_);
   NumberBlocks();
   FindPattern();
+  OrderBlocks();
   matrix_.Allocate();
   column_mutexes_ = std::vector<std::mutex>(matrix_.NumBlocks());
 }
@@ -81,6 +83,19 @@ void BundleReducer::FindPattern() {
         blocks.push_back(found->second);
       }
     }
+  }
+}
+
+void BundleReducer::OrderBlocks() {
+  const std::vector<int> number_of = matrix_.Reorder();
+  std::vector<double*> parameters_of(parameters_of_.size());
+  for (size_t block = 0; block < parameters_of.size(); ++block) {
+    parameters_of[number_of[block]] = parameters_of_[block];
+  }
+  parameters_of_ = std::move(parameters_of);
+  for (auto& [parameters, block] : block_of_) block = number_of[block];
+  for (int& block : block_of_pose_) {
+    if (block >= 0) block = number_of[block];
   }
 }
 

@@ -23,8 +23,8 @@ namespace adasfm {
 // Jacobian is kept: an observation takes the 64 bytes of its keypoint, where
 // Ceres takes 530 with its cost, its rows and its lists.
 //
-// Columns: the poses that are not constant in the order of images, then the
-// other parameters as the problem's residuals name them first.
+// Columns: the poses that are not constant and the other parameters, in an
+// order of little fill (BlockMatrix::Reorder).
 class BundleReducer {
  public:
   // The problem is complete, its gauge too. num_threads: of the points that it
@@ -38,6 +38,8 @@ class BundleReducer {
   double Linearize(double inverse_radius,
                    std::vector<ReducedPriorRows>* priors = nullptr);
   BlockMatrix& Matrix() { return matrix_; }
+  // The parameters of its blocks.
+  const std::vector<double*>& Parameters() const { return parameters_of_; }
   const Eigen::VectorXd& Gradient() const { return gradient_; }
   // Of all parameters, the points too.
   double LargestGradient() const { return largest_gradient_; }
@@ -73,7 +75,7 @@ class BundleReducer {
       Eigen::Matrix<double, 6, 3> mixed;
       Eigen::Matrix<double, 6, 1> gradient;
     };
-    // Those not constant, in order of blocks.
+    // Those not constant.
     std::vector<Image> images;
     Eigen::Matrix3d information;
     Eigen::Vector3d gradient;
@@ -91,6 +93,7 @@ class BundleReducer {
   int AddBlock(double* parameters, int size);
   void NumberBlocks();
   void FindPattern();
+  void OrderBlocks();
   void AddPairsOf(const std::vector<int>& blocks);
 
   // Calls function(point, scratch, totals) for the points kept apart; the sum

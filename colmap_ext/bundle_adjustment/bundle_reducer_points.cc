@@ -107,8 +107,7 @@ void BundleReducer::Damp(size_t point, PointSums* sums) const {
 }
 
 void BundleReducer::EliminatePoint(const PointSums& sums) {
-  for (size_t i = 0; i < sums.images.size(); ++i) {
-    const PointSums::Image& col = sums.images[i];
+  for (const PointSums::Image& col : sums.images) {
     const Eigen::Matrix<double, 6, 3> weighted = col.mixed * sums.covariance;
     const Eigen::Matrix<double, 3, 6> negative = -weighted.transpose();
     const std::lock_guard<std::mutex> lock(column_mutexes_[col.block]);
@@ -119,9 +118,10 @@ void BundleReducer::EliminatePoint(const PointSums& sums) {
     Eigen::Matrix<double, 6, 6> values = col.information;
     values.noalias() += col.mixed * negative;
     matrix_.Add(col.block, col.block, values);
-    for (size_t j = i + 1; j < sums.images.size(); ++j) {
-      values.noalias() = sums.images[j].mixed * negative;
-      matrix_.Add(sums.images[j].block, col.block, values);
+    for (const PointSums::Image& row : sums.images) {
+      if (row.block <= col.block) continue;
+      values.noalias() = row.mixed * negative;
+      matrix_.Add(row.block, col.block, values);
     }
   }
 }

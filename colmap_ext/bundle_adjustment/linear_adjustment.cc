@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "colmap_ext/bundle_adjustment/linear_adjustment.h"
 
-#include <Eigen/CholmodSupport>
 #include <algorithm>
 #include <cmath>
 
+#include "colmap_ext/bundle_adjustment/ordered_cholesky.h"
 #include "core/random.h"
 
 namespace adasfm {
@@ -15,25 +15,21 @@ constexpr double kMinShare = 0.005;
 
 }  // namespace
 
-struct LinearAdjustment::Factorization
-    : Eigen::CholmodSupernodalLLT<Eigen::SparseMatrix<double>> {
-  // The caller says what a failure means.
-  Factorization() { cholmod().print = 0; }
-};
+struct LinearAdjustment::Factorization : OrderedCholesky {};
 
-LinearAdjustment::LinearAdjustment(const ReducedSystem& system,
+LinearAdjustment::LinearAdjustment(ReducedSystem* system,
                                    const std::vector<PosePriorEdge>& priors,
                                    double prior_loss_scale)
-    : system_(system),
+    : system_(*system),
       priors_(priors),
       loss_scale_(prior_loss_scale),
-      information_(system.rest),
       factorization_(std::make_unique<Factorization>()) {
-  factorization_->analyzePattern(information_);
-  for (const ReducedPriorRows& rows : system.priors) {
+  factorization_->analyzePattern(system_.rest);
+  for (const ReducedPriorRows& rows : system_.priors) {
     residuals_.push_back(rows.residuals);
   }
   weights_.resize(residuals_.size());
+  FindChangedValues();
 }
 
 LinearAdjustment::~LinearAdjustment() = default;
@@ -54,22 +50,49 @@ void LinearAdjustment::ComputeWeights(const PriorSigmaFactors& factors) {
   }
 }
 
-bool LinearAdjustment::Factorize() {
-  std::copy_n(system_.rest.valuePtr(), system_.rest.nonZeros(),
-              information_.valuePtr());
-  for (size_t i = 0; i < weights_.size(); ++i) {
-    const std::vector<int>& columns = system_.priors[i].columns;
-    const Eigen::MatrixXd jacobian = weights_[i] * system_.priors[i].jacobian;
-    const Eigen::MatrixXd information = jacobian.transpose() * jacobian;
+template <typename Function>
+void LinearAdjustment::ForEachValueOf(size_t i,
+                                      const Function& function) const {
+  const std::vector<int>& columns = system_.priors[i].columns;
+  const int* starts = system_.rest.outerIndexPtr();
+  const int* rows = system_.rest.innerIndexPtr();
+  for (size_t col = 0; col < columns.size(); ++col) {
+    const int* end = rows + starts[columns[col] + 1];
     for (size_t row = 0; row < columns.size(); ++row) {
-      for (size_t col = 0; col < columns.size(); ++col) {
-        if (columns[row] < columns[col]) continue;
-        information_.coeffRef(columns[row], columns[col]) +=
-            information(row, col);
-      }
+      if (columns[row] < columns[col]) continue;
+      const int* found =
+          std::lower_bound(rows + starts[columns[col]], end, columns[row]);
+      function(row, col, static_cast<int>(found - rows));
     }
   }
-  factorization_->factorize(information_);
+}
+
+void LinearAdjustment::FindChangedValues() {
+  for (size_t i = 0; i < weights_.size(); ++i) {
+    ForEachValueOf(
+        i, [&](size_t, size_t, int value) { changed_.push_back(value); });
+  }
+  std::sort(changed_.begin(), changed_.end());
+  changed_.erase(std::unique(changed_.begin(), changed_.end()), changed_.end());
+  changed_.shrink_to_fit();
+  for (const int value : changed_) {
+    without_priors_.push_back(system_.rest.valuePtr()[value]);
+  }
+}
+
+bool LinearAdjustment::Factorize() {
+  double* values = system_.rest.valuePtr();
+  for (size_t i = 0; i < weights_.size(); ++i) {
+    const Eigen::MatrixXd jacobian = weights_[i] * system_.priors[i].jacobian;
+    const Eigen::MatrixXd information = jacobian.transpose() * jacobian;
+    ForEachValueOf(i, [&](size_t row, size_t col, int value) {
+      values[value] += information(row, col);
+    });
+  }
+  factorization_->factorize(system_.rest);
+  for (size_t k = 0; k < changed_.size(); ++k) {
+    values[changed_[k]] = without_priors_[k];
+  }
   return factorization_->info() == Eigen::Success;
 }
 

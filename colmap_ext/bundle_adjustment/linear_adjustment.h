@@ -23,8 +23,9 @@ class LinearAdjustment {
  public:
   static constexpr int kNumProbes = 4;
 
-  // priors: the adjustment's. Both are kept by reference.
-  LinearAdjustment(const ReducedSystem& system,
+  // priors: the adjustment's. Both are kept by reference; the system holds the
+  // priors' information while it is factorised.
+  LinearAdjustment(ReducedSystem* system,
                    const std::vector<PosePriorEdge>& priors,
                    double prior_loss_scale);
   ~LinearAdjustment();
@@ -38,6 +39,11 @@ class LinearAdjustment {
   // One vector for each of the system's prior rows.
   using RowValues = std::vector<Eigen::VectorXd>;
 
+  // Calls function(row, column, number of the value) for the values of the
+  // lower triangle that the i-th rows add to; row and column are theirs.
+  template <typename Function>
+  void ForEachValueOf(size_t i, const Function& function) const;
+  void FindChangedValues();
   bool IsTested(size_t i) const;
   void ComputeWeights(const PriorSigmaFactors& factors);
   bool Factorize();
@@ -47,15 +53,17 @@ class LinearAdjustment {
   RowValues SolveForRows(const Eigen::VectorXd& right_hand_side) const;
   void EstimateRedundancies(PriorComponents* components) const;
 
-  const ReducedSystem& system_;
+  ReducedSystem& system_;
   const std::vector<PosePriorEdge>& priors_;
   const double loss_scale_;
   // In the adjustment's sigmas.
   RowValues residuals_;
   // Square roots; the factors of the sigmas are in them.
   std::vector<double> weights_;
-  // The normal equations; the pattern is that of system_.rest.
-  Eigen::SparseMatrix<double> information_;
+  // The values of system_.rest that the priors add to: where they are, in
+  // order, and what they are without priors.
+  std::vector<int> changed_;
+  std::vector<double> without_priors_;
   struct Factorization;
   std::unique_ptr<Factorization> factorization_;
 };

@@ -3,11 +3,11 @@
 
 #include <omp.h>
 
-#include <Eigen/CholmodSupport>
 #include <algorithm>
 #include <cmath>
 
 #include "colmap_ext/bundle_adjustment/bundle_reducer.h"
+#include "colmap_ext/bundle_adjustment/ordered_cholesky.h"
 
 namespace adasfm {
 namespace {
@@ -57,7 +57,6 @@ class BundleMinimizer {
       : options_(options),
         reducer_(bundle, options.num_threads),
         region_(options.initial_radius) {
-    factorization_.cholmod().print = 0;  // The caller says what failed.
     factorization_.analyzePattern(reducer_.Matrix().Matrix());
   }
 
@@ -131,7 +130,7 @@ class BundleMinimizer {
   const MinimizeBundleOptions options_;
   BundleReducer reducer_;
   TrustRegion region_;
-  Eigen::CholmodSupernodalLLT<Eigen::SparseMatrix<double>> factorization_;
+  OrderedCholesky factorization_;
   MinimizeBundleSummary summary_;
   double cost_ = 0.0;
   int num_invalid_steps_ = 0;

@@ -22,10 +22,12 @@ void AddImages(const SceneData& data, MapperScene* scene) {
   }
 }
 
-void AddMatches(const SceneData& data, MapperScene* scene) {
+void AddMatches(const SceneData& data, bool with_matches, MapperScene* scene) {
   for (const ScenePair* pair : FindPairsAmong(data, scene->images)) {
-    scene->mapper.AddMatches(pair->image_id1, pair->image_id2,
-                             pair->inlier_matches);
+    if (with_matches) {
+      scene->mapper.AddMatches(pair->image_id1, pair->image_id2,
+                               pair->inlier_matches);
+    }
     const int num_matches = static_cast<int>(pair->inlier_matches.size());
     scene->neighbors[pair->image_id1].emplace_back(pair->image_id2,
                                                    num_matches);
@@ -56,7 +58,8 @@ void AddPriors(const std::vector<RelativePosePrior>& priors,
 
 std::unique_ptr<MapperScene> BuildMapperScene(const SceneData& data,
                                               const CoarsePoseMap& coarse,
-                                              const std::set<image_t>& images) {
+                                              const std::set<image_t>& images,
+                                              bool with_matches) {
   auto scene = std::make_unique<MapperScene>();
   scene->data = &data;
   scene->coarse = &coarse;
@@ -64,8 +67,9 @@ std::unique_ptr<MapperScene> BuildMapperScene(const SceneData& data,
     if (data.images.count(image_id)) scene->images.insert(image_id);
   }
   AddImages(data, scene.get());
-  AddMatches(data, scene.get());
+  AddMatches(data, with_matches, scene.get());
   scene->mapper.Begin();
+  if (!with_matches) scene->mapper.ReleaseMatches();
   AddPriors(data.priors, scene.get());
   AddPriors(data.frame_priors, scene.get());
   return scene;

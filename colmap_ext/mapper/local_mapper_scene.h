@@ -36,9 +36,11 @@ struct MapperScene {
 };
 
 // `data` and `coarse` must outlive the scene. Images unknown to `data` are left
-// out.
+// out. Without matches, which take the most memory, the mapper can do what it
+// can after HostMapper::ReleaseMatches.
 std::unique_ptr<MapperScene> BuildMapperScene(const SceneData& data,
                                               const CoarsePoseMap& coarse,
-                                              const std::set<image_t>& images);
+                                              const std::set<image_t>& images,
+                                              bool with_matches = true);
 
 }  // namespace adasfm

@@ -51,15 +51,18 @@ std::vector<PartPoint> CollectPoints(const AlignPartsResult& aligned,
 std::vector<std::vector<size_t>> GroupPoints(
     const std::vector<PartPoint>& points) {
   DisjointSets sets(points.size());
-  std::map<Observation, size_t> first_point;
+  std::vector<std::pair<Observation, size_t>> point_of;
   for (size_t i = 0; i < points.size(); ++i) {
     for (const Observation& observation : points[i].observations) {
-      const auto [it, is_new] = first_point.emplace(observation, i);
-      if (is_new) continue;
-      const int a = sets.Find(it->second);
-      const int b = sets.Find(i);
-      sets.Join(std::max(a, b), std::min(a, b));
+      point_of.emplace_back(observation, i);
     }
+  }
+  std::sort(point_of.begin(), point_of.end());
+  for (size_t k = 1; k < point_of.size(); ++k) {
+    if (point_of[k].first != point_of[k - 1].first) continue;
+    const int a = sets.Find(point_of[k - 1].second);
+    const int b = sets.Find(point_of[k].second);
+    sets.Join(std::max(a, b), std::min(a, b));
   }
   std::vector<std::vector<size_t>> groups(points.size());
   for (size_t i = 0; i < points.size(); ++i) groups[sets.Find(i)].push_back(i);

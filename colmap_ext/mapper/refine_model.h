@@ -39,6 +39,8 @@ struct RefineModelSummary {
 };
 
 inline constexpr int kNumRefinementRounds = 3;
+// Whether a round completes tracks; the first only adjusts.
+inline bool NeedsMatches(int refinement_round) { return refinement_round > 1; }
 
 // Refines the whole model by the thresholds, the noise of keypoints and the
 // balance that local mapping had, in rounds from 1 to kNumRefinementRounds that
@@ -48,8 +50,8 @@ inline constexpr int kNumRefinementRounds = 3;
 // weak coarse motions. An image whose motion contradicts the priors on all
 // sides is put back to where the coarse model has it, without its points, so
 // that the result is not worse than the priors. An image that neither points
-// nor priors hold is left out in the end. A round begins with a scene that has
-// its matches, and releases them.
+// nor priors hold is left out in the end. A round that needs the scene's
+// matches releases them.
 void RefineModel(const RefineModelOptions& options,
                  const LocalMapperOptions& local, int round, MapperScene* scene,
                  RefineModelSummary* summary);

@@ -125,7 +125,7 @@ class MapperStage {
 
   Status ReadPartReports(bool require_all_parts);
   Status MergePartModels(const std::string& fingerprint);
-  std::unique_ptr<MapperScene> BuildWholeScene() const;
+  std::unique_ptr<MapperScene> BuildWholeScene(bool with_matches) const;
   // Takes the merged model through the rounds that are left.
   Status RefineMerged(const std::string& fingerprint, MergeCheckpoint* merged);
   // So that the result is never worse than the prior trajectory.

@@ -86,10 +86,11 @@ Status MapperStage::ReadPartReports(bool require_all_parts) {
                        "as --AdaSfmMapper.part_index");
 }
 
-std::unique_ptr<MapperScene> MapperStage::BuildWholeScene() const {
+std::unique_ptr<MapperScene> MapperStage::BuildWholeScene(
+    bool with_matches) const {
   std::set<image_t> images;
   for (const auto& [image_id, image] : data_.images) images.insert(image_id);
-  return BuildMapperScene(data_, coarse_, images);
+  return BuildMapperScene(data_, coarse_, images, with_matches);
 }
 
 Status MapperStage::MergePartModels(const std::string& fingerprint) {
@@ -111,7 +112,8 @@ Status MapperStage::MergePartModels(const std::string& fingerprint) {
   summary_.aligned = AlignParts(align, coarse_, parts);
   summary_.refine.keypoint_sigma_factor =
       FindSmallestSigmaFactor(summary_.parts, summary_.aligned);
-  const std::unique_ptr<MapperScene> scene = BuildWholeScene();
+  const std::unique_ptr<MapperScene> scene =
+      BuildWholeScene(/*with_matches=*/false);
   summary_.merge = MergeParts(summary_.aligned, parts, scene.get());
   return WriteMergeCheckpoint(checkpoint_path_, fingerprint, 0, summary_,
                               *scene);
@@ -154,7 +156,7 @@ Status MapperStage::RefineMerged(const std::string& fingerprint,
                " images, round " + std::to_string(round) + " of " +
                std::to_string(kNumRefinementRounds),
            0.65 + 0.3 * (round - 1) / kNumRefinementRounds);
-    std::unique_ptr<MapperScene> scene = BuildWholeScene();
+    std::unique_ptr<MapperScene> scene = BuildWholeScene(NeedsMatches(round));
     PutIntoScene(merged->model, scene.get());
     merged->model = colmap::Reconstruction();
     ReleaseFreedMemory();

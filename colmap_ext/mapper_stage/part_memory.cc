@@ -16,11 +16,11 @@
 namespace adasfm {
 namespace {
 
-// Measured on drives of 500 to 4,000 images (docs/reference/mapper.md), rounded
-// up.
+// Measured on parts of 160 photos and of simulated images
+// (docs/reference/mapper.md), rounded up.
 constexpr double kBytesPerPart = 10e6;
-constexpr double kBytesPerKeypoint = 600.0;
-constexpr double kBytesPerMatch = 60.0;
+constexpr double kBytesPerKeypoint = 250.0;
+constexpr double kBytesPerMatch = 25.0;
 
 double SystemMemoryBytes() {
   std::ifstream file("/proc/meminfo");

@@ -10,7 +10,7 @@
 namespace adasfm {
 
 // What a part at work needs beside the scene: matches in the correspondence
-// graph, tracks, and the adjustment's residuals and Jacobians. An upper
+// graph, tracks, and the adjustment's observations and equations. An upper
 // estimate in bytes from its keypoints and matches.
 double EstimatePartMemoryBytes(const SceneData& data,
                                const std::vector<image_t>& part);

@@ -59,16 +59,16 @@ TEST(EstimateMemoryTest, CoversWhatWasMeasured) {
     double global_bytes, mapper_bytes;
   };
   for (const Peak& peak :
-       {Peak{{300, 101050, 218941}, 133e6, 155e6},       // world-clean-300
-        Peak{{400, 124250, 281891}, 135e6, 178e6},       // world-hard-400
-        Peak{{160, 449962, 1074948}, 207e6, 343e6},      // kitti07-160
-        Peak{{1000, 285426, 1485449}, 305e6, 381e6}}) {  // clean-1000
-    const double global_bytes = EstimateGlobalMemoryBytes(peak.size);
-    EXPECT_GT(global_bytes, peak.global_bytes);
-    EXPECT_LT(global_bytes, 2.0 * peak.global_bytes);
-    const double mapper_bytes = EstimateMergeMemoryBytes(peak.size);
-    EXPECT_GT(mapper_bytes, peak.mapper_bytes);
-    EXPECT_LT(mapper_bytes, 2.0 * peak.mapper_bytes);
+       {Peak{{300, 101050, 218941}, 130e6, 108e6},            // world-clean-300
+        Peak{{400, 124250, 281891}, 131e6, 118e6},            // world-hard-400
+        Peak{{160, 460401, 1580071}, 205e6, 203e6},           // kitti07-160
+        Peak{{1000, 285426, 1485449}, 214e6, 219e6},          // clean-1000
+        Peak{{10000, 2881995, 17562966}, 1662e6, 1816e6}}) {  // clean-10000
+    const double bytes = EstimateStageMemoryBytes(peak.size);
+    for (const double measured : {peak.global_bytes, peak.mapper_bytes}) {
+      EXPECT_GT(bytes, measured) << peak.size.num_images;
+      EXPECT_LT(bytes, 2.0 * measured) << peak.size.num_images;
+    }
   }
 }
 

@@ -12,12 +12,11 @@ MIN_MINUTES = 10.0
 
 
 def memory_mb(stage, settings, facts):
-    """Bytes of a keypoint, a raw match and an inlier, times 1.5 of what was
+    """Bytes of an image, a keypoint and an inlier, times 1.3 to 1.5 of what was
     measured."""
     images = facts['num_images']
     keypoints = facts['num_keypoints'] / 1e6
-    raw, inliers = (facts[name] / 1e6 for name in
-                    ('num_raw_matches', 'num_inlier_matches'))
+    inliers = facts['num_inlier_matches'] / 1e6
     scene = 120 + 100 * keypoints + 35 * inliers
     if stage.name == 'features':
         # A photo of 3200 x 2400 pixels, twice as large for the detector.
@@ -30,10 +29,9 @@ def memory_mb(stage, settings, facts):
         return 300 + 0.01 * images
     if stage.name == 'priors':
         return 120 + 0.1 * images
-    if stage.name == 'global':
-        return 120 + 450 * keypoints + 80 * (raw + inliers)
-    if stage.name == 'merge':
-        return 120 + 800 * keypoints + 200 * inliers
+    if stage.name in ('global', 'merge'):
+        # As colmap_ext/stage_memory.cc, and 50 MB.
+        return 135 + 0.07 * images + 200 * keypoints + 50 * inliers
     if stage.name == 'parts' and 'part_memory_mb' in facts:
         return 1.2 * facts['scene_memory_mb'] + facts['part_memory_mb']
     return scene + (200 if stage.name == 'parts' else 0)

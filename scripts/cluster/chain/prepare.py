@@ -84,7 +84,6 @@ def count_database(path):
                 'num_verified_pairs':
                     number('SELECT COUNT(*) FROM two_view_geometries'
                            ' WHERE rows > 0'),
-                'num_raw_matches': number('SELECT SUM(rows) FROM matches'),
                 'num_inlier_matches':
                     number('SELECT SUM(rows) FROM two_view_geometries')}
     except sqlite3.Error as error:
@@ -121,7 +120,6 @@ def expected(settings):
     estimates = {
         'num_keypoints': num_images * settings.max_num_features,
         'num_pairs': num_pairs,
-        'num_raw_matches': num_pairs * costs.MATCHES_PER_PAIR,
         'num_inlier_matches': num_pairs * costs.MATCHES_PER_PAIR}
     estimates.update(known)
     return estimates

@@ -66,9 +66,9 @@ TEST(PriorComponents, RedundancyIsWhatMeasurementsTestOfEachOther) {
     std::unique_ptr<ReducedSystem> system;
     ASSERT_TRUE(AdjustBundle(options, repeated, &adjusted, &system).success);
     PriorComponents components;
-    ASSERT_TRUE(
-        LinearAdjustment(*system, repeated.priors, options.prior_loss_scale)
-            .Solve(kStated, &components));
+    ASSERT_TRUE(LinearAdjustment(system.get(), repeated.priors,
+                                 options.prior_loss_scale)
+                    .Solve(kStated, &components));
     const double share = 1.0 - 1.0 / num_measurements;
     for (int k = 0; k < 3; ++k) {
       EXPECT_GT(components[k].num_residuals, 100 * num_measurements);
@@ -93,7 +93,8 @@ TEST(LinearAdjustment, ForeseesAnAdjustmentWithOtherSigmas) {
   options.reproj_loss_scale_px = 0.0;
   std::unique_ptr<ReducedSystem> system;
   ASSERT_TRUE(AdjustBundle(options, problem, &model, &system).success);
-  LinearAdjustment linear(*system, problem.priors, options.prior_loss_scale);
+  LinearAdjustment linear(system.get(), problem.priors,
+                          options.prior_loss_scale);
   options.prior_sigma_factors = {0.5, 2.0, 0.3, 1.0};
   PriorComponents foreseen;
   ASSERT_TRUE(linear.Solve(options.prior_sigma_factors, &foreseen));

@@ -8,13 +8,14 @@
 #include <vector>
 
 #include "colmap_ext/bundle_adjustment/bundle_problem.h"
+#include "colmap_ext/bundle_adjustment/bundle_reducer.h"
 #include "tests/testing/colmap_ext/bundle_world_problem.h"
 
 namespace adasfm {
 namespace {
 
-// The parameters that are not constant, poses first, then the points; each as
-// the residuals name them first, poses in the order of images.
+// The parameters that are not constant: those that the reduced system has, in
+// the order of its columns, then the points as the residuals name them first.
 std::vector<double*> ListParameters(BundleProblem* bundle) {
   ceres::Problem& problem = *bundle->CeresProblem();
   std::vector<ceres::ResidualBlockId> ids;
@@ -37,8 +38,11 @@ std::vector<double*> ListParameters(BundleProblem* bundle) {
       }
     }
   }
-  listed.insert(listed.end(), points.begin(), points.end());
-  return listed;
+  std::vector<double*> ordered = BundleReducer(bundle, 1).Parameters();
+  EXPECT_TRUE(std::is_permutation(listed.begin(), listed.end(), ordered.begin(),
+                                  ordered.end()));
+  ordered.insert(ordered.end(), points.begin(), points.end());
+  return ordered;
 }
 
 // The step and the covariance of all parameters but the points, from the whole

@@ -51,8 +51,9 @@ class MergeTest : public testing::Test {
     }
   }
 
-  std::unique_ptr<MapperScene> BuildScene() const {
-    return BuildMapperScene(world_.data, world_.coarse_poses, Interval(1, 60));
+  std::unique_ptr<MapperScene> BuildScene(bool with_matches = false) const {
+    return BuildMapperScene(world_.data, world_.coarse_poses, Interval(1, 60),
+                            with_matches);
   }
 
   MapperWorld world_;
@@ -109,6 +110,28 @@ TEST_F(MergeTest, CorruptedPartIsNotMerged) {
                             world_.coarse_poses.at(image_id), 0.1, 2.0));
       EXPECT_EQ(scene->reconstruction.Image(image_id).NumPoints3D(), 0);
     }
+  }
+}
+
+TEST_F(MergeTest, MatchesChangeNothing) {
+  Build(1);
+  const AlignPartsResult aligned = AlignParts({}, world_.coarse_poses, parts_);
+  const auto with = BuildScene(/*with_matches=*/true);
+  const auto without = BuildScene(/*with_matches=*/false);
+  EXPECT_EQ(MergeParts(aligned, parts_, with.get()).num_points,
+            MergeParts(aligned, parts_, without.get()).num_points);
+  const colmap::Reconstruction& expected = with->reconstruction;
+  const colmap::Reconstruction& model = without->reconstruction;
+  for (const image_t image_id : Interval(1, 60)) {
+    EXPECT_TRUE(PosesNear(CamFromWorld(model.Image(image_id)),
+                          CamFromWorld(expected.Image(image_id)), 1e-12,
+                          1e-12));
+  }
+  ASSERT_GT(model.NumPoints3D(), 0);
+  for (const auto& [point_id, point] : expected.Points3D()) {
+    EXPECT_EQ(XyzOf(model.Point3D(point_id)), XyzOf(point));
+    EXPECT_EQ(TrackOf(model.Point3D(point_id)).Length(),
+              TrackOf(point).Length());
   }
 }
 

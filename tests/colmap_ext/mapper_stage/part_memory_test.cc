@@ -45,5 +45,33 @@ TEST(PartMemoryTest, AddressSpaceLimitsWhatIsAvailable) {
   EXPECT_LT(available, 4.0 * (1 << 30));
 }
 
+// Two images with all of the keypoints and matches of a part.
+SceneData SceneOfPart(size_t num_keypoints, size_t num_matches) {
+  SceneData data;
+  data.images[1].keypoints.resize(num_keypoints);
+  data.images[2].image_id = 2;
+  ScenePair pair;
+  pair.image_id1 = 1;
+  pair.image_id2 = 2;
+  pair.inlier_matches.resize(num_matches);
+  data.pairs.push_back(pair);
+  return data;
+}
+
+// By how much the mapper grew while it made the part.
+TEST(PartMemoryTest, EstimateCoversWhatWasMeasured) {
+  struct Part {
+    size_t num_keypoints, num_matches;
+    double bytes;
+  };
+  for (const Part& part : {Part{460401, 1509729, 90e6},   // kitti07-160
+                           Part{55000, 330000, 21e6}}) {  // of clean-1000
+    const double bytes = EstimatePartMemoryBytes(
+        SceneOfPart(part.num_keypoints, part.num_matches), {1, 2});
+    EXPECT_GT(bytes, part.bytes);
+    EXPECT_LT(bytes, 2.0 * part.bytes);
+  }
+}
+
 }  // namespace
 }  // namespace adasfm

@@ -1,0 +1,24 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <Eigen/CholmodSupport>
+#include <Eigen/SparseCore>
+
+namespace adasfm {
+
+// CHOLMOD's supernodal factorisation of the lower triangle of a matrix that is
+// in a fill-reducing order already (BlockMatrix::Reorder). Without an order of
+// its own CHOLMOD holds no permuted copies of the matrix beside the factor, and
+// no graph of its rows. It prints nothing: the caller says what failed.
+class OrderedCholesky
+    : public Eigen::CholmodSupernodalLLT<Eigen::SparseMatrix<double>> {
+ public:
+  OrderedCholesky() {
+    cholmod().print = 0;
+    cholmod().nmethods = 1;
+    cholmod().method[0].ordering = CHOLMOD_NATURAL;
+    cholmod().postorder = false;
+  }
+};
+
+}  // namespace adasfm
