@@ -108,7 +108,8 @@ def write_database(path, args, names, keypoints, matches):
       file.write('%s %s\n%s\n\n' % (names[i], names[j], '\n'.join(
           '%d %d' % tuple(row) for row in rows)))
   colmap('matches_importer', '--match_list_path', list_path, '--match_type',
-         'raw', '--SiftMatching.use_gpu', '0')
+         'raw', '--SiftMatching.use_gpu', '0', '--SiftMatching.max_num_trials',
+         '300')
   os.remove(list_path)
   database = sqlite3.connect(path)
   pair_ids = [row[0] for row in database.execute(

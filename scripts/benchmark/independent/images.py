@@ -101,10 +101,10 @@ def darken(image, number, rng):
   return image
 
 
-def nearest(pixels, targets):
-  """Order of the pixels by distance from each target, shape (targets, n)."""
-  return np.argsort(np.linalg.norm(pixels[None] - targets[:, None], axis=2),
-                    axis=1)
+def nearest(pixels, targets, count):
+  """The pixels nearest to each target, in any order, shape (targets, count)."""
+  apart = np.sum((pixels[None] - targets[:, None])**2, axis=2)
+  return np.argpartition(apart, count - 1, axis=1)[:, :count]
 
 
 def match(image1, image2, outlier_ratio, rng):
@@ -127,9 +127,10 @@ def match(image1, image2, outlier_ratio, rng):
   wrong1, wrong2 = rng.permutation(free1)[:count], rng.permutation(free2)[:count]
   similar = count // 3
   beside = rows2[nearest(image1['pixels'][rows1],
-                         image1['pixels'][wrong1[:similar]])[:, 0]]
-  around = nearest(image2['pixels'][free2], image2['pixels'][beside])
-  pick = rng.integers(min(6, len(free2)), size=similar)
+                         image1['pixels'][wrong1[:similar]], 1)[:, 0]]
+  around = nearest(image2['pixels'][free2], image2['pixels'][beside],
+                   min(6, len(free2)))
+  pick = rng.integers(around.shape[1], size=similar)
   wrong2[:similar] = free2[around[np.arange(similar), pick]]
   _, once = np.unique(wrong2, return_index=True)
   return np.column_stack([np.append(rows1, wrong1[once]),
