@@ -16,6 +16,11 @@ constexpr int kMinPointsOfImage = 15;
 // Quantiles of chi-square with three degrees of freedom: 50 % and 99.9 %.
 constexpr double kMedianChi2 = 2.366;
 constexpr double kLargeChi2 = 16.27;
+// Of the search for the turn that translations share [rad]: 1 sigma, what an
+// adjustment believes (SharedErrorOptions), and its limit.
+constexpr double kSharedTurnSigma = 0.035;
+constexpr double kMaxSharedTurn = 3.0 * kSharedTurnSigma;
+constexpr int kNumSharedTurnSteps = 5;
 
 // Of the residual by its covariance; negative when that is not one.
 double Chi2(const Eigen::Vector3d& residual,
@@ -23,6 +28,51 @@ double Chi2(const Eigen::Vector3d& residual,
   const Eigen::LLT<Eigen::Matrix3d> llt(covariance);
   if (!covariance.allFinite() || llt.info() != Eigen::Success) return -1.0;
   return residual.dot(llt.solve(residual));
+}
+
+// Of one prior's translation, in the frame of the later camera: what is left
+// of it [m], and how a turn of the direction of driving (shared_errors.h) moves
+// that [m/rad].
+struct TranslationResidual {
+  Eigen::Vector3d residual;
+  Eigen::Matrix3d by_turn;
+  Eigen::Matrix3d covariance;
+};
+
+TranslationResidual ComputeTranslationResidual(const RelativePosePrior& prior,
+                                               const Rigid3d& motion) {
+  const Rigid3d& stated = prior.cam2_from_cam1;
+  const Eigen::Matrix3d later_from_middle =
+      ExpSo3(0.5 * LogSo3(stated.rotation)).toRotationMatrix();
+  TranslationResidual result;
+  result.residual = motion.translation - stated.translation;
+  result.by_turn = -Hat(stated.translation) * later_from_middle;
+  result.covariance = prior.covariance.bottomRightCorner<3, 3>();
+  return result;
+}
+
+// The turn that all translations share, robust (Cauchy); zero beyond what an
+// adjustment believes, whose unknown it is.
+Eigen::Vector3d FindSharedTurn(
+    const std::vector<TranslationResidual>& translations) {
+  Eigen::Vector3d turn = Eigen::Vector3d::Zero();
+  for (int step = 0; step < kNumSharedTurnSteps; ++step) {
+    Eigen::Matrix3d information =
+        Eigen::Matrix3d::Identity() / (kSharedTurnSigma * kSharedTurnSigma);
+    Eigen::Vector3d gradient = Eigen::Vector3d::Zero();
+    for (const TranslationResidual& t : translations) {
+      const double chi2 = Chi2(t.residual - t.by_turn * turn, t.covariance);
+      if (chi2 < 0.0) continue;
+      const Eigen::Matrix3d weighted = t.by_turn.transpose() *
+                                       t.covariance.inverse() /
+                                       (1.0 + chi2 / kLargeChi2);
+      information += weighted * t.by_turn;
+      gradient += weighted * t.residual;
+    }
+    turn = information.ldlt().solve(gradient);
+  }
+  if (turn.norm() > kMaxSharedTurn) turn.setZero();
+  return turn;
 }
 
 PriorAgreement Summarize(const std::string& kind, std::vector<double> chi2) {
@@ -50,6 +100,7 @@ bool IsHeldByPoints(const colmap::Reconstruction& model, image_t image_id) {
 void AddPriorResiduals(const SceneData& data,
                        const colmap::Reconstruction& model,
                        PriorResiduals* residuals) {
+  std::vector<TranslationResidual> translations;
   for (const RelativePosePrior& prior : data.priors) {
     if (!IsHeldByPoints(model, prior.image_id1) ||
         !IsHeldByPoints(model, prior.image_id2)) {
@@ -64,11 +115,13 @@ void AddPriorResiduals(const SceneData& data,
       if (chi2 >= 0.0) residuals->rotations.push_back(chi2);
     }
     if (prior.HasTranslation()) {
-      const double chi2 =
-          Chi2(motion.translation - prior.cam2_from_cam1.translation,
-               prior.covariance.bottomRightCorner<3, 3>());
-      if (chi2 >= 0.0) residuals->translations.push_back(chi2);
+      translations.push_back(ComputeTranslationResidual(prior, motion));
     }
+  }
+  const Eigen::Vector3d turn = FindSharedTurn(translations);
+  for (const TranslationResidual& t : translations) {
+    const double chi2 = Chi2(t.residual - t.by_turn * turn, t.covariance);
+    if (chi2 >= 0.0) residuals->translations.push_back(chi2);
   }
 }
 

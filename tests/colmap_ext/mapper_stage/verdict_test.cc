@@ -153,6 +153,28 @@ TEST_F(VerdictTest, WrongLengthsAreDoubtfulUnlessKeypointsWereLetGo) {
   ExpectResult(Assess(), VerdictResult::kFailed, "translations contradict");
 }
 
+// A camera's mounting that is off turns all directions of driving alike, which
+// the adjustment knows.
+TEST_F(VerdictTest, DirectionsOffAlikeAreNoContradiction) {
+  const SceneData honest = world_.data;
+  const auto turn = [&](double angle_rad, bool alike) {
+    world_.data = honest;
+    double sign = 1.0;
+    for (RelativePosePrior& prior : world_.data.priors) {
+      prior.cam2_from_cam1.translation =
+          ExpSo3(Eigen::Vector3d(0.0, sign * angle_rad, 0.0)) *
+          prior.cam2_from_cam1.translation;
+      if (!alike) sign = -sign;
+    }
+    return Assess();
+  };
+  ExpectResult(turn(0.03, true), VerdictResult::kGood, "");
+  ExpectResult(turn(0.03, false), VerdictResult::kDoubtful,
+               "translations contradict");
+  ExpectResult(turn(0.2, true), VerdictResult::kDoubtful,
+               "translations contradict");
+}
+
 TEST_F(VerdictTest, LensesOfAnotherKind) {
   const Verdict honest = Assess();
   ASSERT_EQ(honest.lens_errors.size(), 1);
