@@ -30,7 +30,7 @@ enum class WheelType {
 };
 
 // One wheel's speed or counter tells nothing of the yaw.
-inline bool TellsYaw(WheelType type) {
+inline bool ObservesYaw(WheelType type) {
   return type != WheelType::kSpeed && type != WheelType::kEncoder;
 }
 

@@ -65,7 +65,7 @@ std::string FindContradiction(const MotionLogs& logs,
                               const SensorCalibration& calibration,
                               std::vector<std::string>* warnings) {
   if (logs.imu.empty() || logs.wheel.empty()) return "";
-  const bool has_yaw = TellsYaw(calibration.wheel_type);
+  const bool has_yaw = ObservesYaw(calibration.wheel_type);
   const WheelCheck check =
       CheckWheels(logs.imu, logs.wheel, has_yaw, calibration);
   warnings->insert(warnings->end(), check.warnings.begin(),

@@ -14,7 +14,7 @@ namespace {
 // What no trajectory is more exact than: rounding, rolling shutter, clocks.
 constexpr double kMinSigmaM = 1e-3;
 constexpr double kMinSigmaRad = DegToRad(0.02);
-constexpr double kSigmaOfTurn = 0.01;
+constexpr double kRotationSigmaRatio = 0.01;
 
 Rigid3d Interpolate(const OdometryPose& before, const OdometryPose& after,
                     timestamp_t timestamp_ns) {
@@ -83,7 +83,7 @@ std::vector<RelativePosePrior> ComputeTrajectoryPriors(
         std::max(kMinSigmaM, options.sigma_m_per_m * distance_m);
     const double sigma_rad =
         std::max({kMinSigmaRad, DegToRad(options.sigma_deg_per_m) * distance_m,
-                  kSigmaOfTurn * turn_rad});
+                  kRotationSigmaRatio * turn_rad});
     prior.covariance.setZero();
     prior.covariance.diagonal().head<3>().setConstant(sigma_rad * sigma_rad);
     prior.covariance.diagonal().tail<3>().setConstant(sigma_m * sigma_m);

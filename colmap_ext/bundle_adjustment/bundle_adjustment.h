@@ -70,7 +70,7 @@ double MedianDirectionSigma(const std::vector<PosePriorEdge>& edges);
 struct PriorBundleAdjustmentOptions {
   // 1 sigma of a keypoint's position; the unit in which priors and keypoints
   // are compared. Half a pixel is the noise of one keypoint where residuals do
-  // not tell it yet; balance_priors.h finds it, and what keypoints have in
+  // not tell it yet; variance_components.h finds it, and what keypoints have in
   // common.
   double keypoint_sigma_px = 0.5;
   // Where the robust loss on reprojection errors (soft L1) takes over, in px;
@@ -78,7 +78,7 @@ struct PriorBundleAdjustmentOptions {
   double reproj_loss_scale_px = 2.0;
   // Where the robust loss (Cauchy) on whitened prior terms takes over, in
   // sigmas. It drops single wrong priors; many that vision contradicts together
-  // are what balance_priors.h is for.
+  // are what variance_components.h is for.
   double prior_loss_scale = 3.0;
   // Of the priors' sigmas alone: what is believed of the shared errors stays.
   PriorSigmaFactors prior_sigma_factors = {1.0, 1.0, 1.0, 1.0};
@@ -149,12 +149,12 @@ struct PriorBundleAdjustmentSummary {
   double keypoint_sigma_px = 0.0;
   PriorSigmaFactors prior_sigma_factors = {1.0, 1.0, 1.0, 1.0};
   std::string message;
-  // Of the priors, where AdjustBundleInBalance made the adjustment: the largest
-  // chi-square per degree of freedom of a kind of term (with the redundancy
-  // only where it estimates the keypoint sigma),
+  // Of the priors, where AdjustBundleWithVarianceComponents made the
+  // adjustment: the largest chi-square per degree of freedom of a kind of term
+  // (with the redundancy only where it estimates the keypoint sigma),
   double prior_chi2_per_dof = 0.0;
   // and whether their mean squares are within what the balance asks for.
-  bool priors_in_balance = true;
+  bool priors_agree = true;
   // Of the priors with a duration; all zero on failure.
   SharedErrors shared_errors;
 };

@@ -14,8 +14,8 @@ namespace adasfm {
 // every k, does not feel wrong matches. The poses, which were adjusted to the
 // same residuals, are allowed for by the share of the degrees of freedom that
 // they took. Errors that keypoints have in common (calibration, forward motion)
-// leave no residuals: balance_priors.h looks for those. None with less than a
-// hundred points of three images or more.
+// leave no residuals: variance_components.h looks for those. None with less
+// than a hundred points of three images or more.
 std::optional<double> EstimateKeypointSigma(
     const colmap::Reconstruction& reconstruction);
 

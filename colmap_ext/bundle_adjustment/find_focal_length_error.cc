@@ -77,14 +77,14 @@ double FarthestRatio(const colmap::Reconstruction& before,
 
 }  // namespace
 
-bool KnowsFocalLengths(const colmap::Reconstruction& reconstruction) {
+bool HasPriorFocalLengths(const colmap::Reconstruction& reconstruction) {
   return std::all_of(
       reconstruction.Cameras().begin(), reconstruction.Cameras().end(),
       [](const auto& entry) { return HasPriorFocalLength(entry.second); });
 }
 
 std::optional<FocalLengthError> FindFocalLengthError(
-    const PriorBalanceOptions& balance,
+    const VarianceComponentOptions& balance,
     const PriorBundleAdjustmentOptions& options,
     const PriorBundleAdjustmentProblem& whole_problem,
     const colmap::Reconstruction& reconstruction) {
@@ -115,7 +115,7 @@ std::optional<FocalLengthError> FindFocalLengthError(
       variance);
   FocalLengthError error;
   error.ratio = FarthestRatio(reconstruction, free);
-  const double min_num_sigmas = KnowsFocalLengths(reconstruction)
+  const double min_num_sigmas = HasPriorFocalLengths(reconstruction)
                                     ? kMinNumSigmas
                                     : kMinNumSigmasOfUnknown;
   if (std::abs(error.ratio - 1.0) < kMinRatio || num_sigmas < min_num_sigmas) {

@@ -3,8 +3,8 @@
 
 #include <optional>
 
-#include "colmap_ext/bundle_adjustment/balance_priors.h"
 #include "colmap_ext/bundle_adjustment/bundle_adjustment.h"
+#include "colmap_ext/bundle_adjustment/variance_components.h"
 #include "colmap_ext/host/colmap.h"
 
 namespace adasfm {
@@ -17,7 +17,7 @@ struct FocalLengthError {
 };
 
 // Whether all cameras are marked as of measured focal length.
-bool KnowsFocalLengths(const colmap::Reconstruction& reconstruction);
+bool HasPriorFocalLengths(const colmap::Reconstruction& reconstruction);
 
 // Whether the focal lengths of an adjusted model are wrong, as vision and the
 // priors together see it: at most 300 consecutive images, those that turn most,
@@ -29,7 +29,7 @@ bool KnowsFocalLengths(const colmap::Reconstruction& reconstruction);
 // focal lengths would take those up. None without priors, or where these turn
 // by less than 20 deg in all. The model is left as it is.
 std::optional<FocalLengthError> FindFocalLengthError(
-    const PriorBalanceOptions& balance,
+    const VarianceComponentOptions& balance,
     const PriorBundleAdjustmentOptions& options,
     const PriorBundleAdjustmentProblem& problem,
     const colmap::Reconstruction& reconstruction);

@@ -91,7 +91,7 @@ void FillFigures(const CoarseStructureOptions& options, CoarseModel* model) {
         num_points < options.min_num_points_per_image;
   }
   model->prior_chi2_per_dof = model->rounds.back().prior_chi2_per_dof;
-  model->priors_agree = model->rounds.back().priors_in_balance;
+  model->priors_agree = model->rounds.back().priors_agree;
 }
 
 // Moves the poses into the frame of the positions, if they fit.
@@ -197,7 +197,7 @@ PriorBundleAdjustmentSummary AdjustRound(
   PriorBundleAdjustmentOptions bundle = options.bundle;
   bundle.position_loss_scale = PositionLossScale(
       alignment, bundle.position_loss_scale, round, options.num_rounds);
-  PriorBalanceOptions balance = options.balance;
+  VarianceComponentOptions balance = options.balance;
   balance.estimate_prior_sigmas = false;
   if (round + 1 < options.num_rounds) {
     bundle.function_tolerance =
@@ -205,8 +205,8 @@ PriorBundleAdjustmentSummary AdjustRound(
     balance.enabled = false;
     balance.estimate_keypoint_sigma = false;
   }
-  return AdjustBundleInBalance(balance, bundle, problem, reconstruction,
-                               keypoint_sigma_factor);
+  return AdjustBundleWithVarianceComponents(
+      balance, bundle, problem, reconstruction, keypoint_sigma_factor);
 }
 
 // The last round once more, after an adjustment that has found the focal
@@ -278,7 +278,7 @@ CoarseModel BuildCoarseModel(
         options.balance, options.bundle, problem, model.reconstruction);
   }
   if (model.focal_length_error && options.refine_unknown_focal_length &&
-      !KnowsFocalLengths(model.reconstruction)) {
+      !HasPriorFocalLengths(model.reconstruction)) {
     RepeatWithFreeFocalLength(options, scene, bearings, input, tracks, problem,
                               &keypoint_sigma_factor, &model);
   }

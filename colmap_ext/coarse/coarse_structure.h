@@ -6,9 +6,9 @@
 #include <string>
 #include <vector>
 
-#include "colmap_ext/bundle_adjustment/balance_priors.h"
 #include "colmap_ext/bundle_adjustment/bundle_adjustment.h"
 #include "colmap_ext/bundle_adjustment/find_focal_length_error.h"
+#include "colmap_ext/bundle_adjustment/variance_components.h"
 #include "colmap_ext/coarse/mapper_start.h"
 #include "colmap_ext/coarse/pair_agreement.h"
 #include "colmap_ext/host/colmap.h"
@@ -28,7 +28,7 @@ struct CoarseStructureOptions {
   PriorBundleAdjustmentOptions bundle;
   // Vision that needs more than eight times its own noise to agree with the
   // sensors contradicts them, which is to be said (priors_agree).
-  PriorBalanceOptions balance;
+  VarianceComponentOptions balance;
   // The rounds before the last see points in keyframes only.
   KeyframeOptions keyframes;
   // Motion straight ahead leaves some images without points of a wide angle.

@@ -42,7 +42,7 @@ std::set<ImagePair> FindRefutedPairs(const ViewGraph& graph) {
     switch (edge.removal) {
       case EdgeRemoval::kOdometry:
       case EdgeRemoval::kFalseLoop:
-      case EdgeRemoval::kUnverifiedJoin:
+      case EdgeRemoval::kUnconfirmedClosure:
       case EdgeRemoval::kRotation:
       case EdgeRemoval::kTranslation:
         refuted.insert(edge.Pair());

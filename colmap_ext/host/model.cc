@@ -185,6 +185,7 @@ StatusOr<colmap::Reconstruction> ReadModel(const std::string& path) {
     return Status::Error("cannot read the model in " + path + ": " +
                          error.what() + "; make the model again");
   }
+  ReleaseVisibility(&reconstruction);
   return reconstruction;
 }
 

@@ -5,8 +5,8 @@
 #include <set>
 #include <string>
 
-#include "colmap_ext/bundle_adjustment/balance_priors.h"
 #include "colmap_ext/bundle_adjustment/bundle_adjustment.h"
+#include "colmap_ext/bundle_adjustment/variance_components.h"
 #include "colmap_ext/host/colmap.h"
 #include "colmap_ext/mapper/initial_pair.h"
 #include "colmap_ext/mapper/local_mapper_scene.h"
@@ -30,7 +30,7 @@ struct LocalMapperOptions {
   // 1 sigma of a keypoint's position, which weighs priors against keypoints.
   double keypoint_sigma_px = 0.5;
   // How vision is weighed against the priors.
-  PriorBalanceOptions balance;
+  VarianceComponentOptions balance;
   int num_threads = 1;
 
   bool IsValid(std::string* error) const;

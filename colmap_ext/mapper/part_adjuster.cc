@@ -5,7 +5,7 @@
 #include <map>
 #include <utility>
 
-#include "colmap_ext/bundle_adjustment/balance_priors.h"
+#include "colmap_ext/bundle_adjustment/variance_components.h"
 #include "colmap_ext/host/pose_conversion.h"
 
 namespace adasfm {
@@ -93,10 +93,10 @@ void PartAdjuster::AdjustImages(const std::set<image_t>& images,
     AdjustBundle(options, problem, &reconstruction_);
     return;
   }
-  PriorBalanceOptions balance = options_.balance;
+  VarianceComponentOptions balance = options_.balance;
   balance.estimate_keypoint_sigma = false;  // A part that grows has few points.
-  AdjustBundleInBalance(balance, options, problem, &reconstruction_,
-                        &keypoint_sigma_factor_);
+  AdjustBundleWithVarianceComponents(balance, options, problem,
+                                     &reconstruction_, &keypoint_sigma_factor_);
 }
 
 void PartAdjuster::AdjustAll(int max_num_iterations) {

@@ -182,10 +182,11 @@ class ModelRefiner {
     options.max_num_iterations = max_num_iterations;
     options.function_tolerance = function_tolerance;
     options.num_threads = options_.num_threads;
-    PriorBalanceOptions balance = local_.balance;
+    VarianceComponentOptions balance = local_.balance;
     if (is_tentative) balance.estimate_keypoint_sigma = false;
-    const PriorBundleAdjustmentSummary adjustment = AdjustBundleInBalance(
-        balance, options, problem, &reconstruction_, keypoint_sigma_factor);
+    const PriorBundleAdjustmentSummary adjustment =
+        AdjustBundleWithVarianceComponents(
+            balance, options, problem, &reconstruction_, keypoint_sigma_factor);
     summary_.num_iterations += adjustment.num_iterations;
     summary_.keypoint_sigma_px = adjustment.keypoint_sigma_px;
     summary_.prior_chi2_per_dof = adjustment.prior_chi2_per_dof;

@@ -28,7 +28,7 @@ struct RefineModelSummary {
   // By which the keypoints' sigma is multiplied in balance with the priors.
   // The first rounds begin with what the parts had, the last one with 1.
   double keypoint_sigma_factor = 1.0;
-  // 1 sigma of keypoints that agrees with the priors (balance_priors.h).
+  // 1 sigma of keypoints that agrees with the priors (variance_components.h).
   double keypoint_sigma_px = 0.0;
   // Squared whitened residual of the priors per degree of freedom at the end.
   double prior_chi2_per_dof = 0.0;

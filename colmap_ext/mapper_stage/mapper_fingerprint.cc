@@ -63,7 +63,8 @@ void AddScene(const SceneData& data, Hash* hash) {
   }
 }
 
-void AddBalance(const PriorBalanceOptions& balance, Hash* hash) {
+void AddVarianceComponents(const VarianceComponentOptions& balance,
+                           Hash* hash) {
   hash->Add(balance.enabled);
   hash->Add(balance.estimate_keypoint_sigma);
   hash->Add(balance.estimate_prior_sigmas);
@@ -90,7 +91,7 @@ void AddLocalOptions(const LocalMapperOptions& local, Hash* hash) {
   hash->Add(local.min_triangulation_angle_deg);
   hash->Add(local.global_adjustment_growth);
   hash->Add(local.keypoint_sigma_px);
-  AddBalance(local.balance, hash);
+  AddVarianceComponents(local.balance, hash);
 }
 
 void AddAlignOptions(const AlignSimilarityOptions& align, Hash* hash) {

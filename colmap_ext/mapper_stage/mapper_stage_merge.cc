@@ -55,9 +55,9 @@ double FindSmallestSigmaFactor(const std::vector<PartReport>& parts,
   return smallest.value_or(1.0);
 }
 
-int CountTorn(const MapperScene& scene) {
-  return CountTornPriors(FindPriorEdges(scene, scene.images),
-                         scene.reconstruction);
+int CountViolated(const MapperScene& scene) {
+  return CountViolatedPriors(FindPriorEdges(scene, scene.images),
+                             scene.reconstruction);
 }
 
 }  // namespace
@@ -121,12 +121,12 @@ Status MapperStage::MergePartModels(const std::string& fingerprint) {
 
 void MapperStage::FallBackToCoarsePoses(std::unique_ptr<MapperScene>* scene) {
   if (!options_.local.use_priors_in_adjustment) return;
-  const int num_torn = CountTorn(**scene);
-  if (num_torn == 0) return;
+  const int num_violated = CountViolated(**scene);
+  if (num_violated == 0) return;
   auto coarse_scene = BuildMapperScene(data_, coarse_, (*scene)->images);
   RegisterAtCoarsePoses(coarse_scene.get());
   // Priors that tear in the coarse model too are wrong themselves.
-  if (num_torn <= CountTorn(*coarse_scene)) return;
+  if (num_violated <= CountViolated(*coarse_scene)) return;
   Report("the parts contradict the priors; refining the coarse poses", 0.9);
   RefineModelOptions options = options_.refine;
   options.join_parts = false;
@@ -139,7 +139,7 @@ void MapperStage::FallBackToCoarsePoses(std::unique_ptr<MapperScene>* scene) {
     }
     RefineModel(options, options_.local, round, coarse_scene.get(), &refined);
   }
-  if (CountTorn(*coarse_scene) >= num_torn) return;
+  if (CountViolated(*coarse_scene) >= num_violated) return;
   summary_.refine = refined;
   summary_.started_from_coarse_poses = true;
   *scene = std::move(coarse_scene);

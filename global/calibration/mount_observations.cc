@@ -106,7 +106,7 @@ MountObservation ObserveRotation(const MountPair& pair,
       motion.rotation_covariance + sigma * sigma * Eigen::Matrix3d::Identity());
 }
 
-bool TellsTheMount(int max_num_steps, const OdometryChain& chain,
+bool ObservesMount(int max_num_steps, const OdometryChain& chain,
                    const GlobalCorrespondences& correspondences,
                    const ViewGraphEdge& edge) {
   return edge.IsKept() && edge.has_rotation &&
@@ -165,7 +165,7 @@ std::vector<MountPair> CollectMountPairs(
     const std::vector<RelativePosePrior>& priors) {
   std::vector<const ViewGraphEdge*> edges;
   for (const ViewGraphEdge& edge : graph.edges) {
-    if (TellsTheMount(max_num_steps, chain, correspondences, edge)) {
+    if (ObservesMount(max_num_steps, chain, correspondences, edge)) {
       edges.push_back(&edge);
     }
   }

@@ -203,7 +203,7 @@ class LoopClosureFilter {
                                            UnitLogSigma(segments)))) {
           continue;
         }
-        removals_[e] = EdgeRemoval::kUnverifiedJoin;
+        removals_[e] = EdgeRemoval::kUnconfirmedClosure;
         ++report_.num_pairs_of_unconfirmed_closures;
       }
     }

@@ -63,7 +63,7 @@ struct LoopClosureReport {
 // 3. between two segments no odometry contradicts. Pairs that are inconsistent
 //    with the best one of their cluster go, those outside of a heavy pairwise
 //    consistent set of clusters, and all of them unless it holds two places
-//    beyond a turn from each other at both ends (kUnverifiedJoin): a single
+//    beyond a turn from each other at both ends (kUnconfirmedClosure): a single
 //    place always fits, and a straight street that looks alike all along fits
 //    everywhere. Off with split_unconfirmed_closures.
 // What holds each rule, and what was tried beside: docs/reference/global.md,

@@ -226,7 +226,7 @@ GlobalRotations EstimateGlobalRotations(const RotationAveragingOptions& options,
   const std::vector<RotationEdge> edges = CollectEdges(options, graph);
   Rotations rotations;
   if (num_nodes == 0 ||
-      !SpreadRotationsOverTree(edges, num_nodes, &rotations)) {
+      !PropagateRotationsOverTree(edges, num_nodes, &rotations)) {
     return result;
   }
   if (options.use_sdp_start) StartFromSdp(options, edges, &rotations, &result);

@@ -31,9 +31,9 @@ std::vector<std::vector<int>> BuildTree(const std::vector<RotationEdge>& edges,
 
 }  // namespace
 
-bool SpreadRotationsOverTree(const std::vector<RotationEdge>& edges,
-                             size_t num_nodes,
-                             std::vector<Eigen::Matrix3d>* rotations) {
+bool PropagateRotationsOverTree(const std::vector<RotationEdge>& edges,
+                                size_t num_nodes,
+                                std::vector<Eigen::Matrix3d>* rotations) {
   const std::vector<std::vector<int>> tree = BuildTree(edges, num_nodes);
   rotations->assign(num_nodes, Eigen::Matrix3d::Identity());
   std::vector<bool> is_visited(num_nodes, false);

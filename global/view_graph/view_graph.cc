@@ -23,7 +23,7 @@ const char* EdgeRemovalName(EdgeRemoval removal) {
       return "contradicts odometry";
     case EdgeRemoval::kFalseLoop:
       return "inconsistent with other loops";
-    case EdgeRemoval::kUnverifiedJoin:
+    case EdgeRemoval::kUnconfirmedClosure:
       return "alone joins two parts";
     case EdgeRemoval::kUnknownSize:
       return "joins parts of unknown relative size";

@@ -23,15 +23,15 @@ enum class EdgeSource {
 enum class EdgeRemoval {
   kKept,
   kFewInliers,
-  kRelativePose,    // its own matches do not support one relative pose
-  kOdometryPose,    // contradicts the odometry, but others at its place do not
-  kOdometry,        // contradicts the odometry
-  kFalseLoop,       // is inconsistent with other loops
-  kUnverifiedJoin,  // alone joins two parts of a drive, and may be wrong
-  kUnknownSize,     // joins parts whose relative size nothing tells
-  kRotation,        // off the global rotations
-  kTranslation,     // off the global positions
-  kDisconnected,    // one of its images has no pose
+  kRelativePose,  // its own matches do not support one relative pose
+  kOdometryPose,  // contradicts the odometry, but others at its place do not
+  kOdometry,      // contradicts the odometry
+  kFalseLoop,     // is inconsistent with other loops
+  kUnconfirmedClosure,  // alone joins two parts of a drive, and may be wrong
+  kUnknownSize,         // joins parts whose relative size nothing tells
+  kRotation,            // off the global rotations
+  kTranslation,         // off the global positions
+  kDisconnected,        // one of its images has no pose
 };
 const char* EdgeRemovalName(EdgeRemoval removal);
 

@@ -56,11 +56,11 @@ class WheelChecker {
 
  private:
   double LogLikelihood(const WheelFit& fit) const;
-  bool ForceTells(const WheelFit& fit) const {
+  bool ObservesForce(const WheelFit& fit) const {
     return fit.acceleration_rms > kMinAcceleration &&
            fit.force_correlation > kMinCorrelation;
   }
-  bool YawTells(const WheelFit& fit) const {
+  bool ObservesYaw(const WheelFit& fit) const {
     return has_yaw_ && fit.yaw_rate_rms > kMinYawRate &&
            std::abs(fit.yaw_correlation) > kMinCorrelation;
   }
@@ -135,14 +135,15 @@ std::string WheelChecker::CheckGravity(const WheelCheck& check) const {
       " (gravity is %.0f deg off the wheel frame's z axis, which T_imu_wheel "
       "must let point up; correlation of the yaw rates %.2f)",
       tilt_deg, check.fit.yaw_correlation);
-  if (YawTells(check.fit) && std::abs(check.fit.yaw_correlation) > 0.9 &&
+  if (ObservesYaw(check.fit) && std::abs(check.fit.yaw_correlation) > 0.9 &&
       check.fit.yaw_correlation < 0.0 && tilt_deg > 180.0 - kMaxTiltDeg) {
     return "T_imu_wheel is upside down: its third column must be the axis of "
            "the IMU that points up" +
            figures;
   }
   if (tilt_deg > 180.0 - kMaxTiltDeg) {
-    const bool only_z = ForceTells(check.fit) && check.fit.force.real() > 0.0;
+    const bool only_z =
+        ObservesForce(check.fit) && check.fit.force.real() > 0.0;
     return std::string("the accelerometer") + (only_z ? "'s z axis" : "") +
            " has the other sign: at rest it must read +9.81 m/s^2 upwards "
            "(specific force); multiply the log's " +
@@ -227,11 +228,11 @@ std::string WheelChecker::CheckAxes(const WheelFit& fit) const {
 }
 
 std::string WheelChecker::CheckDirection(const WheelFit& fit) const {
-  if (!ForceTells(fit)) return "";
+  if (!ObservesForce(fit)) return "";
   const double turn_deg = RadToDeg(std::arg(fit.force));
   if (std::abs(turn_deg) < kMaxTurnDeg) return "";
   if (std::abs(turn_deg) > 180.0 - kMaxTurnDeg) {
-    return YawTells(fit) && fit.yaw > 0.0
+    return ObservesYaw(fit) && fit.yaw > 0.0
                ? "the wheels drive backwards where the accelerometer drives "
                  "forwards, but turn to the same side: T_imu_wheel is turned "
                  "by 180 deg about z, or the wheels are negative and left and "
@@ -248,7 +249,7 @@ std::string WheelChecker::CheckDirection(const WheelFit& fit) const {
 
 std::string WheelChecker::CheckUnits(const WheelFit& fit,
                                      std::vector<std::string>* warnings) const {
-  if (!ForceTells(fit)) return "";
+  if (!ObservesForce(fit)) return "";
   // Noise makes a factor too small only by the squared correlation.
   const double low = std::abs(fit.force);
   const double high = low / (fit.force_correlation * fit.force_correlation);
@@ -266,7 +267,7 @@ std::string WheelChecker::CheckUnits(const WheelFit& fit,
     if (logged > kMinUnitFactor || logged < 1.0 / kMinUnitFactor) return text;
     warnings->push_back(text + ", unless they spun");
   }
-  if (!YawTells(fit)) return "";
+  if (!ObservesYaw(fit)) return "";
   if (fit.yaw < 0.0) {
     warnings->push_back(
         "the wheels turn to the other side than the gyroscope: left and right "

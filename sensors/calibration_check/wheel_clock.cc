@@ -152,7 +152,8 @@ class ClockSearch {
 std::optional<double> FindWheelClockShift(
     const std::vector<ImuSample>& imu, const std::vector<WheelSpeed>& speeds,
     const SensorCalibration& calibration) {
-  if (imu.size() < 2 || !TellsYaw(calibration.wheel_type)) return std::nullopt;
+  if (imu.size() < 2 || !ObservesYaw(calibration.wheel_type))
+    return std::nullopt;
   return ClockSearch(
              imu, speeds,
              calibration.imu_from_wheel.rotation * Eigen::Vector3d::UnitZ())

@@ -14,7 +14,7 @@ namespace adasfm {
 struct WheelSpeed {
   timestamp_t timestamp_ns = 0;
   double speed = 0.0;     // m/s
-  double yaw_rate = 0.0;  // rad/s; 0 where TellsYaw says no
+  double yaw_rate = 0.0;  // rad/s; 0 where ObservesYaw says no
 };
 
 struct WheelNoise {

@@ -179,7 +179,7 @@ std::vector<OdometryLink> BuildOdometryLinks(
     } else if (CoversInterval(logs.wheel, start, end,
                               options.max_wheel_gap_s)) {
       link.has_wheel = true;
-      link.has_wheel_yaw = TellsYaw(calibration.wheel_type);
+      link.has_wheel_yaw = ObservesYaw(calibration.wheel_type);
       link.wheel = PreintegrateWheel(logs.wheel, start, end,
                                      calibration.imu_from_wheel.rotation,
                                      wheel_noise, profile);

@@ -20,7 +20,7 @@ constexpr double kFirstSlipWeight = 1e-4;
 // Converged: a step of all unknowns together by this share of a sigma.
 constexpr double kConvergedStep = 0.01;
 // The threshold comes down after a smaller step than this: rad, m/s, m.
-constexpr double kSettledStep = 1e-2;
+constexpr double kThresholdStep = 1e-2;
 
 // 1 up to the threshold, then falling faster than the residual grows.
 double RobustWeight(double chi2, double threshold_sigma) {
@@ -148,7 +148,7 @@ OdometryFusionResult Smoother::Run() {
       break;
     }
     // The threshold comes down once the solution has settled at it.
-    if (change.largest < kSettledStep) factor = std::max(1.0, 0.5 * factor);
+    if (change.largest < kThresholdStep) factor = std::max(1.0, 0.5 * factor);
     UpdateWeights(factor);
   }
   FillResult(&result);

@@ -110,4 +110,12 @@ inline void FilterPoints(double max_reproj_error_px, double min_angle_deg,
   reconstruction->FilterAllPoints3D(max_reproj_error_px, min_angle_deg);
 }
 
+// Of a model that is not mapped on: where the points that its images might see
+// lie in them, 22 kB an image.
+inline void ReleaseVisibility(colmap::Reconstruction* reconstruction) {
+  for (const auto& [image_id, image] : reconstruction->Images()) {
+    reconstruction->Image(image_id).TearDown();
+  }
+}
+
 }  // namespace adasfm

@@ -76,9 +76,7 @@ void HostMapper::End() { host_->mapper.EndReconstruction(/*discard=*/false); }
 void HostMapper::ReleaseMatches() {
   // Takes its pointer to the graph from the reconstruction.
   reconstruction_.Load(colmap::DatabaseCache());
-  for (const auto& [image_id, image] : reconstruction_.Images()) {
-    reconstruction_.Image(image_id).TearDown();
-  }
+  ReleaseVisibility(&reconstruction_);
   host_.reset();
 }
 

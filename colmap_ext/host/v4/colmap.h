@@ -114,4 +114,7 @@ inline void FilterPoints(double max_reproj_error_px, double min_angle_deg,
       .FilterAllPoints3D(max_reproj_error_px, min_angle_deg);
 }
 
+// A model has nothing of the kind: its ObservationManager does.
+inline void ReleaseVisibility(colmap::Reconstruction*) {}
+
 }  // namespace adasfm

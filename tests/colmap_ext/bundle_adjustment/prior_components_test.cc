@@ -3,8 +3,8 @@
 
 #include <gtest/gtest.h>
 
-#include "colmap_ext/bundle_adjustment/balance_priors.h"
 #include "colmap_ext/bundle_adjustment/linear_adjustment.h"
+#include "colmap_ext/bundle_adjustment/variance_components.h"
 #include "colmap_ext/host/pose_conversion.h"
 #include "core/random.h"
 #include "core/so3.h"
@@ -128,16 +128,17 @@ TEST(PriorComponents, LeavesOutWhatSensorsDidNotMeasure) {
 
 // Poses follow honest priors, whose squares are then below 1; chi-square allows
 // for that without an estimate of their sigmas too.
-TEST(AdjustBundleInBalance, DividesByTheRedundancy) {
+TEST(AdjustBundleWithVarianceComponents, DividesByTheRedundancy) {
   for (uint64_t seed = 1; seed <= 3; ++seed) {
     const MapperWorld world = BuildDrive(seed);
     colmap::Reconstruction model = Reconstruct(world);
     const PriorBundleAdjustmentProblem problem = ProblemOf(world, model);
-    PriorBalanceOptions balance;
+    VarianceComponentOptions balance;
     balance.estimate_prior_sigmas = false;
     double factor = 1.0;
     const PriorBundleAdjustmentSummary summary =
-        AdjustBundleInBalance(balance, {}, problem, &model, &factor);
+        AdjustBundleWithVarianceComponents(balance, {}, problem, &model,
+                                           &factor);
     const double mean_square = ComputePriorMeanSquare(
         CorrectSharedErrors({}, summary.shared_errors, problem.priors), model);
     EXPECT_LT(1.05 * mean_square, summary.prior_chi2_per_dof)
@@ -150,16 +151,16 @@ TEST(AdjustBundleInBalance, DividesByTheRedundancy) {
 
 // Sigmas that are stated three times too large end within 40 % of the truth,
 // and the chi-square at 1; right ones stay.
-TEST(AdjustBundleInBalance, LowersSigmasThatResidualsRefute) {
+TEST(AdjustBundleWithVarianceComponents, LowersSigmasThatResidualsRefute) {
   for (uint64_t seed = 1; seed <= 3; ++seed) {
     const MapperWorld world = BuildDrive(seed);
     const colmap::Reconstruction start = Reconstruct(world);
     const auto adjust = [&](double sigma_factor, bool estimates) {
       colmap::Reconstruction model = start;
-      PriorBalanceOptions balance;
+      VarianceComponentOptions balance;
       balance.estimate_prior_sigmas = estimates;
       double factor = 1.0;
-      return AdjustBundleInBalance(
+      return AdjustBundleWithVarianceComponents(
           balance, {}, ProblemOf(world, start, sigma_factor), &model, &factor);
     };
     const PriorBundleAdjustmentSummary large = adjust(3.0, true);

@@ -25,7 +25,7 @@ TEST(WeakPlacesTest, TheBestPairStandsForAllBetweenTwoModels) {
   poses.graph.edges = {
       Edge(1, 2, 90, EdgeRemoval::kRotation),  // inside a model
       Edge(1, 5, 20, EdgeRemoval::kRotation),
-      Edge(1, 6, 40, EdgeRemoval::kUnverifiedJoin),
+      Edge(1, 6, 40, EdgeRemoval::kUnconfirmedClosure),
       Edge(2, 5, 30, EdgeRemoval::kRotation),
       Edge(2, 7, 50, EdgeRemoval::kRotation),  // 7 is in no model
       Edge(5, 6, 90, EdgeRemoval::kKept)};
@@ -38,7 +38,7 @@ TEST(WeakPlacesTest, TheBestPairStandsForAllBetweenTwoModels) {
   EXPECT_EQ(places[0].pair, ImagePair(1, 6));
   EXPECT_EQ(places[0].num_inliers, 40);
   EXPECT_EQ(places[0].num_pairs, 3);
-  EXPECT_EQ(places[0].removal, EdgeRemoval::kUnverifiedJoin);
+  EXPECT_EQ(places[0].removal, EdgeRemoval::kUnconfirmedClosure);
 }
 
 }  // namespace

@@ -16,7 +16,7 @@ namespace adasfm {
 // agree. When it leaves them nearer than their covariance lets expect, that is
 // too large, and lowered: variance component estimation, in which priors are
 // never blamed (docs/reference/mapper.md).
-struct PriorBalanceOptions {
+struct VarianceComponentOptions {
   bool enabled = true;
   // Mean of the squared whitened residuals that priors may have; honest ones
   // have 1 or less.
@@ -45,15 +45,15 @@ double ComputePriorMeanSquare(const std::vector<PosePriorEdge>& priors,
 // The priors of which a term is more than ten sigmas off: a model that folds
 // two look-alike places together tears a few of them and leaves all others
 // alone.
-int CountTornPriors(const std::vector<PosePriorEdge>& priors,
-                    const colmap::Reconstruction& reconstruction);
+int CountViolatedPriors(const std::vector<PosePriorEdge>& priors,
+                        const colmap::Reconstruction& reconstruction);
 
 // AdjustBundle, with the keypoint sigma balanced against the problem's priors.
 // keypoint_sigma_factor (>= 1) multiplies the estimated sigma, or
 // options.keypoint_sigma_px; it is where the search begins and holds what was
 // found.
-PriorBundleAdjustmentSummary AdjustBundleInBalance(
-    const PriorBalanceOptions& balance,
+PriorBundleAdjustmentSummary AdjustBundleWithVarianceComponents(
+    const VarianceComponentOptions& balance,
     const PriorBundleAdjustmentOptions& options,
     const PriorBundleAdjustmentProblem& problem,
     colmap::Reconstruction* reconstruction, double* keypoint_sigma_factor);

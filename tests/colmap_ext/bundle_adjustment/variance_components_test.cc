@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "colmap_ext/bundle_adjustment/balance_priors.h"
+#include "colmap_ext/bundle_adjustment/variance_components.h"
 
 #include <gtest/gtest.h>
 
@@ -29,43 +29,46 @@ TEST(ComputePriorMeanSquare, IsZeroAtThePriorsAndCapsWhatIsWild) {
   std::vector<PosePriorEdge> wild = priors;
   wild[5].cam2_from_cam1.translation *= 1e3;
   EXPECT_NEAR(ComputePriorMeanSquare(wild, model), 9.0 / priors.size(), 1e-6);
-  EXPECT_EQ(CountTornPriors(priors, model), 0);
-  EXPECT_EQ(CountTornPriors(longer, model), 0);
-  EXPECT_EQ(CountTornPriors(wild, model), 1);
+  EXPECT_EQ(CountViolatedPriors(priors, model), 0);
+  EXPECT_EQ(CountViolatedPriors(longer, model), 0);
+  EXPECT_EQ(CountViolatedPriors(wild, model), 1);
   EXPECT_EQ(ComputePriorMeanSquare({}, model), 0.0);
 }
 
-TEST(AdjustBundleInBalance, LeavesIndependentNoiseAlone) {
+TEST(AdjustBundleWithVarianceComponents, LeavesIndependentNoiseAlone) {
   for (uint64_t seed = 1; seed <= 3; ++seed) {
     const MapperWorld world = BuildDrive(seed);
     colmap::Reconstruction model = Reconstruct(world);
     double factor = 1.0;
-    EXPECT_TRUE(
-        AdjustBundleInBalance({}, {}, ProblemOf(world, model), &model, &factor)
-            .success);
+    EXPECT_TRUE(AdjustBundleWithVarianceComponents(
+                    {}, {}, ProblemOf(world, model), &model, &factor)
+                    .success);
     EXPECT_EQ(factor, 1.0) << "seed " << seed;
   }
 }
 
 // Vision with an error that all keypoints share: the camera's focal length is
 // 5 % off, so that turns and lengths do not fit each other.
-TEST(AdjustBundleInBalance, BelievesPriorsWhereKeypointsShareAnError) {
+TEST(AdjustBundleWithVarianceComponents,
+     BelievesPriorsWhereKeypointsShareAnError) {
   for (uint64_t seed = 1; seed <= 3; ++seed) {
     MapperWorld world = BuildDrive(seed);
     world.data.cameras.at(1).SetFocalLengthX(
         1.05 * world.data.cameras.at(1).FocalLengthX());
     const colmap::Reconstruction start = Reconstruct(world);
     const PriorBundleAdjustmentProblem problem = ProblemOf(world, start);
-    PriorBalanceOptions balance;
+    VarianceComponentOptions balance;
 
     colmap::Reconstruction balanced = start;
     double factor = 1.0;
     const PriorBundleAdjustmentSummary summary =
-        AdjustBundleInBalance(balance, {}, problem, &balanced, &factor);
+        AdjustBundleWithVarianceComponents(balance, {}, problem, &balanced,
+                                           &factor);
     balance.enabled = false;
     colmap::Reconstruction plain = start;
     double plain_factor = 1.0;
-    AdjustBundleInBalance(balance, {}, problem, &plain, &plain_factor);
+    AdjustBundleWithVarianceComponents(balance, {}, problem, &plain,
+                                       &plain_factor);
 
     EXPECT_EQ(plain_factor, 1.0);
     const double plain_chi2 = ComputePriorMeanSquare(problem.priors, plain);
@@ -83,8 +86,8 @@ TEST(AdjustBundleInBalance, BelievesPriorsWhereKeypointsShareAnError) {
   }
 }
 
-TEST(PriorBalanceOptions, RefusesWhatMakesNoSense) {
-  PriorBalanceOptions options;
+TEST(VarianceComponentOptions, RefusesWhatMakesNoSense) {
+  VarianceComponentOptions options;
   std::string error;
   EXPECT_TRUE(options.IsValid(&error));
   options.max_mean_square = 0.5;

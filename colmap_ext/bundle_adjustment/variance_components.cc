@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "colmap_ext/bundle_adjustment/balance_priors.h"
+#include "colmap_ext/bundle_adjustment/variance_components.h"
 
 #include <algorithm>
 #include <cmath>
@@ -17,7 +17,7 @@
 namespace adasfm {
 namespace {
 
-constexpr double kTornNumSigmas = 10.0;
+constexpr double kViolatedNumSigmas = 10.0;
 // Made-up keypoints have no noise, and weights need an end.
 constexpr double kMinKeypointSigmaPx = 0.02;
 // Relative change of the cost at which an adjustment of the search ends.
@@ -71,13 +71,13 @@ std::optional<PriorSigmaEstimate> EstimatePriorSigmas(
 }
 
 // One adjustment, repeated until its sigmas agree with its residuals.
-class BalancedAdjustment {
+class VarianceComponentAdjustment {
  public:
-  BalancedAdjustment(const PriorBalanceOptions& balance,
-                     const PriorBundleAdjustmentOptions& options,
-                     const PriorBundleAdjustmentProblem& problem,
-                     double* keypoint_sigma_factor,
-                     colmap::Reconstruction* reconstruction)
+  VarianceComponentAdjustment(const VarianceComponentOptions& balance,
+                              const PriorBundleAdjustmentOptions& options,
+                              const PriorBundleAdjustmentProblem& problem,
+                              double* keypoint_sigma_factor,
+                              colmap::Reconstruction* reconstruction)
       : balance_(balance),
         given_(options),
         options_(options),
@@ -192,7 +192,7 @@ class BalancedAdjustment {
   bool HasEstimate() const { return redundancies_factor_ > 0.0; }
 
   void DescribePriors() {
-    summary_.priors_in_balance =
+    summary_.priors_agree =
         LargestMeanSquare(Components()) <= balance_.max_mean_square;
     if (system_) {
       LinearAdjustment linear(system_.get(), problem_.priors,
@@ -202,7 +202,7 @@ class BalancedAdjustment {
     summary_.prior_chi2_per_dof = LargestChi2PerDof(Components());
   }
 
-  const PriorBalanceOptions& balance_;
+  const VarianceComponentOptions& balance_;
   // With the keypoint sigma that the residuals show.
   PriorBundleAdjustmentOptions given_;
   PriorBundleAdjustmentOptions options_;
@@ -222,7 +222,7 @@ class BalancedAdjustment {
 
 }  // namespace
 
-bool PriorBalanceOptions::IsValid(std::string* error) const {
+bool VarianceComponentOptions::IsValid(std::string* error) const {
   // Honest priors have a mean square of 1.
   return OptionChecker(error)
       .AtLeast(1, "max_mean_square", max_mean_square)
@@ -236,23 +236,23 @@ double ComputePriorMeanSquare(const std::vector<PosePriorEdge>& priors,
       ComputePriorComponents({1.0, 1.0, 1.0, 1.0}, priors, reconstruction));
 }
 
-int CountTornPriors(const std::vector<PosePriorEdge>& priors,
-                    const colmap::Reconstruction& reconstruction) {
+int CountViolatedPriors(const std::vector<PosePriorEdge>& priors,
+                        const colmap::Reconstruction& reconstruction) {
   return std::count_if(
       priors.begin(), priors.end(), [&](const PosePriorEdge& edge) {
-        return LargestNumSigmas(edge, reconstruction) > kTornNumSigmas;
+        return LargestNumSigmas(edge, reconstruction) > kViolatedNumSigmas;
       });
 }
 
-PriorBundleAdjustmentSummary AdjustBundleInBalance(
-    const PriorBalanceOptions& balance,
+PriorBundleAdjustmentSummary AdjustBundleWithVarianceComponents(
+    const VarianceComponentOptions& balance,
     const PriorBundleAdjustmentOptions& options,
     const PriorBundleAdjustmentProblem& problem,
     colmap::Reconstruction* reconstruction, double* keypoint_sigma_factor) {
   std::string error;
   if (!balance.IsValid(&error)) throw std::invalid_argument(error);
-  return BalancedAdjustment(balance, options, problem, keypoint_sigma_factor,
-                            reconstruction)
+  return VarianceComponentAdjustment(balance, options, problem,
+                                     keypoint_sigma_factor, reconstruction)
       .Run();
 }
 
