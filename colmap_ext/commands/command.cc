@@ -56,22 +56,26 @@ void PrintError(const std::string& message) {
 }
 
 bool has_command_ended = false;
-std::atomic<bool> is_exit_reported{false};
+std::atomic<bool> may_exit_go_on{false};
 
-// COLMAP's database class and OpenMP end the process when something fails.
+// COLMAP's database class and OpenMP end the process when something fails, the
+// latter in several threads at once, which must not meet in the destructors of
+// what is static.
 void ReportExitOfLibrary() {
-  if (!has_command_ended) {
-    PrintError(
-        "a library stopped at the error above; mend its cause (space, memory "
-        "or threads that are short), then give the same command again");
+  if (has_command_ended) {
+    may_exit_go_on = true;
+    return;
   }
-  is_exit_reported = true;
+  PrintError(
+      "a library stopped at the error above; mend its cause (space, memory or "
+      "threads that are short), then give the same command again");
+  std::fflush(nullptr);
+  _exit(EXIT_FAILURE);
 }
 
-// When two threads end the process at once, the second one passes over the
-// handler that the first one is in, and would end the process before its line.
+// A second thread passes over the handler that the first one is in.
 void WaitForReportOfExit() {
-  while (!is_exit_reported) std::this_thread::yield();
+  while (!may_exit_go_on) std::this_thread::yield();
 }
 
 void WriteToStderr(const char* text) {
