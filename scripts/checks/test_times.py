@@ -6,10 +6,11 @@
 
 STEPS holds a line `seconds<TAB>what` (seconds since 1970) for the beginning of
 each step of scripts/test.sh; each LOG is what ctest left as
-Testing/Temporary/LastTest.log. Tests that an earlier run left there are not
-counted.
+Testing/Temporary/LastTest.log, or as LastTest.log.tmp when it was stopped.
+Tests that an earlier run left there are not counted.
 """
 
+import os
 import pathlib
 import re
 import sys
@@ -50,6 +51,9 @@ def read_tests(path):
   """Of a ctest log; the output of a test may hold anything."""
   build = pathlib.Path(path).absolute().parents[2].name
   tests, name, program, seconds = [], None, '', 0.0
+  # While ctest runs, the log of the run before stands beside its own.
+  if os.path.exists(path + '.tmp'):
+    path += '.tmp'
   with open(path, errors='replace') as file:
     for line in file:
       start = re.match(r'\d+/\d+ Test: (.*)', line)

@@ -34,10 +34,10 @@ def minute(seconds):
 
 class TestTimesTest(unittest.TestCase):
 
-  def report(self, folder, begin_s, entries):
+  def report(self, folder, begin_s, entries, suffix=''):
     log = os.path.join(folder, 'build', 'Testing', 'Temporary', 'LastTest.log')
     os.makedirs(os.path.dirname(log), exist_ok=True)
-    with open(log, 'w') as file:
+    with open(log + suffix, 'w') as file:
       for name, program, at_s, seconds in entries:
         file.write(ENTRY.format(name=name, program=program, end=minute(at_s),
                                 seconds=seconds,
@@ -47,6 +47,15 @@ class TestTimesTest(unittest.TestCase):
       file.write('%d\tBuilding\n%d\tTesting\n' % (begin_s, begin_s + 1860))
     return subprocess.run([sys.executable, SCRIPT, steps, log], text=True,
                           capture_output=True, check=True).stdout
+
+  def test_stopped_run(self):
+    begin_s = int(time.time()) // 60 * 60
+    with tempfile.TemporaryDirectory() as folder:
+      self.report(folder, begin_s, [('A.Before', 'test_core', begin_s, 1.0)])
+      text = self.report(folder, begin_s,
+                         [('A.Done', 'test_core', begin_s, 1.0)], '.tmp')
+    self.assertIn('A.Done', text)
+    self.assertNotIn('A.Before', text)
 
   def test_half_hours_and_the_slowest(self):
     begin_s = int(time.time()) // 60 * 60 - 3600
