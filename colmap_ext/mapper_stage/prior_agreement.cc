@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "colmap_ext/bundle_adjustment/shared_errors.h"
 #include "core/median.h"
 #include "core/so3.h"
 
@@ -16,11 +17,10 @@ constexpr int kMinPointsOfImage = 15;
 // Quantiles of chi-square with three degrees of freedom: 50 % and 99.9 %.
 constexpr double kMedianChi2 = 2.366;
 constexpr double kLargeChi2 = 16.27;
-// Of the search for the turn that translations share [rad]: 1 sigma, what an
-// adjustment believes (SharedErrorOptions), and its limit.
-constexpr double kSharedTurnSigma = 0.035;
-constexpr double kMaxSharedTurn = 3.0 * kSharedTurnSigma;
-constexpr int kNumSharedTurnSteps = 5;
+// Of the search for the rotation that translations share: an error of more
+// sigmas is not believed.
+constexpr double kMaxNumSharedSigmas = 3.0;
+constexpr int kNumSharedSteps = 5;
 
 // Of the residual by its covariance; negative when that is not one.
 double Chi2(const Eigen::Vector3d& residual,
@@ -31,11 +31,11 @@ double Chi2(const Eigen::Vector3d& residual,
 }
 
 // Of one prior's translation, in the frame of the later camera: what is left
-// of it [m], and how a turn of the direction of driving (shared_errors.h) moves
-// that [m/rad].
+// of it [m], and how a rotation of the direction of driving (shared_errors.h)
+// moves that [m/rad].
 struct TranslationResidual {
   Eigen::Vector3d residual;
-  Eigen::Matrix3d by_turn;
+  Eigen::Matrix3d by_rotation;
   Eigen::Matrix3d covariance;
 };
 
@@ -46,33 +46,34 @@ TranslationResidual ComputeTranslationResidual(const RelativePosePrior& prior,
       ExpSo3(0.5 * LogSo3(stated.rotation)).toRotationMatrix();
   TranslationResidual result;
   result.residual = motion.translation - stated.translation;
-  result.by_turn = -Hat(stated.translation) * later_from_middle;
+  result.by_rotation = -Hat(stated.translation) * later_from_middle;
   result.covariance = prior.covariance.bottomRightCorner<3, 3>();
   return result;
 }
 
-// The turn that all translations share, robust (Cauchy); zero beyond what an
-// adjustment believes, whose unknown it is.
-Eigen::Vector3d FindSharedTurn(
+// The rotation that all translations share, robust (Cauchy); zero beyond what
+// an adjustment believes, whose unknown it is.
+Eigen::Vector3d FindSharedRotation(
     const std::vector<TranslationResidual>& translations) {
-  Eigen::Vector3d turn = Eigen::Vector3d::Zero();
-  for (int step = 0; step < kNumSharedTurnSteps; ++step) {
-    Eigen::Matrix3d information =
-        Eigen::Matrix3d::Identity() / (kSharedTurnSigma * kSharedTurnSigma);
+  const double sigma = SharedErrorOptions().driving_direction_sigma_rad;
+  Eigen::Vector3d rotation = Eigen::Vector3d::Zero();
+  for (int step = 0; step < kNumSharedSteps; ++step) {
+    Eigen::Matrix3d information = Eigen::Matrix3d::Identity() / (sigma * sigma);
     Eigen::Vector3d gradient = Eigen::Vector3d::Zero();
     for (const TranslationResidual& t : translations) {
-      const double chi2 = Chi2(t.residual - t.by_turn * turn, t.covariance);
+      const double chi2 =
+          Chi2(t.residual - t.by_rotation * rotation, t.covariance);
       if (chi2 < 0.0) continue;
-      const Eigen::Matrix3d weighted = t.by_turn.transpose() *
+      const Eigen::Matrix3d weighted = t.by_rotation.transpose() *
                                        t.covariance.inverse() /
                                        (1.0 + chi2 / kLargeChi2);
-      information += weighted * t.by_turn;
+      information += weighted * t.by_rotation;
       gradient += weighted * t.residual;
     }
-    turn = information.ldlt().solve(gradient);
+    rotation = information.ldlt().solve(gradient);
   }
-  if (turn.norm() > kMaxSharedTurn) turn.setZero();
-  return turn;
+  if (rotation.norm() > kMaxNumSharedSigmas * sigma) rotation.setZero();
+  return rotation;
 }
 
 PriorAgreement Summarize(const std::string& kind, std::vector<double> chi2) {
@@ -118,9 +119,10 @@ void AddPriorResiduals(const SceneData& data,
       translations.push_back(ComputeTranslationResidual(prior, motion));
     }
   }
-  const Eigen::Vector3d turn = FindSharedTurn(translations);
+  const Eigen::Vector3d rotation = FindSharedRotation(translations);
   for (const TranslationResidual& t : translations) {
-    const double chi2 = Chi2(t.residual - t.by_turn * turn, t.covariance);
+    const double chi2 =
+        Chi2(t.residual - t.by_rotation * rotation, t.covariance);
     if (chi2 >= 0.0) residuals->translations.push_back(chi2);
   }
 }

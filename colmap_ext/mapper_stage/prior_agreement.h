@@ -34,8 +34,8 @@ struct PriorResiduals {
 
 // Adds those of the scene's priors between images of the model that points
 // hold; translations are of priors with direction and length [m], without the
-// turn of the direction of driving that all of them share. That is an unknown
-// of the adjustment and no contradiction (shared_errors.h).
+// rotation of the direction of driving that all of them share. That is an
+// unknown of the adjustment and no contradiction (shared_errors.h).
 void AddPriorResiduals(const SceneData& data,
                        const colmap::Reconstruction& model,
                        PriorResiduals* residuals);

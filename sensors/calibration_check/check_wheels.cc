@@ -60,7 +60,7 @@ class WheelChecker {
     return fit.acceleration_rms > kMinAcceleration &&
            fit.force_correlation > kMinCorrelation;
   }
-  bool ObservesYaw(const WheelFit& fit) const {
+  bool FitsYaw(const WheelFit& fit) const {
     return has_yaw_ && fit.yaw_rate_rms > kMinYawRate &&
            std::abs(fit.yaw_correlation) > kMinCorrelation;
   }
@@ -135,7 +135,7 @@ std::string WheelChecker::CheckGravity(const WheelCheck& check) const {
       " (gravity is %.0f deg off the wheel frame's z axis, which T_imu_wheel "
       "must let point up; correlation of the yaw rates %.2f)",
       tilt_deg, check.fit.yaw_correlation);
-  if (ObservesYaw(check.fit) && std::abs(check.fit.yaw_correlation) > 0.9 &&
+  if (FitsYaw(check.fit) && std::abs(check.fit.yaw_correlation) > 0.9 &&
       check.fit.yaw_correlation < 0.0 && tilt_deg > 180.0 - kMaxTiltDeg) {
     return "T_imu_wheel is upside down: its third column must be the axis of "
            "the IMU that points up" +
@@ -232,7 +232,7 @@ std::string WheelChecker::CheckDirection(const WheelFit& fit) const {
   const double turn_deg = RadToDeg(std::arg(fit.force));
   if (std::abs(turn_deg) < kMaxTurnDeg) return "";
   if (std::abs(turn_deg) > 180.0 - kMaxTurnDeg) {
-    return ObservesYaw(fit) && fit.yaw > 0.0
+    return FitsYaw(fit) && fit.yaw > 0.0
                ? "the wheels drive backwards where the accelerometer drives "
                  "forwards, but turn to the same side: T_imu_wheel is turned "
                  "by 180 deg about z, or the wheels are negative and left and "
@@ -267,7 +267,7 @@ std::string WheelChecker::CheckUnits(const WheelFit& fit,
     if (logged > kMinUnitFactor || logged < 1.0 / kMinUnitFactor) return text;
     warnings->push_back(text + ", unless they spun");
   }
-  if (!ObservesYaw(fit)) return "";
+  if (!FitsYaw(fit)) return "";
   if (fit.yaw < 0.0) {
     warnings->push_back(
         "the wheels turn to the other side than the gyroscope: left and right "

@@ -19,7 +19,8 @@ constexpr double kFirstThresholdFactor = 8.0;
 constexpr double kFirstSlipWeight = 1e-4;
 // Converged: a step of all unknowns together by this share of a sigma.
 constexpr double kConvergedStep = 0.01;
-// The threshold comes down after a smaller step than this: rad, m/s, m.
+// The threshold comes down once no unknown moves by more than this: rad for
+// rotations, m/s for velocities, m for positions.
 constexpr double kThresholdStep = 1e-2;
 
 // 1 up to the threshold, then falling faster than the residual grows.
