@@ -2,9 +2,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 # Sets up what is missing and runs all tests: format, layers, unit and
 # command-line tests with warnings as errors, the report in a browser, the
-# packages, the documentation's commands, and the pure layers' tests once more
-# under AddressSanitizer and UBSan. Says at the end what was tested in which half
-# hour, and which tests took longest.
+# packages, the documentation's commands, and under AddressSanitizer and UBSan the
+# pure layers' tests once more and the whole chain. Says at the end what was tested
+# in which half hour, and which tests took longest.
 #
 #   scripts/test.sh [--no-sanitizers]
 set -euo pipefail
@@ -44,18 +44,19 @@ scripts/checks/check_layers.sh
 scripts/checks/check_host_part.sh
 
 if [ "${1:-}" != --no-sanitizers ]; then
-  step 'Building the pure layers with sanitizers (about 10 minutes the first time)'
-  cmake -S . -B build-sanitize -G Ninja -DCMAKE_BUILD_TYPE=RelWithDebInfo \
-    -DCMAKE_CXX_FLAGS_RELWITHDEBINFO='-O1 -g1 -DNDEBUG' -DADASFM_UNITY=ON \
-    -DADASFM_WITH_COLMAP=OFF -DADASFM_BUILD_BENCHMARKS=OFF \
-    -DADASFM_SANITIZE=ON -DADASFM_WERROR=ON > /dev/null
-  cmake --build build-sanitize --parallel "$jobs"
+  step 'Building with sanitizers (about 15 minutes the first time)'
+  pure_layers=(core sensors global partition synthetic)
+  scripts/checks/sanitized_chain.sh build address build-sanitize \
+    "${pure_layers[@]/#/test_}"
   step 'Running the unit tests under AddressSanitizer and UBSan'
   # Statistics of many seeds take ten times as long as without sanitizers, and
   # run the code that shorter tests run.
   statistics='JitterOfTheImages|OnAStraightRoad|ShiftsAreExact|LengthHonesty'
   statistics+='|RealRoad|IsNotFoundWhereThereIsNone|OverTwentySeeds'
-  run_tests build-sanitize --exclude-regex "$statistics"
+  run_tests build-sanitize --exclude-regex "$statistics" \
+    --label-regex "^($(IFS='|'; echo "${pure_layers[*]}"))$"
+  step 'Running the whole chain under AddressSanitizer and UBSan'
+  scripts/checks/sanitized_chain.sh run build-sanitize/bin/colmap
 fi
 
 step 'Running all tests'

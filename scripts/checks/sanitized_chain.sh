@@ -4,6 +4,8 @@
 # and on photos with four threads; fails when a command does, as it does on a finding.
 #
 #   scripts/checks/sanitized_chain.sh address|thread [BUILD_FOLDER]
+#   scripts/checks/sanitized_chain.sh build address|thread BUILD_FOLDER [TARGET...]
+#                                                     only the build, with tests
 #   scripts/checks/sanitized_chain.sh run COLMAP      only the chain
 #
 # address: AddressSanitizer and UBSan; thread: ThreadSanitizer. The first build of
@@ -14,29 +16,35 @@
 set -euo pipefail
 here=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
 root=$here/../..
+host=${ADASFM_CACHE:-${XDG_CACHE_HOME:-$HOME/.cache}/adasfm}/colmap-3.8
 
-usage() { sed -n '3,16s/^# \?//p' "${BASH_SOURCE[0]}" >&2; exit 2; }
+usage() { sed -n '3,18s/^# \?//p' "${BASH_SOURCE[0]}" >&2; exit 2; }
 
-case ${1:-} in
-  address) sanitize=ON ;;
-  thread) sanitize=thread ;;
-  run) [ $# = 2 ] || usage ;;
+# build address|thread FOLDER [TARGET...]: the launcher and those.
+build() {
+  local sanitize=thread folder=$2
+  [ "$1" = thread ] || sanitize=ON
+  # Compiling is what takes long, so only line numbers and few optimisations.
+  cmake -S "$root" -B "$folder" -G Ninja -DCMAKE_BUILD_TYPE=RelWithDebInfo \
+    -DCMAKE_CXX_FLAGS_RELWITHDEBINFO='-O1 -g1' -DADASFM_UNITY=ON \
+    -DADASFM_WERROR=ON -DCOLMAP_DIR="${COLMAP_DIR:-$host/share/colmap}" \
+    -DADASFM_BUILD_BENCHMARKS=OFF -DADASFM_SANITIZE="$sanitize" > /dev/null
+  cmake --build "$folder" --target adasfm_launcher "${@:3}"
+}
+
+case ${1:-}/$# in
+  address/[12] | thread/[12])
+    folder=${2:-$root/build-sanitize-$1}
+    build "$1" "$folder"
+    colmap=$(realpath "$folder/bin/colmap")
+    ;;
+  build/[3-9])
+    build "${@:2}"
+    exit
+    ;;
+  run/2) colmap=$(realpath "$2") ;;
   *) usage ;;
 esac
-
-if [ "$1" = run ]; then
-  colmap=$(realpath "$2")
-else
-  build=${2:-$root/build-sanitize-$1}
-  # Compiling is what takes long, so only line numbers and few optimisations.
-  cmake -S "$root" -B "$build" -G Ninja -DCMAKE_BUILD_TYPE=RelWithDebInfo \
-    -DCMAKE_CXX_FLAGS_RELWITHDEBINFO='-O1 -g1' -DADASFM_UNITY=ON \
-    -DCOLMAP_DIR="${COLMAP_DIR:-$HOME/.cache/adasfm/colmap-3.8/share/colmap}" \
-    -DADASFM_BUILD_TESTS=OFF -DADASFM_BUILD_BENCHMARKS=OFF \
-    -DADASFM_SANITIZE="$sanitize" > /dev/null
-  cmake --build "$build" --target adasfm_launcher
-  colmap=$(realpath "$build/bin/colmap")
-fi
 
 world=$(mktemp -d)
 trap 'rm -rf "$world"' EXIT
