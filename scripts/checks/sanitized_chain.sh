@@ -27,7 +27,7 @@ build() {
   # Compiling is what takes long, so only line numbers and few optimisations.
   cmake -S "$root" -B "$folder" -G Ninja -DCMAKE_BUILD_TYPE=RelWithDebInfo \
     -DCMAKE_CXX_FLAGS_RELWITHDEBINFO='-O1 -g1' -DADASFM_UNITY=ON \
-    -DADASFM_WERROR=ON -DCOLMAP_DIR="${COLMAP_DIR:-$host/share/colmap}" \
+    -DCOLMAP_DIR="${COLMAP_DIR:-$host/share/colmap}" \
     -DADASFM_BUILD_BENCHMARKS=OFF -DADASFM_SANITIZE="$sanitize" > /dev/null
   cmake --build "$folder" --target adasfm_launcher "${@:3}"
 }
