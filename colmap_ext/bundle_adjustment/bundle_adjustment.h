@@ -73,9 +73,12 @@ struct PriorBundleAdjustmentOptions {
   // not tell it yet; variance_components.h finds it, and what keypoints have in
   // common.
   double keypoint_sigma_px = 0.5;
-  // Where the robust loss on reprojection errors (soft L1) takes over, in px;
+  // Where the robust loss on reprojection errors (Cauchy) takes over, in px:
+  // three sigmas of the noise, with which variance_components.h scales it.
+  // Wrong matches that agree with a point to a few pixels would pull at its
+  // images.
   // <= 0: plain squares.
-  double reproj_loss_scale_px = 2.0;
+  double reproj_loss_scale_px = 1.5;
   // Where the robust loss (Cauchy) on whitened prior terms takes over, in
   // sigmas. It drops single wrong priors; many that vision contradicts together
   // are what variance_components.h is for.

@@ -21,7 +21,7 @@ BundleProblem::BundleProblem(const PriorBundleAdjustmentOptions& options,
       prior_loss_(
           std::make_unique<ceres::CauchyLoss>(options.prior_loss_scale)) {
   if (options.reproj_loss_scale_px > 0.0) {
-    reprojection_loss_ = std::make_unique<ceres::SoftLOneLoss>(
+    reprojection_loss_ = std::make_unique<ceres::CauchyLoss>(
         options.reproj_loss_scale_px / options.keypoint_sigma_px);
   }
   ceres::Problem::Options problem_options;

@@ -88,6 +88,9 @@ class VarianceComponentAdjustment {
     given_.keypoint_sigma_px =
         std::max(kMinKeypointSigmaPx, EstimateKeypointSigma(reconstruction_)
                                           .value_or(options.keypoint_sigma_px));
+    // Follows the noise, not what keypoints have in common.
+    options_.reproj_loss_scale_px *=
+        given_.keypoint_sigma_px / options.keypoint_sigma_px;
   }
 
   PriorBundleAdjustmentSummary Run() {

@@ -18,10 +18,13 @@
 namespace adasfm {
 namespace {
 
-// Factors of the given focal length, as logarithms: from 0.38 to 2.6 of it,
-// then, with the distortion, around the best one in steps that become finer.
+// The same lenses whatever is given: focal lengths from 0.38 to 2.6 of the
+// longer side, in steps of their logarithms and, where nothing is known of it,
+// with several distortions (a minimum without any is not always near that of
+// all). Then around the best one in steps that become finer.
 constexpr int kNumSteps = 6;  // to either side
 constexpr double kCoarseStep = 0.16;
+constexpr double kCoarseDistortions[] = {-0.2, -0.1, 0.0, 0.1};
 struct Steps {
   double log_factor;
   double distortion;
@@ -243,14 +246,20 @@ std::optional<Minimum> FitMinimum(const std::vector<CostCurve>& curves,
 std::optional<Minimum> FindFocalLength(
     const FocalLengthCalibrationOptions& options,
     const std::vector<PairPoints>& pairs, const colmap::Camera& camera) {
+  const bool has_distortion = FindUnknownDistortion(camera).has_value();
+  const double of_longer_side = std::log(
+      std::max(camera.Width(), camera.Height()) / camera.MeanFocalLength());
   std::vector<Lens> coarse;
-  for (int k = -kNumSteps; k <= kNumSteps; ++k) {
-    coarse.push_back({k * kCoarseStep, 0.0});
+  for (const double distortion : kCoarseDistortions) {
+    if (distortion != 0.0 && !has_distortion) continue;
+    for (int k = -kNumSteps; k <= kNumSteps; ++k) {
+      coarse.push_back({of_longer_side + k * kCoarseStep, distortion});
+    }
   }
   const int first =
       FindBest(ComputeCurves(options, pairs, camera, coarse), coarse);
-  if (first == 0 || first == 2 * kNumSteps) return std::nullopt;
-  const bool has_distortion = FindUnknownDistortion(camera).has_value();
+  const int of_row = first % (2 * kNumSteps + 1);
+  if (of_row == 0 || of_row == 2 * kNumSteps) return std::nullopt;
   Lens best = coarse[first];
   std::optional<Minimum> fit;
   int num_moves = 0;

@@ -42,9 +42,11 @@ struct CalibratedFocalLength {
 // The focal length at which the epipolar distances of the camera's pairs are
 // least, each pair with the essential matrix that suits it best (view graph
 // calibration, as in Sweeney et al., ICCV 2015, with distances in the image);
-// pairs straight on cost the same everywhere, and none counts beyond a bound. A
-// distortion that is not given is estimated, too: taken for zero, a slight
-// barrel (-0.05) made it 6 % too long. The sigma is the pairs' sandwich.
+// pairs straight on cost the same everywhere, and none counts beyond a bound.
+// What is given does not matter for what is found: from 0.38 to 2.6 of the
+// longer side all are tried. A distortion that is not given is estimated, too:
+// taken for zero, a slight barrel (-0.05) made it 6 % too long. The sigma is
+// the pairs' sandwich.
 //
 // Both images of a pair must have the camera. Cameras whose focal length was
 // found, with certainty and other than given, are changed in `scene` and

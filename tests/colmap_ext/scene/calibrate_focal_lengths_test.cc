@@ -86,6 +86,25 @@ TEST(CalibrateFocalLengths, FindsTheTruthOfADistortingLens) {
   }
 }
 
+// Guesses by different programs lead to the same lens.
+TEST(CalibrateFocalLengths, WhatIsGivenDoesNotMatter) {
+  for (const uint64_t seed : {1, 2}) {
+    const SyntheticWorld world = BuildSyntheticWorld(Drive(seed));
+    std::vector<double> found_px;
+    for (const double factor : {0.5, 1.4, 2.3}) {
+      SceneData scene = SceneWithFocalLength(world, 1.0);
+      DistortKeypoints(-0.08, &scene);
+      colmap::Camera& camera = scene.cameras.at(1);
+      camera.SetFocalLength(factor * camera.FocalLength());
+      const auto found =
+          CalibrateFocalLengths(FocalLengthCalibrationOptions(), &scene);
+      ASSERT_EQ(found.size(), 1) << seed << ", " << factor;
+      found_px.push_back(found[0].found_px);
+      EXPECT_NEAR(found_px.back(), found_px.front(), 1e-6 * found_px.front());
+    }
+  }
+}
+
 TEST(CalibrateFocalLengths, KnownAndRightOnesStay) {
   const SyntheticWorld world = BuildSyntheticWorld(Drive(1));
   SceneData known = SceneWithFocalLength(world, 1.6);
