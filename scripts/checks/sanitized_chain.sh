@@ -29,7 +29,8 @@ build() {
     -DCMAKE_CXX_FLAGS_RELWITHDEBINFO='-O1 -g1' -DADASFM_UNITY=ON \
     -DCOLMAP_DIR="${COLMAP_DIR:-$host/share/colmap}" \
     -DADASFM_BUILD_BENCHMARKS=OFF -DADASFM_SANITIZE="$sanitize" > /dev/null
-  cmake --build "$folder" --target adasfm_launcher "${@:3}"
+  cmake --build "$folder" --parallel "$(nproc)" --target adasfm_launcher \
+    "${@:3}"
 }
 
 case ${1:-}/$# in
