@@ -49,10 +49,11 @@ if [ "${1:-}" != --no-sanitizers ]; then
   scripts/checks/sanitized_chain.sh build address build-sanitize \
     "${pure_layers[@]/#/test_}"
   step 'Running the unit tests under AddressSanitizer and UBSan'
-  # Statistics of many seeds take ten times as long as without sanitizers, and
-  # run the code that shorter tests run.
+  # Statistics of long drives and many seeds take ten times as long as without
+  # sanitizers, and run the code that shorter tests run.
   statistics='JitterOfTheImages|OnAStraightRoad|ShiftsAreExact|LengthHonesty'
-  statistics+='|RealRoad|IsNotFoundWhereThereIsNone|OverTwentySeeds'
+  statistics+='|RealRoad|IsNotFoundWhereThereIsNone|OverTwentySeeds|ALongDrive'
+  statistics+='|AreNamed/(SwappedAxes|OneSecond)'
   run_tests build-sanitize --exclude-regex "$statistics" \
     --label-regex "^($(IFS='|'; echo "${pure_layers[*]}"))$"
   step 'Running the whole chain under AddressSanitizer and UBSan'
