@@ -22,9 +22,11 @@ function(adasfm_target_options target)
     if(CMAKE_CXX_COMPILER_ID STREQUAL GNU)
       # A check of each pointer doubles the time of Eigen's code, and
       # AddressSanitizer finds bad addresses too. Clang's build of the fuzzers
-      # keeps these checks for the parsers.
+      # keeps these checks for the parsers. Calls in place of inlined checks
+      # compile in a fifth less time.
       target_compile_options(${target} PUBLIC
-        -fno-sanitize=null,alignment,object-size,vptr)
+        -fno-sanitize=null,alignment,object-size,vptr
+        --param=asan-instrumentation-with-call-threshold=0)
     endif()
     # Eigen hides an offset before each block under AddressSanitizer, where
     # COLMAP's library, which is not instrumented, expects none.

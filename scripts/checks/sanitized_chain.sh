@@ -4,8 +4,8 @@
 # and on photos with four threads; fails when a command does, as it does on a finding.
 #
 #   scripts/checks/sanitized_chain.sh address|thread [BUILD_FOLDER]
-#   scripts/checks/sanitized_chain.sh build address|thread BUILD_FOLDER [TARGET...]
-#                                                     only the build, with tests
+#   scripts/checks/sanitized_chain.sh build address|thread BUILD_FOLDER TARGET...
+#                                                     only the build, of those
 #   scripts/checks/sanitized_chain.sh run COLMAP      only the chain
 #
 # address: AddressSanitizer and UBSan; thread: ThreadSanitizer. The first build of
@@ -20,7 +20,7 @@ host=${ADASFM_CACHE:-${XDG_CACHE_HOME:-$HOME/.cache}/adasfm}/colmap-3.8
 
 usage() { sed -n '3,18s/^# \?//p' "${BASH_SOURCE[0]}" >&2; exit 2; }
 
-# build address|thread FOLDER [TARGET...]: the launcher and those.
+# build address|thread FOLDER TARGET...
 build() {
   local sanitize=thread folder=$2
   [ "$1" = thread ] || sanitize=ON
@@ -29,17 +29,16 @@ build() {
     -DCMAKE_CXX_FLAGS_RELWITHDEBINFO='-O1 -g1' -DADASFM_UNITY=ON \
     -DCOLMAP_DIR="${COLMAP_DIR:-$host/share/colmap}" \
     -DADASFM_BUILD_BENCHMARKS=OFF -DADASFM_SANITIZE="$sanitize" > /dev/null
-  cmake --build "$folder" --parallel "$(nproc)" --target adasfm_launcher \
-    "${@:3}"
+  cmake --build "$folder" --parallel "$(nproc)" --target "${@:3}"
 }
 
 case ${1:-}/$# in
   address/[12] | thread/[12])
     folder=${2:-$root/build-sanitize-$1}
-    build "$1" "$folder"
+    build "$1" "$folder" adasfm_launcher
     colmap=$(realpath "$folder/bin/colmap")
     ;;
-  build/[3-9])
+  build/[4-9])
     build "${@:2}"
     exit
     ;;
