@@ -56,7 +56,7 @@ if [ "${1:-}" != --no-sanitizers ]; then
   step 'Running unit tests under AddressSanitizer and UBSan'
   # Statistics of long drives and many seeds take ten times as long as without
   # sanitizers, and run the code that shorter tests run.
-  statistics='JitterOfTheImages|OnAStraightRoad|ShiftsAreExact|LengthHonesty'
+  statistics='JitterOfTheImages|OnAStraightRoad|ShiftsAreExact|Honesty'
   statistics+='|RealRoad|IsNotFoundWhereThereIsNone|OverTwentySeeds|ALongDrive'
   statistics+='|AreNamed/(SwappedAxes|OneSecond)'
   run_tests build-sanitize --exclude-regex "$statistics" \
