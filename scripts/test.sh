@@ -3,7 +3,7 @@
 # Sets up what is missing and runs all tests: format, layers, unit and
 # command-line tests with warnings as errors, the report in a browser, the
 # packages, the documentation's commands, and once more under AddressSanitizer and
-# UBSan the tests of the layers that read files. Says at the end what was tested in
+# UBSan the tests of core, sensors and partition. Says at the end what was tested in
 # which half hour, and which tests took longest.
 #
 #   scripts/test.sh [--no-sanitizers]
@@ -47,7 +47,7 @@ step 'Running all tests'
 run_tests "$build"
 
 if [ "${1:-}" != --no-sanitizers ]; then
-  # The layers that read what users bring; the chain runs the others
+  # Sensors read what users bring; the chain runs the other layers
   # (scripts/checks/sanitized_chain.sh).
   layers=(core sensors partition)
   step 'Building with sanitizers (about 8 minutes the first time)'
