@@ -263,6 +263,7 @@ PriorBundleAdjustmentSummary AdjustBundle(
 
   PriorBundleAdjustmentSummary summary;
   summary.keypoint_sigma_px = options.keypoint_sigma_px;
+  summary.keypoint_sigma_ratios = options.keypoint_sigma_ratios;
   summary.prior_sigma_factors = options.prior_sigma_factors;
   PriorBundleAdjustmentProblem with_windows = problem;
   AssignWindows(options.shared_errors, &with_windows.priors);

@@ -73,12 +73,15 @@ struct PriorBundleAdjustmentOptions {
   // not tell it yet; variance_components.h finds it, and what keypoints have in
   // common.
   double keypoint_sigma_px = 0.5;
+  // Of single cameras, over keypoint_sigma_px; those that are missing have 1.
+  std::map<camera_t, double> keypoint_sigma_ratios;
   // Where the robust loss on reprojection errors (Cauchy) takes over, in px:
-  // three sigmas of the noise, with which variance_components.h scales it.
+  // four sigmas of the noise, with which variance_components.h scales it, and
+  // as many of each camera's own.
   // Wrong matches that agree with a point to a few pixels would pull at its
   // images.
   // <= 0: plain squares.
-  double reproj_loss_scale_px = 1.5;
+  double reproj_loss_scale_px = 2.0;
   // Where the robust loss (Cauchy) on whitened prior terms takes over, in
   // sigmas. It drops single wrong priors; many that vision contradicts together
   // are what variance_components.h is for.
@@ -150,6 +153,7 @@ struct PriorBundleAdjustmentSummary {
   double seconds = 0.0;
   // The sigmas that were used.
   double keypoint_sigma_px = 0.0;
+  std::map<camera_t, double> keypoint_sigma_ratios;
   PriorSigmaFactors prior_sigma_factors = {1.0, 1.0, 1.0, 1.0};
   std::string message;
   // Of the priors, where AdjustBundleWithVarianceComponents made the

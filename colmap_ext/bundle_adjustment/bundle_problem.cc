@@ -141,6 +141,13 @@ ceres::ResidualBlockId BundleProblem::AddCost(
   return problem_->AddResidualBlock(cost, loss, parameters);
 }
 
+double BundleProblem::KeypointSigmaPx(camera_t camera_id) const {
+  const auto ratio = options_.keypoint_sigma_ratios.find(camera_id);
+  return ratio == options_.keypoint_sigma_ratios.end()
+             ? options_.keypoint_sigma_px
+             : options_.keypoint_sigma_px * ratio->second;
+}
+
 std::vector<BundleProblem::Observation> BundleProblem::FindObservations(
     const colmap::Reconstruction& reconstruction,
     const colmap::Point3D& point) const {
@@ -157,7 +164,7 @@ std::vector<BundleProblem::Observation> BundleProblem::FindObservations(
     observation.image_id = element.image_id;
     observation.xy = XyOf(image.Point2D(element.point2D_idx));
     if (!NormalizeKeypoint(reconstruction.Camera(image.CameraId()),
-                           observation.xy, options_.keypoint_sigma_px,
+                           observation.xy, KeypointSigmaPx(image.CameraId()),
                            &observation.keypoint)) {
       continue;
     }
@@ -225,7 +232,7 @@ void BundleProblem::AddObservation(const colmap::Reconstruction& reconstruction,
   camera.is_used = true;
   other_costs_.push_back(
       CreateCameraCost(reconstruction.Camera(camera_id), observation.xy,
-                       options_.keypoint_sigma_px, block.pose));
+                       KeypointSigmaPx(camera_id), block.pose));
   AddCost(other_costs_.back().get(), reprojection_loss_.get(), {&block},
           {point->xyz.data(), camera.params.data()});
 }

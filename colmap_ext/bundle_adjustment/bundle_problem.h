@@ -137,6 +137,7 @@ class BundleProblem final : private ceres::EvaluationCallback {
                                  const std::vector<const ImageBlock*>& images,
                                  const std::vector<double*>& others = {});
   void AddPoints(const colmap::Reconstruction& reconstruction);
+  double KeypointSigmaPx(camera_t camera_id) const;
   // The usable observations of a point, in order of image ids.
   std::vector<Observation> FindObservations(
       const colmap::Reconstruction& reconstruction,

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 #include <map>
+#include <set>
 #include <vector>
 
 #include "colmap_ext/host/pose_conversion.h"
@@ -35,34 +36,84 @@ double SquaredError(const colmap::Reconstruction& reconstruction,
   return (projected - XyOf(image.Point2D(element.point2D_idx))).squaredNorm();
 }
 
+// What the points and poses of one camera, or of all, tell of its sigma.
+struct Residuals {
+  // Of each point, an estimate of sigma^2.
+  std::vector<double> variances;
+  double num_dof_of_observations = 0.0;
+  size_t num_images = 0;
+
+  std::optional<double> Sigma() {
+    const double num_dof_of_poses = 6.0 * num_images;
+    if (variances.size() < kMinNumPoints ||
+        num_dof_of_poses >= 0.5 * num_dof_of_observations) {
+      return std::nullopt;
+    }
+    return std::sqrt(UpperMedian(&variances) /
+                     (1.0 - num_dof_of_poses / num_dof_of_observations));
+  }
+};
+
+// None when the point lies behind an image, or when two see it.
+std::optional<double> EstimateVariance(
+    const colmap::Reconstruction& reconstruction,
+    const std::map<image_t, Rigid3d>& poses, const colmap::Point3D& point) {
+  const size_t length = TrackOf(point).Length();
+  if (length < kMinTrackLength) return std::nullopt;
+  const double num_dof = 2.0 * length - 3.0;
+  double sum = 0.0;
+  for (const colmap::TrackElement& element : TrackOf(point).Elements()) {
+    sum += SquaredError(reconstruction, poses.at(element.image_id), element,
+                        XyzOf(point));
+  }
+  if (!std::isfinite(sum)) return std::nullopt;
+  return sum / (num_dof * MedianOfChi2PerDof(num_dof));
+}
+
 }  // namespace
 
 std::optional<double> EstimateKeypointSigma(
     const colmap::Reconstruction& reconstruction) {
   const std::map<image_t, Rigid3d> poses = CamsFromWorld(reconstruction);
-  std::vector<double> variances;
-  double num_dof_of_points = 0.0;
+  Residuals residuals;
+  residuals.num_images = reconstruction.NumRegImages();
   for (const auto& [point_id, point] : reconstruction.Points3D()) {
     const size_t length = TrackOf(point).Length();
-    const double num_dof = 2.0 * length - 3.0;
-    if (length >= 2) num_dof_of_points += num_dof;
-    if (length < kMinTrackLength) continue;
-    double sum = 0.0;
+    if (length >= 2) residuals.num_dof_of_observations += 2.0 * length - 3.0;
+    const auto variance = EstimateVariance(reconstruction, poses, point);
+    if (variance) residuals.variances.push_back(*variance);
+  }
+  return residuals.Sigma();
+}
+
+std::map<camera_t, double> EstimateKeypointSigmas(
+    const colmap::Reconstruction& reconstruction) {
+  if (reconstruction.NumCameras() < 2) return {};
+  const std::map<image_t, Rigid3d> poses = CamsFromWorld(reconstruction);
+  std::map<camera_t, Residuals> residuals;
+  for (const auto& [image_id, pose] : poses) {
+    ++residuals[reconstruction.Image(image_id).CameraId()].num_images;
+  }
+  for (const auto& [point_id, point] : reconstruction.Points3D()) {
+    const size_t length = TrackOf(point).Length();
+    if (length < 2) continue;
+    std::set<camera_t> cameras;
     for (const colmap::TrackElement& element : TrackOf(point).Elements()) {
-      sum += SquaredError(reconstruction, poses.at(element.image_id), element,
-                          XyzOf(point));
+      const camera_t camera_id =
+          reconstruction.Image(element.image_id).CameraId();
+      cameras.insert(camera_id);
+      residuals.at(camera_id).num_dof_of_observations += 2.0 - 3.0 / length;
     }
-    if (std::isfinite(sum)) {
-      variances.push_back(sum / (num_dof * MedianOfChi2PerDof(num_dof)));
-    }
+    if (cameras.size() > 1) continue;
+    const auto variance = EstimateVariance(reconstruction, poses, point);
+    if (variance) residuals.at(*cameras.begin()).variances.push_back(*variance);
   }
-  const double num_dof_of_poses = 6.0 * reconstruction.NumRegImages();
-  if (variances.size() < kMinNumPoints ||
-      num_dof_of_poses >= 0.5 * num_dof_of_points) {
-    return std::nullopt;
+  std::map<camera_t, double> sigmas_px;
+  for (auto& [camera_id, of_camera] : residuals) {
+    const std::optional<double> sigma_px = of_camera.Sigma();
+    if (sigma_px) sigmas_px[camera_id] = *sigma_px;
   }
-  return std::sqrt(UpperMedian(&variances) /
-                   (1.0 - num_dof_of_poses / num_dof_of_points));
+  return sigmas_px;
 }
 
 }  // namespace adasfm

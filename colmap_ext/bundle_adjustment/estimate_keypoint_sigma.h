@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <map>
 #include <optional>
 
 #include "colmap_ext/bundle_adjustment/bundle_adjustment.h"
@@ -17,6 +18,12 @@ namespace adasfm {
 // leave no residuals: variance_components.h looks for those. None with less
 // than a hundred points of three images or more.
 std::optional<double> EstimateKeypointSigma(
+    const colmap::Reconstruction& reconstruction);
+
+// The same for each camera of several, from the points that no other camera
+// observes: a blurred lens has no part in the residuals of a sharp one.
+// Cameras with less than a hundred such points are missing.
+std::map<camera_t, double> EstimateKeypointSigmas(
     const colmap::Reconstruction& reconstruction);
 
 }  // namespace adasfm

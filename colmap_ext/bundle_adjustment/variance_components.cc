@@ -91,6 +91,11 @@ class VarianceComponentAdjustment {
     // Follows the noise, not what keypoints have in common.
     options_.reproj_loss_scale_px *=
         given_.keypoint_sigma_px / options.keypoint_sigma_px;
+    for (const auto& [camera_id, sigma_px] :
+         EstimateKeypointSigmas(reconstruction_)) {
+      options_.keypoint_sigma_ratios[camera_id] =
+          std::max(kMinKeypointSigmaPx, sigma_px) / given_.keypoint_sigma_px;
+    }
   }
 
   PriorBundleAdjustmentSummary Run() {

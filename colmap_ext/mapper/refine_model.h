@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <map>
+
 #include "colmap_ext/mapper/local_mapper.h"
 #include "colmap_ext/mapper/local_mapper_scene.h"
 #include "core/types.h"
@@ -30,11 +32,14 @@ struct RefineModelSummary {
   double keypoint_sigma_factor = 1.0;
   // 1 sigma of keypoints that agrees with the priors (variance_components.h).
   double keypoint_sigma_px = 0.0;
+  // Of single cameras, over keypoint_sigma_px.
+  std::map<camera_t, double> keypoint_sigma_ratios;
   // Squared whitened residual of the priors per degree of freedom at the end.
   double prior_chi2_per_dof = 0.0;
   // Images that the priors contradict and that were put back.
   int num_images_put_back = 0;
-  // Images without priors that end with too few points for a pose.
+  // Images that end with too few points for a pose and that no known motions
+  // tie to others.
   int num_images_left_out = 0;
 };
 

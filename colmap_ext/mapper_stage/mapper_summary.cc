@@ -63,6 +63,12 @@ nlohmann::json MapperSummaryToJson(const MapperStageSummary& summary) {
       {"parts_seconds", summary.parts_seconds},
       {"merge_seconds", summary.merge_seconds},
       {"refine_seconds", summary.refine_seconds}};
+  nlohmann::json& of_cameras = json["keypoint_sigma_px_of_cameras"] =
+      nlohmann::json::object();
+  for (const auto& [camera_id, ratio] : summary.refine.keypoint_sigma_ratios) {
+    of_cameras[std::to_string(camera_id)] =
+        ratio * summary.refine.keypoint_sigma_px;
+  }
   json["parts"] = nlohmann::json::array();
   for (size_t k = 0; k < summary.parts.size(); ++k) {
     json["parts"].push_back(PartAsJson(summary, k));

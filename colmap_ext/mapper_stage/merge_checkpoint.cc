@@ -38,6 +38,7 @@ void VisitSummary(Summary& summary, const Visit& visit) {
   visit("num_iterations", summary.refine.num_iterations);
   visit("keypoint_sigma_factor", summary.refine.keypoint_sigma_factor);
   visit("keypoint_sigma_px", summary.refine.keypoint_sigma_px);
+  visit("keypoint_sigma_ratios", summary.refine.keypoint_sigma_ratios);
   visit("prior_chi2_per_dof", summary.refine.prior_chi2_per_dof);
   visit("num_images_put_back", summary.refine.num_images_put_back);
   visit("num_images_left_out", summary.refine.num_images_left_out);

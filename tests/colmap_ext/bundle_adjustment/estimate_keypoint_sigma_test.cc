@@ -31,6 +31,24 @@ TEST(EstimateKeypointSigmaTest, FindsTheNoiseOfTheWorld) {
   }
 }
 
+TEST(EstimateKeypointSigmaTest, FindsTheNoiseOfEachCamera) {
+  for (const uint64_t seed : {1, 2, 3}) {
+    BundleWorldOptions options;
+    options.seed = seed;
+    options.num_images = 40;
+    options.num_keypoints_per_image = 400;
+    options.pixel_noise_px = 0.3;
+    options.second_camera_noise_px = 1.2;
+    const std::map<camera_t, double> sigmas_px =
+        EstimateKeypointSigmas(AdjustedWorld(options));
+    ASSERT_EQ(sigmas_px.size(), 2);
+    // Four times what 20 seeds scatter by.
+    EXPECT_NEAR(sigmas_px.at(1) / 0.3, 1.0, 0.1) << "seed " << seed;
+    EXPECT_NEAR(sigmas_px.at(2) / 1.2, 1.0, 0.1) << "seed " << seed;
+  }
+  EXPECT_TRUE(EstimateKeypointSigmas(AdjustedWorld({})).empty());
+}
+
 TEST(EstimateKeypointSigmaTest, WrongMatchesDoNotCount) {
   BundleWorldOptions options;
   options.pixel_noise_px = 0.5;

@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include "tests/testing/colmap_ext/bundle_world_problem.h"
 #include "tests/testing/colmap_ext/mapper_drive.h"
 
 namespace adasfm {
@@ -84,6 +85,33 @@ TEST(AdjustBundleWithVarianceComponents,
     EXPECT_TRUE(own_chi2 <= balance.max_mean_square ||
                 factor == balance.max_sigma_factor);
   }
+}
+
+// A blurred camera beside a sharp one weighs by its own noise.
+TEST(AdjustBundleWithVarianceComponents, WeighsEachCameraByItsNoise) {
+  double error_m = 0.0;
+  double error_of_one_sigma_m = 0.0;
+  for (uint64_t seed = 1; seed <= 5; ++seed) {
+    BundleWorldOptions options;
+    options.seed = seed;
+    options.num_images = 40;
+    options.pixel_noise_px = 0.3;
+    options.second_camera_noise_px = 1.5;
+    colmap::Reconstruction model = BuildBundleWorld(options);
+    const PriorBundleAdjustmentProblem problem = ProblemOfAll(model);
+    ASSERT_TRUE(AdjustBundle({}, problem, &model).success);
+    error_of_one_sigma_m += AlignedCenterError(options, model);
+    double factor = 1.0;
+    const PriorBundleAdjustmentSummary summary =
+        AdjustBundleWithVarianceComponents({}, {}, problem, &model, &factor);
+    ASSERT_TRUE(summary.success);
+    EXPECT_NEAR(summary.keypoint_sigma_ratios.at(2) /
+                    summary.keypoint_sigma_ratios.at(1),
+                1.5 / 0.3, 1.0)
+        << "seed " << seed;
+    error_m += AlignedCenterError(options, model);
+  }
+  EXPECT_LT(error_m, 0.9 * error_of_one_sigma_m);
 }
 
 TEST(VarianceComponentOptions, RefusesWhatMakesNoSense) {

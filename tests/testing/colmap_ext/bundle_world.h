@@ -28,6 +28,10 @@ struct BundleWorldOptions {
   std::vector<double> camera_params = {480, 485, 400, 250};
   // How far the camera looks to the left and to the right of the street.
   double weave_rad = 0.15;
+  // When positive, every other image is of camera 2, whose keypoints have this
+  // noise, and each camera sees two fifths of the points alone, as lenses that
+  // look to different sides do.
+  double second_camera_noise_px = 0.0;
   uint64_t seed = 1;
 };
 
@@ -56,6 +60,12 @@ inline colmap::Reconstruction BuildBundleWorld(
   camera.SetHeight(500);
   camera.SetParams(options.camera_params);
   reconstruction.AddCamera(camera);
+  const bool has_second_camera = options.second_camera_noise_px > 0.0;
+  if (has_second_camera) {
+    camera.SetCameraId(2);
+    reconstruction.AddCamera(camera);
+  }
+  const auto is_second = [&](int i) { return has_second_camera && i % 2; };
 
   const int num_points =
       static_cast<int>(options.num_images * options.num_keypoints_per_image *
@@ -74,8 +84,10 @@ inline colmap::Reconstruction BuildBundleWorld(
                                 side * random.Uniform(8.0, 12.0),
                                 random.Uniform(0.0, 8.0));
     const double nearest = random.Uniform(12.0, 24.0);
+    const double share = has_second_camera ? random.Uniform(0.0, 1.0) : 1.0;
     colmap::Track track;
     for (int i = 0; i < options.num_images; ++i) {
+      if (share < 0.8 && is_second(i) != (share < 0.4)) continue;
       const Eigen::Vector3d x_in_cam = poses[i] * point;
       if (x_in_cam.z() < nearest || x_in_cam.z() > nearest + kSeenOver_m) {
         continue;
@@ -83,9 +95,11 @@ inline colmap::Reconstruction BuildBundleWorld(
       const Eigen::Vector2d pixel = camera.WorldToImage(x_in_cam.hnormalized());
       if (pixel.minCoeff() < 0 || pixel.x() > 800 || pixel.y() > 500) continue;
       track.AddElement(i + 1, keypoints[i].size());
-      keypoints[i].push_back(
-          pixel + Eigen::Vector2d(random.Gaussian(options.pixel_noise_px),
-                                  random.Gaussian(options.pixel_noise_px)));
+      const double noise_px = is_second(i) ? options.second_camera_noise_px
+                                           : options.pixel_noise_px;
+      keypoints[i].push_back(pixel +
+                             Eigen::Vector2d(random.Gaussian(noise_px),
+                                             random.Gaussian(noise_px)));
     }
     if (track.Length() < 2) continue;
     tracks.push_back(track);
@@ -95,7 +109,7 @@ inline colmap::Reconstruction BuildBundleWorld(
     colmap::Image image;
     image.SetImageId(i + 1);
     image.SetName("image" + std::to_string(i + 1));
-    image.SetCameraId(1);
+    image.SetCameraId(is_second(i) ? 2 : 1);
     image.SetPoints2D(keypoints[i]);
     SetCamFromWorld(poses[i], &image);
     reconstruction.AddImage(image);
