@@ -62,6 +62,9 @@ void AddMapperOptions(MapOptions* options, CommandOptions* command) {
       "coarse poses as candidates beside P3P");
   add("use_priors_in_adjustment", &local.use_priors_in_adjustment,
       "sensor priors as terms of the bundle adjustment");
+  add("use_coarse_motions_in_parts", &local.use_coarse_motions_in_parts,
+      "the coarse motions of all pairs as terms of the parts' bundle "
+      "adjustments (the paper's eq. 8)");
   add("keypoint_sigma_px", &local.keypoint_sigma_px,
       "1 sigma of keypoints, weighs priors [px]");
   add("estimate_keypoint_sigma", &local.balance.estimate_keypoint_sigma,

@@ -19,6 +19,10 @@ struct LocalMapperOptions {
   InitialPairOptions initial_pair;
   // Terms of the sensor priors in the adjustments.
   bool use_priors_in_adjustment = true;
+  // The coarse motion of every pair of the augmented view graph as a term of a
+  // part's adjustments (paper, eq. 8). Off: the coarse model came from the same
+  // matches, which would count twice (docs/reference/mapper.md has figures).
+  bool use_coarse_motions_in_parts = false;
   // After an adjustment, observations beyond this error are removed, and points
   // below this angle.
   double filter_max_reproj_error_px = 4.0;

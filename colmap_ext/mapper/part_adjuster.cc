@@ -16,6 +16,11 @@ constexpr size_t kMaxNumConstantImages = 30;
 // What the next images, or the refinement of the whole, bring moves the part by
 // more.
 constexpr double kFunctionTolerance = 1e-3;
+// What a coarse motion is believed to.
+constexpr double kCoarseRotationSigmaRad = 0.02;
+constexpr double kCoarseDirectionSigmaRad = 0.1;
+// Below this length in units of the model a motion has no direction.
+constexpr double kMinCoarseLength = 1e-6;
 
 }  // namespace
 
@@ -25,6 +30,49 @@ std::vector<PosePriorEdge> FindPriorEdges(const MapperScene& scene,
   for (const RelativePosePrior& prior : scene.priors) {
     if (images.count(prior.image_id1) && images.count(prior.image_id2)) {
       edges.push_back(PosePriorEdgeFromPrior(prior));
+    }
+  }
+  return edges;
+}
+
+std::optional<PosePriorEdge> CoarseEdge(const MapperScene& scene,
+                                        image_t image_id1, image_t image_id2) {
+  const auto coarse1 = scene.coarse->find(image_id1);
+  const auto coarse2 = scene.coarse->find(image_id2);
+  if (coarse1 == scene.coarse->end() || coarse2 == scene.coarse->end()) {
+    return std::nullopt;
+  }
+  PosePriorEdge edge;
+  edge.image_id1 = image_id1;
+  edge.image_id2 = image_id2;
+  edge.cam2_from_cam1 = ComputeCam2FromCam1(coarse1->second, coarse2->second);
+  edge.rotation_sigma_rad = kCoarseRotationSigmaRad;
+  if (edge.cam2_from_cam1.translation.norm() > kMinCoarseLength) {
+    edge.direction_sigma_rad = kCoarseDirectionSigmaRad;
+  }
+  return edge;
+}
+
+std::vector<PosePriorEdge> FindCoarseEdges(const MapperScene& scene,
+                                           const std::set<image_t>& images) {
+  std::set<std::pair<image_t, image_t>> pairs;
+  const auto add = [&](image_t image_id1, image_t image_id2) {
+    if (images.count(image_id2)) {
+      pairs.insert(std::minmax(image_id1, image_id2));
+    }
+  };
+  for (const image_t image_id : images) {
+    for (const auto& [neighbor, num_matches] : scene.neighbors.at(image_id)) {
+      add(image_id, neighbor);
+    }
+  }
+  for (const RelativePosePrior& prior : scene.priors) {
+    if (images.count(prior.image_id1)) add(prior.image_id1, prior.image_id2);
+  }
+  std::vector<PosePriorEdge> edges;
+  for (const auto& [image_id1, image_id2] : pairs) {
+    if (const auto edge = CoarseEdge(scene, image_id1, image_id2)) {
+      edges.push_back(*edge);
     }
   }
   return edges;
@@ -76,10 +124,14 @@ void PartAdjuster::AdjustImages(const std::set<image_t>& images,
   PriorBundleAdjustmentProblem problem;
   problem.images = images;
   problem.constant_images = constant_images;
+  std::set<image_t> all = images;
+  all.insert(constant_images.begin(), constant_images.end());
   if (options_.use_priors_in_adjustment) {
-    std::set<image_t> all = images;
-    all.insert(constant_images.begin(), constant_images.end());
     problem.priors = FindPriorEdges(scene_, all);
+  }
+  if (options_.use_coarse_motions_in_parts) {
+    const std::vector<PosePriorEdge> coarse = FindCoarseEdges(scene_, all);
+    problem.priors.insert(problem.priors.end(), coarse.begin(), coarse.end());
   }
   PriorBundleAdjustmentOptions options;
   options.keypoint_sigma_px = options_.keypoint_sigma_px;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <optional>
 #include <set>
 #include <vector>
 
@@ -14,6 +15,17 @@ namespace adasfm {
 // The priors among the images, as terms of an adjustment.
 std::vector<PosePriorEdge> FindPriorEdges(const MapperScene& scene,
                                           const std::set<image_t>& images);
+
+// The motion from the first to the second image in the coarse model, as loose
+// terms of rotation and, unless it is too short, direction. None where the
+// coarse model lacks one of them.
+std::optional<PosePriorEdge> CoarseEdge(const MapperScene& scene,
+                                        image_t image_id1, image_t image_id2);
+
+// Those of all pairs of the augmented view graph among the images: pairs with
+// matches or with a prior.
+std::vector<PosePriorEdge> FindCoarseEdges(const MapperScene& scene,
+                                           const std::set<image_t>& images);
 
 // The bundle adjustments of a part that grows, with priors, each followed by
 // the filters of points. Vision's weight against the priors is kept from one to

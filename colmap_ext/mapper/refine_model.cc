@@ -2,6 +2,9 @@
 #include "colmap_ext/mapper/refine_model.h"
 
 #include <algorithm>
+#include <cmath>
+#include <map>
+#include <optional>
 #include <stdexcept>
 #include <utility>
 #include <vector>
@@ -12,6 +15,7 @@
 #include "colmap_ext/mapper/prior_support.h"
 #include "colmap_ext/mapper/register_image.h"
 #include "colmap_ext/scene/georeference.h"
+#include "core/disjoint_sets.h"
 #include "core/release_memory.h"
 
 namespace adasfm {
@@ -21,9 +25,7 @@ namespace {
 constexpr size_t kMinNumPointsToHold = 20;
 // And with fewer than this nothing is known of its pose.
 constexpr size_t kMinNumPointsToKeep = 6;
-// How weak the ties of such images to the coarse motion are.
-constexpr double kCoarseRotationSigmaRad = 0.02;
-constexpr double kCoarseDirectionSigmaRad = 0.1;
+// How weak the ties of such images to the coarse motion's length are.
 constexpr double kCoarseLengthSigmaRatio = 0.2;
 constexpr size_t kMaxNumCoarseEdges = 4;
 // What no vision error and no calibration error explains.
@@ -94,37 +96,39 @@ class ModelRefiner {
     }
   }
 
+  // Whether sensors know its whole motion to another image of the model.
+  bool HasMotionPrior(image_t image_id) const {
+    const auto indices = scene_.priors_of_image.find(image_id);
+    if (indices == scene_.priors_of_image.end()) return false;
+    return std::any_of(
+        indices->second.begin(), indices->second.end(), [this](size_t i) {
+          const RelativePosePrior& prior = scene_.priors[i];
+          return prior.HasMotion() &&
+                 IsRegistered(reconstruction_, prior.image_id1) &&
+                 IsRegistered(reconstruction_, prior.image_id2);
+        });
+  }
+
   // For images on few points, the coarse motion to registered neighbours.
   void AddCoarseEdges(std::vector<PosePriorEdge>* edges) const {
     for (const image_t image_id : RegisteredImages(reconstruction_)) {
-      const auto coarse = scene_.coarse->find(image_id);
-      if (coarse == scene_.coarse->end() ||
-          reconstruction_.Image(image_id).NumPoints3D() >=
+      if (reconstruction_.Image(image_id).NumPoints3D() >=
               kMinNumPointsToHold ||
-          (local_.use_priors_in_adjustment &&
-           scene_.priors_of_image.count(image_id))) {
+          (local_.use_priors_in_adjustment && HasMotionPrior(image_id))) {
         continue;
       }
       size_t num_edges = 0;
       for (const auto& [neighbor, num_matches] :
            scene_.neighbors.at(image_id)) {
-        const auto coarse_neighbor = scene_.coarse->find(neighbor);
-        if (coarse_neighbor == scene_.coarse->end() ||
-            !IsRegistered(reconstruction_, neighbor)) {
-          continue;
+        if (!IsRegistered(reconstruction_, neighbor)) continue;
+        std::optional<PosePriorEdge> edge =
+            CoarseEdge(scene_, neighbor, image_id);
+        if (!edge) continue;
+        if (std::isfinite(edge->direction_sigma_rad)) {
+          edge->length_sigma_m =
+              kCoarseLengthSigmaRatio * edge->cam2_from_cam1.translation.norm();
         }
-        PosePriorEdge edge;
-        edge.image_id1 = neighbor;
-        edge.image_id2 = image_id;
-        edge.cam2_from_cam1 =
-            ComputeCam2FromCam1(coarse_neighbor->second, coarse->second);
-        edge.rotation_sigma_rad = kCoarseRotationSigmaRad;
-        const double length = edge.cam2_from_cam1.translation.norm();
-        if (length > 1e-6) {
-          edge.direction_sigma_rad = kCoarseDirectionSigmaRad;
-          edge.length_sigma_m = kCoarseLengthSigmaRatio * length;
-        }
-        edges->push_back(edge);
+        edges->push_back(*edge);
         if (++num_edges == kMaxNumCoarseEdges) break;
       }
     }
@@ -189,6 +193,7 @@ class ModelRefiner {
             balance, options, problem, &reconstruction_, keypoint_sigma_factor);
     summary_.num_iterations += adjustment.num_iterations;
     summary_.keypoint_sigma_px = adjustment.keypoint_sigma_px;
+    summary_.keypoint_sigma_ratios = adjustment.keypoint_sigma_ratios;
     summary_.prior_chi2_per_dof = adjustment.prior_chi2_per_dof;
   }
 
@@ -253,12 +258,31 @@ class ModelRefiner {
     return !images.empty();
   }
 
-  // A coarse pose that neither points nor priors confirm is only a guess.
+  // A pose that neither points nor a chain of known motions from an image with
+  // points confirms is only a guess of the coarse model.
   void LeaveOutUnsupportedImages() {
-    for (const image_t image_id : RegisteredImages(reconstruction_)) {
-      if (scene_.priors_of_image.count(image_id) > 0 ||
-          reconstruction_.Image(image_id).NumPoints3D() >=
-              kMinNumPointsToKeep) {
+    const std::set<image_t> images = RegisteredImages(reconstruction_);
+    std::map<image_t, int> index_of_image;
+    for (const image_t image_id : images) {
+      index_of_image.emplace(image_id, static_cast<int>(index_of_image.size()));
+    }
+    DisjointSets chains(images.size());
+    for (const RelativePosePrior& prior : scene_.priors) {
+      if (prior.HasMotion() && images.count(prior.image_id1) &&
+          images.count(prior.image_id2)) {
+        chains.Join(index_of_image.at(prior.image_id1),
+                    index_of_image.at(prior.image_id2));
+      }
+    }
+    std::set<int> supported_chains;
+    for (const image_t image_id : images) {
+      if (reconstruction_.Image(image_id).NumPoints3D() >=
+          kMinNumPointsToKeep) {
+        supported_chains.insert(chains.Find(index_of_image.at(image_id)));
+      }
+    }
+    for (const image_t image_id : images) {
+      if (supported_chains.count(chains.Find(index_of_image.at(image_id)))) {
         continue;
       }
       scene_.mapper.Deregister(image_id);

@@ -87,6 +87,7 @@ void AddLocalOptions(const LocalMapperOptions& local, Hash* hash) {
   hash->Add(local.registration.use_global_candidate);
   hash->Add(local.initial_pair.max_epipolar_error_px);
   hash->Add(local.use_priors_in_adjustment);
+  hash->Add(local.use_coarse_motions_in_parts);
   hash->Add(local.filter_max_reproj_error_px);
   hash->Add(local.min_triangulation_angle_deg);
   hash->Add(local.global_adjustment_growth);

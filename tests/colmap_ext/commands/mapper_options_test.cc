@@ -22,6 +22,8 @@ const std::vector<OptionCase<Options>>& Cases() {
                     stage.local.registration.use_global_candidate),
       ADASFM_OPTION("Mapper.use_priors_in_adjustment", 0,
                     stage.local.use_priors_in_adjustment),
+      ADASFM_OPTION("Mapper.use_coarse_motions_in_parts", 1,
+                    stage.local.use_coarse_motions_in_parts),
       ADASFM_OPTION("Mapper.keypoint_sigma_px", 1,
                     stage.local.keypoint_sigma_px),
       ADASFM_OPTION("Mapper.estimate_keypoint_sigma", 0,

@@ -3,7 +3,10 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+
 #include "colmap_ext/host/pose_conversion.h"
+#include "colmap_ext/mapper/part_adjuster.h"
 #include "colmap_ext/mapper/prior_support.h"
 #include "colmap_ext/mapper/register_image.h"
 #include "tests/testing/colmap_ext/mapper_world.h"
@@ -88,6 +91,78 @@ TEST(LocalMapper, GlobalCandidateCanBeSwitchedOff) {
       options, world.data, world.coarse_poses, AllImages(world));
   EXPECT_EQ(result.num_registered_by_global_pose, 0);
   EXPECT_EQ(result.reconstruction.NumRegImages(), 30);
+}
+
+TEST(CoarseEdges, AreThoseOfTheAugmentedGraph) {
+  MapperWorldOptions options = SmallWorld(1);
+  options.world.num_blackouts = 1;
+  options.world.blackout_num_images = 3;
+  MapperWorld world = BuildMapperWorld(options);
+  const image_t lost = world.coarse_poses.begin()->first;
+  world.coarse_poses.erase(lost);
+  const std::set<image_t> images = AllImages(world);
+  const auto scene = BuildMapperScene(world.data, world.coarse_poses, images);
+  std::set<std::pair<image_t, image_t>> expected;
+  for (const ScenePair& pair : world.data.pairs) {
+    expected.insert(std::minmax(pair.image_id1, pair.image_id2));
+  }
+  const size_t num_matched = expected.size();
+  for (const RelativePosePrior& prior : world.data.priors) {
+    expected.insert(std::minmax(prior.image_id1, prior.image_id2));
+  }
+  ASSERT_GT(expected.size(), num_matched);
+  std::set<std::pair<image_t, image_t>> found;
+  for (const PosePriorEdge& edge : FindCoarseEdges(*scene, images)) {
+    EXPECT_TRUE(found.emplace(edge.image_id1, edge.image_id2).second);
+    EXPECT_TRUE(
+        PosesNear(edge.cam2_from_cam1,
+                  ComputeCam2FromCam1(world.coarse_poses.at(edge.image_id1),
+                                      world.coarse_poses.at(edge.image_id2)),
+                  1e-12, 1e-12));
+    EXPECT_TRUE(std::isfinite(edge.rotation_sigma_rad));
+    EXPECT_TRUE(std::isfinite(edge.direction_sigma_rad));
+    EXPECT_FALSE(std::isfinite(edge.length_sigma_m));
+    EXPECT_LT(edge.dt_s, 0.0);
+  }
+  for (auto it = expected.begin(); it != expected.end();) {
+    const bool is_known = it->first != lost && it->second != lost;
+    it = is_known ? std::next(it) : expected.erase(it);
+  }
+  EXPECT_EQ(found, expected);
+}
+
+// Where keypoints hardly count, the part is bent as the coarse model is.
+TEST(LocalMapper, CoarseMotionsDrawThePart) {
+  const MapperWorld world = BuildMapperWorld(SmallWorld(1));
+  const auto mean_angle_to_coarse_rad = [&world](bool use_coarse_motions) {
+    LocalMapperOptions options;
+    options.use_priors_in_adjustment = false;
+    options.use_coarse_motions_in_parts = use_coarse_motions;
+    options.keypoint_sigma_px = 1e3;
+    const colmap::Reconstruction model =
+        ReconstructLocally(options, world.data, world.coarse_poses,
+                           AllImages(world))
+            .reconstruction;
+    double sum_rad = 0.0;
+    int count = 0;
+    for (const RelativePosePrior& prior : world.data.priors) {
+      if (!IsRegistered(model, prior.image_id1) ||
+          !IsRegistered(model, prior.image_id2)) {
+        continue;
+      }
+      sum_rad += AngleBetweenRad(
+          ComputeCam2FromCam1(CamFromWorld(model.Image(prior.image_id1)),
+                              CamFromWorld(model.Image(prior.image_id2)))
+              .rotation,
+          ComputeCam2FromCam1(world.coarse_poses.at(prior.image_id1),
+                              world.coarse_poses.at(prior.image_id2))
+              .rotation);
+      ++count;
+    }
+    return sum_rad / count;
+  };
+  EXPECT_LT(mean_angle_to_coarse_rad(true),
+            0.1 * mean_angle_to_coarse_rad(false));
 }
 
 TEST(LocalMapper, FewGlobalAdjustments) {

@@ -130,16 +130,21 @@ TEST_F(MapperStageTest, GapsDoNotDependOnTheCoarsePoses) {
   }
 }
 
-// Without priors nothing says where they are but a coarse pose.
+// Nothing says where they are but a coarse pose: without priors, or with those
+// of a gyroscope alone or of a speed alone.
 TEST_F(MapperStageTest, ImagesThatNothingHoldsAreLeftOut) {
-  for (uint64_t seed = 1; seed <= 2; ++seed) {
+  const uint32_t kNoPriors = 0;
+  for (const uint32_t flags :
+       {kNoPriors, uint32_t{kPriorRotation}, uint32_t{kPriorLength}}) {
+    std::filesystem::remove_all(folder_);
     MapperWorldOptions options;
     options.world.num_images = 60;
-    options.world.seed = seed;
+    options.world.seed = 1 + flags;
     options.world.num_blackouts = 1;
     options.world.blackout_num_images = 3;
-    options.priors.enabled = false;
-    const MapperWorld world = BuildMapperWorld(options);
+    options.priors.enabled = flags != kNoPriors;
+    MapperWorld world = BuildMapperWorld(options);
+    for (RelativePosePrior& prior : world.data.priors) prior.flags = flags;
     const auto poses = Run(world);
     for (const auto& [image_id, image] : world.data.images) {
       EXPECT_EQ(poses.count(image_id), image.keypoints.empty() ? 0 : 1)
