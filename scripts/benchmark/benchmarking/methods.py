@@ -26,6 +26,9 @@ ABLATIONS = {
         ('candidates', 'mapper', 'AdaSfmMapper', 'use_global_candidate'),
         ('priors_in_adjustment', 'mapper', 'AdaSfmMapper',
          'use_priors_in_adjustment'))}
+# The paper's own terms in the adjustments of parts (eq. 8).
+ABLATIONS['adasfm_coarse_motions'] = {
+    'mapper': ['--AdaSfmMapper.use_coarse_motions_in_parts', '1']}
 # The alignment of parts with one threshold for all, in metres.
 ABLATIONS.update({
     'adasfm_fixed_threshold_%s' % metres: {
@@ -213,10 +216,12 @@ def run_method(name, method, folder, source, args):
   records = [_record(name, method, steps, score('model'))]
   records[0]['models'] = list_models(os.path.join(folder, 'model'),
                                      ground_truth, args, log_path)
+  if method.startswith('adasfm'):
+    records[0]['coarse_evaluation'] = score(os.path.join('global', '0'))
   if method == 'adasfm':
     coarse = {k: steps[k] for k in ('import', 'global')}
     records.insert(0, _record(name, 'adasfm_global', coarse,
-                              score(os.path.join('global', '0'))))
+                              records[0]['coarse_evaluation']))
     if write_prior_trajectory(database, os.path.join(folder, 'priors')):
       records.insert(0, _record(name, 'priors_only',
                                 {'import': steps['import']}, score('priors')))

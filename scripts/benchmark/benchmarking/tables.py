@@ -38,8 +38,12 @@ def ordered(records, field):
   return list(dict.fromkeys(record[field] for record in records))
 
 
+def error_of(evaluation):
+  return evaluation['sim3_least_squares']['translation_rmse_m']
+
+
 def sim3_error(record):
-  return record['evaluation']['sim3_least_squares']['translation_rmse_m']
+  return error_of(record['evaluation'])
 
 
 def ratio(value, base):
@@ -122,11 +126,10 @@ def accuracy_table(records, methods):
 
 
 def ablation_table(records):
-  """A line per variant of AdaSfM: images, error in m and CPU s per set."""
+  """A line per variant of AdaSfM: images, errors in m and CPU s per set."""
   runs = middle_runs(records)
   methods = [m for m in ordered(records, 'method')
-             if m == 'adasfm' or m.startswith('adasfm_no_') or
-             m.startswith('adasfm_fixed_')]
+             if m.startswith('adasfm') and m != 'adasfm_global']
   if len(methods) < 2:
     return ''
   names = [name for name in ordered(records, 'set')
@@ -138,8 +141,10 @@ def ablation_table(records):
     for name in names:
       record = runs.get((name, method))
       e = record and record['evaluation']
-      cells.append('%d/%d, %.3f m, %.0f s' %
+      coarse = e and record.get('coarse_evaluation')
+      cells.append('%d/%d, %.3f m%s, %.0f s' %
                    (e['num_images'], e['num_true_images'], sim3_error(record),
+                    ' (coarse %.3f)' % error_of(coarse) if coarse else '',
                     record['cpu_seconds']) if e else '-')
     lines.append('| %s | %s |' % (name_of(method).strip('*'),
                                   ' | '.join(cells)))
