@@ -109,20 +109,13 @@ std::vector<std::vector<int>> FindNeighbors(
   return neighbors;
 }
 
-// Whether the factor of the reduced camera system is no larger than the options
-// allow. Drives, nearly banded, stay far below.
-bool HasSmallFactor(const PriorBundleAdjustmentOptions& options,
-                    const std::set<image_t>& images,
+// Whether the factor of the reduced camera system is no larger than that of so
+// many images that all see each other. Drives, nearly banded, stay far below.
+bool HasSmallFactor(size_t num_full_images, const std::set<image_t>& images,
                     const colmap::Reconstruction& reconstruction) {
-  constexpr double kBytesPerBlock = 6 * 6 * sizeof(double);
-  const size_t num_full_images = options.max_num_images_sparse;
   if (images.size() <= num_full_images) return true;
-  const size_t num_blocks =
-      CountFactorBlocks(FindNeighbors(images, reconstruction));
-  return num_blocks <= num_full_images * (num_full_images - 1) / 2 ||
-         kBytesPerBlock * num_blocks <=
-             options.max_factor_bytes_per_observation *
-                 reconstruction.ComputeNumObservations();
+  return CountFactorBlocks(FindNeighbors(images, reconstruction)) <=
+         num_full_images * (num_full_images - 1) / 2;
 }
 
 int NumThreads(const PriorBundleAdjustmentOptions& options,
@@ -253,9 +246,7 @@ bool PriorBundleAdjustmentOptions::IsValid(std::string* error) const {
                       "reproj_loss_scale_px", reproj_loss_scale_px,
                       "must be finite")
              .AtLeast(1, "max_num_iterations", max_num_iterations)
-             .NotNegative({{"function_tolerance", function_tolerance},
-                           {"max_factor_bytes_per_observation",
-                            max_factor_bytes_per_observation}})
+             .NotNegative({{"function_tolerance", function_tolerance}})
              .AtLeast(max_num_images_dense, "max_num_images_sparse",
                       max_num_images_sparse)
              .AllHold() &&
@@ -276,8 +267,8 @@ PriorBundleAdjustmentSummary AdjustBundle(
   summary.prior_sigma_factors = options.prior_sigma_factors;
   PriorBundleAdjustmentProblem with_windows = problem;
   AssignWindows(options.shared_errors, &with_windows.priors);
-  const bool has_small_factor =
-      HasSmallFactor(options, problem.images, *reconstruction);
+  const bool has_small_factor = HasSmallFactor(options.max_num_images_sparse,
+                                               problem.images, *reconstruction);
   BundleProblem bundle(options, with_windows, *reconstruction,
                        /*may_keep_points_apart=*/has_small_factor);
   summary.num_images = bundle.NumImages();

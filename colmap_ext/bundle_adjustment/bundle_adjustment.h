@@ -106,14 +106,9 @@ struct PriorBundleAdjustmentOptions {
   // to rounding only. One thread repeats them bit by bit. -1: all.
   int num_threads = 1;
   // Where Ceres solves (docs/reference/math.md), up to so many images densely;
-  // iteratively what has a larger factor than the second number of images that
-  // all see each other, and than so many bytes for each observation: those that
-  // Ceres' Jacobian, which an iterative solver needs, takes more than ours.
-  // With the reduced system 30,000 images then take a fifth more memory and
-  // less than two thirds of the time.
+  // what has a larger factor than the second number of them iteratively.
   int max_num_images_dense = 50;
   int max_num_images_sparse = 4000;
-  double max_factor_bytes_per_observation = 466.0;
 
   bool RefinesCameras() const {
     return refine_focal_length || refine_principal_point || refine_extra_params;

@@ -302,7 +302,6 @@ TEST(AdjustBundleTest, EverySizeOfSolverGivesTheSame) {
     PriorBundleAdjustmentOptions options = ConvergeFully();
     options.max_num_images_dense = dense;
     options.max_num_images_sparse = sparse;
-    if (sparse == 0) options.max_factor_bytes_per_observation = 0.0;
     costs.push_back(
         AdjustBundle(options, ProblemOfAll(reconstruction), &reconstruction)
             .final_cost);
