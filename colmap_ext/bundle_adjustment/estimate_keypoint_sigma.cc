@@ -54,7 +54,7 @@ struct Residuals {
   }
 };
 
-// None when the point lies behind an image, or when two see it.
+// None when the point lies behind an image, or when only two see it.
 std::optional<double> EstimateVariance(
     const colmap::Reconstruction& reconstruction,
     const std::map<image_t, Rigid3d>& poses, const colmap::Point3D& point) {
