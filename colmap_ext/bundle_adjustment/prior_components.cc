@@ -117,19 +117,6 @@ PriorComponents ComputePriorComponents(
   return components;
 }
 
-double LargestNumSigmas(const PosePriorEdge& prior,
-                        const colmap::Reconstruction& reconstruction) {
-  const std::optional<TermErrors> errors = ErrorsAt(prior, reconstruction);
-  double largest = 0.0;
-  for (int k = 0; errors && k < kNumPriorTerms; ++k) {
-    const double sigma = prior.SigmaOf(static_cast<PriorTerm>(k));
-    if (std::isfinite(sigma)) {
-      largest = std::max(largest, (*errors)[k].norm() / sigma);
-    }
-  }
-  return largest;
-}
-
 double LargestMeanSquare(const PriorComponents& components) {
   double largest = 0.0;
   for (const PriorComponent& component : components) {

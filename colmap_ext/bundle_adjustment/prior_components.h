@@ -54,10 +54,6 @@ PriorComponents ComputePriorComponents(
     const PriorSigmaFactors& factors, const std::vector<PosePriorEdge>& priors,
     const colmap::Reconstruction& reconstruction);
 
-// How many sigmas the prior's worst term is off; 0 when an image is missing.
-double LargestNumSigmas(const PosePriorEdge& prior,
-                        const colmap::Reconstruction& reconstruction);
-
 // The largest of the kinds; 0 without priors.
 double LargestMeanSquare(const PriorComponents& components);
 double LargestChi2PerDof(const PriorComponents& components);

@@ -17,7 +17,6 @@
 namespace adasfm {
 namespace {
 
-constexpr double kViolatedNumSigmas = 10.0;
 // Made-up keypoints have no noise, and weights need an end.
 constexpr double kMinKeypointSigmaPx = 0.02;
 // Relative change of the cost at which an adjustment of the search ends.
@@ -242,14 +241,6 @@ double ComputePriorMeanSquare(const std::vector<PosePriorEdge>& priors,
                               const colmap::Reconstruction& reconstruction) {
   return LargestMeanSquare(
       ComputePriorComponents({1.0, 1.0, 1.0, 1.0}, priors, reconstruction));
-}
-
-int CountViolatedPriors(const std::vector<PosePriorEdge>& priors,
-                        const colmap::Reconstruction& reconstruction) {
-  return std::count_if(
-      priors.begin(), priors.end(), [&](const PosePriorEdge& edge) {
-        return LargestNumSigmas(edge, reconstruction) > kViolatedNumSigmas;
-      });
 }
 
 PriorBundleAdjustmentSummary AdjustBundleWithVarianceComponents(

@@ -42,12 +42,6 @@ struct VarianceComponentOptions {
 double ComputePriorMeanSquare(const std::vector<PosePriorEdge>& priors,
                               const colmap::Reconstruction& reconstruction);
 
-// The priors of which a term is more than ten sigmas off: a model that folds
-// two look-alike places together tears a few of them and leaves all others
-// alone.
-int CountViolatedPriors(const std::vector<PosePriorEdge>& priors,
-                        const colmap::Reconstruction& reconstruction);
-
 // AdjustBundle, with the keypoint sigma balanced against the problem's priors.
 // keypoint_sigma_factor (>= 1) multiplies the estimated sigma, or
 // options.keypoint_sigma_px; it is where the search begins and holds what was

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "colmap_ext/host/pose_conversion.h"
 #include "core/so3.h"
 
 namespace adasfm {
@@ -45,6 +46,22 @@ bool IsSupportedByPrior(const PriorSupportOptions& options,
   }
   return (cam2_from_cam1.translation - prior.cam2_from_cam1.translation)
              .norm() <= tolerance_m;
+}
+
+std::optional<bool> IsTorn(const RelativePosePrior& prior,
+                           const colmap::Reconstruction& model) {
+  if (prior.flags & kPriorWheelSlip || !IsRegistered(model, prior.image_id1) ||
+      !IsRegistered(model, prior.image_id2)) {
+    return std::nullopt;
+  }
+  PriorSupportOptions options;
+  options.rotation_tolerance_rad = 0.1;
+  options.translation_tolerance_ratio = 0.5;
+  options.translation_tolerance_m = 0.5;
+  return !IsSupportedByPrior(
+      options, prior,
+      ComputeCam2FromCam1(CamFromWorld(model.Image(prior.image_id1)),
+                          CamFromWorld(model.Image(prior.image_id2))));
 }
 
 }  // namespace adasfm

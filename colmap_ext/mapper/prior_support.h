@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <optional>
+
+#include "colmap_ext/host/colmap.h"
 #include "colmap_ext/scene/scene_data.h"
 #include "core/rigid3d.h"
 
@@ -18,5 +21,12 @@ struct PriorSupportOptions {
 bool IsSupportedByPrior(const PriorSupportOptions& options,
                         const RelativePosePrior& prior,
                         const Rigid3d& cam2_from_cam1);
+
+// Whether the model contradicts the prior by what no error of vision or of the
+// calibration explains: two look-alike places that are folded together, or an
+// image at a wrong place, tear the priors there. None where wheels slipped or
+// the model lacks an image.
+std::optional<bool> IsTorn(const RelativePosePrior& prior,
+                           const colmap::Reconstruction& model);
 
 }  // namespace adasfm

@@ -28,10 +28,6 @@ constexpr size_t kMinNumPointsToKeep = 6;
 // How weak the ties of such images to the coarse motion's length are.
 constexpr double kCoarseLengthSigmaRatio = 0.2;
 constexpr size_t kMaxNumCoarseEdges = 4;
-// What no vision error and no calibration error explains.
-constexpr double kContradictionRotationRad = 0.1;
-constexpr double kContradictionTranslationRatio = 0.5;
-constexpr double kContradictionTranslationM = 0.5;
 
 class ModelRefiner {
  public:
@@ -207,18 +203,6 @@ class ModelRefiner {
     problem->gravity_sigma_rad = verticals.sigma_rad;
   }
 
-  bool IsContradicted(const RelativePosePrior& prior) const {
-    PriorSupportOptions options;
-    options.rotation_tolerance_rad = kContradictionRotationRad;
-    options.translation_tolerance_ratio = kContradictionTranslationRatio;
-    options.translation_tolerance_m = kContradictionTranslationM;
-    return !IsSupportedByPrior(
-        options, prior,
-        ComputeCam2FromCam1(
-            CamFromWorld(reconstruction_.Image(prior.image_id1)),
-            CamFromWorld(reconstruction_.Image(prior.image_id2))));
-  }
-
   // The images all of whose usable priors are contradicted.
   std::set<image_t> FindContradictedImages() const {
     std::set<image_t> contradicted;
@@ -226,14 +210,10 @@ class ModelRefiner {
       int num_usable = 0;
       int num_contradicted = 0;
       for (const size_t i : indices) {
-        const RelativePosePrior& prior = scene_.priors[i];
-        if (prior.flags & kPriorWheelSlip ||
-            !IsRegistered(reconstruction_, prior.image_id1) ||
-            !IsRegistered(reconstruction_, prior.image_id2)) {
-          continue;
-        }
-        ++num_usable;
-        num_contradicted += IsContradicted(prior);
+        const std::optional<bool> is_torn =
+            IsTorn(scene_.priors[i], reconstruction_);
+        num_usable += is_torn.has_value();
+        num_contradicted += is_torn.value_or(false);
       }
       if (num_contradicted > 0 && num_contradicted == num_usable &&
           scene_.coarse->count(image_id)) {

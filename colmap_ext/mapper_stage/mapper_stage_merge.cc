@@ -5,7 +5,7 @@
 #include <optional>
 #include <utility>
 
-#include "colmap_ext/mapper/part_adjuster.h"
+#include "colmap_ext/mapper/prior_support.h"
 #include "colmap_ext/mapper_stage/mapper_fingerprint.h"
 #include "colmap_ext/mapper_stage/mapper_stage.h"
 #include "colmap_ext/mapper_stage/mapper_steps.h"
@@ -55,9 +55,12 @@ double FindSmallestSigmaFactor(const std::vector<PartReport>& parts,
   return smallest.value_or(1.0);
 }
 
-int CountViolated(const MapperScene& scene) {
-  return CountViolatedPriors(FindPriorEdges(scene, scene.images),
-                             scene.reconstruction);
+int CountTornPriors(const MapperScene& scene) {
+  return std::count_if(
+      scene.priors.begin(), scene.priors.end(),
+      [&scene](const RelativePosePrior& prior) {
+        return IsTorn(prior, scene.reconstruction).value_or(false);
+      });
 }
 
 }  // namespace
@@ -121,12 +124,12 @@ Status MapperStage::MergePartModels(const std::string& fingerprint) {
 
 void MapperStage::FallBackToCoarsePoses(std::unique_ptr<MapperScene>* scene) {
   if (!options_.local.use_priors_in_adjustment) return;
-  const int num_violated = CountViolated(**scene);
-  if (num_violated == 0) return;
+  const int num_torn = CountTornPriors(**scene);
+  if (num_torn == 0) return;
   auto coarse_scene = BuildMapperScene(data_, coarse_, (*scene)->images);
   RegisterAtCoarsePoses(coarse_scene.get());
   // Priors that tear in the coarse model too are wrong themselves.
-  if (num_violated <= CountViolated(*coarse_scene)) return;
+  if (num_torn <= CountTornPriors(*coarse_scene)) return;
   Report("the parts contradict the priors; refining the coarse poses", 0.9);
   RefineModelOptions options = options_.refine;
   options.join_parts = false;
@@ -139,7 +142,7 @@ void MapperStage::FallBackToCoarsePoses(std::unique_ptr<MapperScene>* scene) {
     }
     RefineModel(options, options_.local, round, coarse_scene.get(), &refined);
   }
-  if (CountViolated(*coarse_scene) >= num_violated) return;
+  if (CountTornPriors(*coarse_scene) >= num_torn) return;
   summary_.refine = refined;
   summary_.started_from_coarse_poses = true;
   *scene = std::move(coarse_scene);

@@ -30,9 +30,6 @@ TEST(ComputePriorMeanSquare, IsZeroAtThePriorsAndCapsWhatIsWild) {
   std::vector<PosePriorEdge> wild = priors;
   wild[5].cam2_from_cam1.translation *= 1e3;
   EXPECT_NEAR(ComputePriorMeanSquare(wild, model), 9.0 / priors.size(), 1e-6);
-  EXPECT_EQ(CountViolatedPriors(priors, model), 0);
-  EXPECT_EQ(CountViolatedPriors(longer, model), 0);
-  EXPECT_EQ(CountViolatedPriors(wild, model), 1);
   EXPECT_EQ(ComputePriorMeanSquare({}, model), 0.0);
 }
 

@@ -1,0 +1,89 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "colmap_ext/mapper/prior_support.h"
+
+#include <gtest/gtest.h>
+
+#include <optional>
+#include <vector>
+
+#include "colmap_ext/host/pose_conversion.h"
+#include "core/so3.h"
+#include "tests/testing/colmap_ext/mapper_drive.h"
+
+namespace adasfm {
+namespace {
+
+// The indices of the torn priors; all others can be told.
+std::vector<size_t> FindTorn(const std::vector<RelativePosePrior>& priors,
+                             const colmap::Reconstruction& model) {
+  std::vector<size_t> torn;
+  for (size_t i = 0; i < priors.size(); ++i) {
+    const std::optional<bool> is_torn = IsTorn(priors[i], model);
+    EXPECT_TRUE(is_torn.has_value());
+    if (is_torn.value_or(false)) torn.push_back(i);
+  }
+  return torn;
+}
+
+class IsTornTest : public testing::TestWithParam<uint64_t> {
+ protected:
+  // The images from the 60th on are moved as one, as a wrong loop moves them.
+  void MoveRest(const Rigid3d& world_from_moved) {
+    for (const image_t image_id : model_.RegImageIds()) {
+      if (image_id < kFirstMoved) continue;
+      colmap::Image& image = model_.Image(image_id);
+      SetCamFromWorld(CamFromWorld(image) * world_from_moved.Inverse(), &image);
+    }
+  }
+  std::vector<size_t> PriorsAcross() const {
+    std::vector<size_t> across;
+    for (size_t i = 0; i < priors_.size(); ++i) {
+      if (priors_[i].image_id1 < kFirstMoved &&
+          priors_[i].image_id2 >= kFirstMoved) {
+        across.push_back(i);
+      }
+    }
+    return across;
+  }
+
+  static constexpr image_t kFirstMoved = 60;
+  const MapperWorld world_ = BuildDrive(GetParam());
+  colmap::Reconstruction model_ = Reconstruct(world_);
+  std::vector<RelativePosePrior> priors_ = world_.data.priors;
+};
+
+TEST_P(IsTornTest, ManySigmasOfAFewMillimetresAreNoTear) {
+  EXPECT_TRUE(FindTorn(priors_, model_).empty());
+  for (RelativePosePrior& prior : priors_) prior.covariance *= 1e-6;
+  EXPECT_TRUE(FindTorn(priors_, model_).empty());
+}
+
+TEST_P(IsTornTest, AFoldTearsThePriorsThere) {
+  MoveRest(Rigid3d(Eigen::Quaterniond::Identity(), {8.0, 0.0, -4.0}));
+  EXPECT_EQ(FindTorn(priors_, model_), PriorsAcross());
+}
+
+// Of a gyroscope alone.
+TEST_P(IsTornTest, AWrongTurnTearsRotations) {
+  for (RelativePosePrior& prior : priors_) {
+    prior.flags = kPriorRotation;
+  }
+  MoveRest(Rigid3d(Eigen::Quaterniond::Identity(), {8.0, 0.0, -4.0}));
+  EXPECT_TRUE(FindTorn(priors_, model_).empty());
+  MoveRest(Rigid3d(ExpSo3({0.0, 0.3, 0.0}), Eigen::Vector3d::Zero()));
+  EXPECT_EQ(FindTorn(priors_, model_), PriorsAcross());
+}
+
+TEST_P(IsTornTest, SlipsAndMissingImagesTellNothing) {
+  RelativePosePrior prior = priors_[10];
+  prior.flags |= kPriorWheelSlip;
+  EXPECT_EQ(IsTorn(prior, model_), std::nullopt);
+  prior = priors_[10];
+  prior.image_id2 = 100000;
+  EXPECT_EQ(IsTorn(prior, model_), std::nullopt);
+}
+
+INSTANTIATE_TEST_SUITE_P(Seeds, IsTornTest, testing::Values(1, 2, 3));
+
+}  // namespace
+}  // namespace adasfm
