@@ -1,33 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "colmap_ext/bundle_adjustment/block_matrix.h"
 
-#include <Eigen/CholmodSupport>
 #include <algorithm>
-#include <new>
 #include <utility>
 
+#include "colmap_ext/bundle_adjustment/block_ordering.h"
+
 namespace adasfm {
-namespace {
-
-class BlockAnalysis
-    : public Eigen::CholmodSupernodalLLT<Eigen::SparseMatrix<double>> {
- public:
-  // The lower triangle; the values mean nothing.
-  explicit BlockAnalysis(const Eigen::SparseMatrix<double>& pattern) {
-    cholmod().print = 0;
-    cholmod().nmethods = 2;
-    cholmod().method[0].ordering = CHOLMOD_AMD;
-    cholmod().method[1].ordering = CHOLMOD_METIS;
-    analyzePattern(pattern);
-    if (m_cholmodFactor == nullptr) throw std::bad_alloc();
-  }
-  // By its new number, the old number of each block.
-  const int* Order() const {
-    return static_cast<const int*>(m_cholmodFactor->Perm);
-  }
-};
-
-}  // namespace
 
 int BlockMatrix::AddBlock(int size) {
   first_.push_back(num_columns_);
@@ -56,19 +35,16 @@ void BlockMatrix::AddPair(int block1, int block2) {
 }
 
 std::vector<int> BlockMatrix::Reorder() {
-  Eigen::SparseMatrix<double> pattern(NumBlocks(), NumBlocks());
-  for (int col = 0; col < NumBlocks(); ++col) {
-    columns_[col].Sort();
-    pattern.startVec(col);
-    pattern.insertBack(col, col) = 1.0;
-    for (const int row : columns_[col].rows) pattern.insertBack(row, col) = 1.0;
+  std::vector<std::vector<int>> rows_of;
+  for (Column& column : columns_) {
+    column.Sort();
+    rows_of.push_back(column.rows);
   }
-  pattern.finalize();
-  const BlockAnalysis analysis(pattern);
+  const BlockOrdering ordering = FindBlockOrdering(rows_of);
   std::vector<int> number_of(NumBlocks());
   BlockMatrix ordered;
   for (int number = 0; number < NumBlocks(); ++number) {
-    const int block = analysis.Order()[number];
+    const int block = ordering.block_of_number[number];
     number_of[block] = ordered.AddBlock(size_[block]);
   }
   for (int block = 0; block < NumBlocks(); ++block) {

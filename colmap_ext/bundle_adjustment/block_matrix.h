@@ -22,11 +22,10 @@ class BlockMatrix {
 
   // Makes room for what two blocks have in common, if there is none yet.
   void AddPair(int block1, int block2);
-  // Numbers the blocks anew so that a Cholesky factor has little fill: in
-  // postorder, by minimum degree or nested dissection, which CHOLMOD finds. The
-  // new number of each. A graph of blocks takes a 36th of the memory of that of
-  // a matrix of poses, and a matrix in order is factorised without a copy
-  // (ordered_cholesky.h). Throws where memory is short.
+  // Numbers the blocks anew so that a Cholesky factor has little fill
+  // (block_ordering.h); the new number of each. A graph of blocks takes a 36th
+  // of the memory of that of a matrix of poses, and a matrix in order is
+  // factorised without a copy (ordered_cholesky.h).
   std::vector<int> Reorder();
   // Fixes the pattern; all values are zero.
   void Allocate();

@@ -7,8 +7,8 @@
 #include <stdexcept>
 #include <unordered_map>
 
+#include "colmap_ext/bundle_adjustment/block_ordering.h"
 #include "colmap_ext/bundle_adjustment/bundle_problem.h"
-#include "colmap_ext/bundle_adjustment/factor_size.h"
 #include "colmap_ext/bundle_adjustment/minimize_bundle.h"
 #include "colmap_ext/bundle_adjustment/position_priors.h"
 #include "colmap_ext/bundle_adjustment/reduced_system.h"
@@ -114,8 +114,8 @@ std::vector<std::vector<int>> FindNeighbors(
 bool HasSmallFactor(size_t num_full_images, const std::set<image_t>& images,
                     const colmap::Reconstruction& reconstruction) {
   if (images.size() <= num_full_images) return true;
-  return CountFactorBlocks(FindNeighbors(images, reconstruction)) <=
-         num_full_images * (num_full_images - 1) / 2;
+  return FindBlockOrdering(FindNeighbors(images, reconstruction))
+             .num_factor_blocks <= num_full_images * (num_full_images - 1) / 2;
 }
 
 int NumThreads(const PriorBundleAdjustmentOptions& options,

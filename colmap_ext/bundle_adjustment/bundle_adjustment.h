@@ -108,7 +108,7 @@ struct PriorBundleAdjustmentOptions {
   // Where Ceres solves (docs/reference/math.md), up to so many images densely;
   // what has a larger factor than the second number of them iteratively.
   int max_num_images_dense = 50;
-  int max_num_images_sparse = 4000;
+  int max_num_images_sparse = 5000;
 
   bool RefinesCameras() const {
     return refine_focal_length || refine_principal_point || refine_extra_params;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "colmap_ext/bundle_adjustment/factor_size.h"
+#include "colmap_ext/bundle_adjustment/block_ordering.h"
 
 #include <gtest/gtest.h>
 
@@ -11,37 +11,41 @@ namespace {
 
 using Neighbors = std::vector<std::vector<int>>;
 
-TEST(CountFactorBlocksTest, KnowsGraphsWithoutFill) {
-  EXPECT_EQ(CountFactorBlocks({}), 0);
+size_t NumFactorBlocks(const Neighbors& neighbors) {
+  return FindBlockOrdering(neighbors).num_factor_blocks;
+}
+
+TEST(BlockOrderingTest, KnowsGraphsWithoutFill) {
+  EXPECT_EQ(NumFactorBlocks({}), 0);
   Neighbors chain(50);
   Neighbors star(50);
   for (int i = 0; i + 1 < 50; ++i) {
     chain[i].push_back(i + 1);
     star[0].push_back(i + 1);
   }
-  EXPECT_EQ(CountFactorBlocks(chain), 49);
-  EXPECT_EQ(CountFactorBlocks(star), 49);
+  EXPECT_EQ(NumFactorBlocks(chain), 49);
+  EXPECT_EQ(NumFactorBlocks(star), 49);
 }
 
-TEST(CountFactorBlocksTest, ACompleteGraphIsFull) {
+TEST(BlockOrderingTest, ACompleteGraphIsFull) {
   Neighbors neighbors(30);
   for (int i = 0; i < 30; ++i) {
     for (int j = 0; j < i; ++j) neighbors[i].push_back(j);
   }
-  EXPECT_EQ(CountFactorBlocks(neighbors), 30 * 29 / 2);
+  EXPECT_EQ(NumFactorBlocks(neighbors), 30 * 29 / 2);
 }
 
 // 0 - 1 - 2 - 3 - 4 - 5 - 0: whichever node goes first joins its neighbours,
 // until a triangle is left.
-TEST(CountFactorBlocksTest, ARingFills) {
+TEST(BlockOrderingTest, ARingFills) {
   Neighbors ring(6);
   for (int i = 0; i < 6; ++i) ring[i].push_back((i + 1) % 6);
-  EXPECT_EQ(CountFactorBlocks(ring), 6 + 3);
+  EXPECT_EQ(NumFactorBlocks(ring), 6 + 3);
 }
 
 // A drive that sees each place once stays a band, however long; streets that
 // cross fill more.
-TEST(CountFactorBlocksTest, GrowsWithTheStreetsThatCross) {
+TEST(BlockOrderingTest, GrowsWithTheStreetsThatCross) {
   const int num_images = 400;
   Neighbors straight(num_images);
   for (int i = 0; i < num_images; ++i) {
@@ -49,13 +53,13 @@ TEST(CountFactorBlocksTest, GrowsWithTheStreetsThatCross) {
       straight[i].push_back(j);
     }
   }
-  const size_t band = CountFactorBlocks(straight);
+  const size_t band = NumFactorBlocks(straight);
   EXPECT_EQ(band, 3 * num_images - 6);
   Neighbors crossing = straight;
   for (int i = 0; i < num_images; i += 20) {
     crossing[i].push_back((i * 7 + 190) % num_images);
   }
-  EXPECT_GT(CountFactorBlocks(crossing), band);
+  EXPECT_GT(NumFactorBlocks(crossing), band);
 }
 
 }  // namespace
