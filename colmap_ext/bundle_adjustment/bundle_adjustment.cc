@@ -23,8 +23,9 @@ namespace {
 // no residual pulls against it, so the value is not a weight.
 constexpr double kGaugeLengthRatio = 1e-3;
 // The chain's length and bends are soft: the damping that Ceres begins with
-// (radius 1e4) would let them go a little at each of many steps.
-constexpr double kInitialTrustRegionRadius = 1e7;
+// (radius 1e4) would let them go a little at each of many steps, and an
+// adjustment end before they are where they belong.
+constexpr double kInitialTrustRegionRadius = 1e10;
 // Of priors: beyond, a direction is nearly any; below, there is no motion.
 constexpr double kMaxDirectionSigmaRad = 0.5;
 constexpr double kMinLengthM = 1e-9;

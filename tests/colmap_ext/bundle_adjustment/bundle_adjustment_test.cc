@@ -292,6 +292,30 @@ TEST(AdjustBundleTest, FailsWithoutResidualsAndChangesNothing) {
   EXPECT_LT(CenterError(world, reconstruction), 1e-12);
 }
 
+// Vision sees a slight bend of a whole street only little, beside the noise of
+// its keypoints: it ends where an adjustment from the truth ends, though the
+// cost hardly changes on the way.
+TEST(AdjustBundleTest, UnbendsALongStreet) {
+  for (uint64_t seed = 1; seed <= 3; ++seed) {
+    BundleWorldOptions world;
+    world.num_images = 1200;
+    world.num_keypoints_per_image = 40;
+    world.pixel_noise_px = 0.5;
+    world.seed = seed;
+    colmap::Reconstruction from_truth = BuildBundleWorld(world);
+    AdjustBundle(ConvergeFully(), ProblemOfAll(from_truth), &from_truth);
+    colmap::Reconstruction from_bend = BuildBundleWorld(world);
+    Bend(/*radius_m=*/16000.0, &from_bend);
+    PriorBundleAdjustmentOptions options;
+    options.max_num_iterations = 25;
+    options.function_tolerance = 1e-6;
+    AdjustBundle(options, ProblemOfAll(from_bend), &from_bend);
+    const double truth_m = AlignedCenterError(world, from_truth);
+    EXPECT_NEAR(AlignedCenterError(world, from_bend), truth_m, 0.01 * truth_m)
+        << "seed " << seed;
+  }
+}
+
 TEST(AdjustBundleTest, EverySizeOfSolverGivesTheSame) {
   BundleWorldOptions world;
   world.pixel_noise_px = 0.5;

@@ -40,6 +40,30 @@ inline std::vector<PosePriorEdge> TruePriors(
   return edges;
 }
 
+// Winds the x axis around a circle, and the model with it.
+inline void Bend(double radius_m, colmap::Reconstruction* reconstruction) {
+  const auto bend = [radius_m](const Eigen::Vector3d& X) {
+    const double angle_rad = X.x() / radius_m;
+    const double to_center_m = radius_m - X.y();
+    return Eigen::Vector3d(to_center_m * std::sin(angle_rad),
+                           radius_m - to_center_m * std::cos(angle_rad), X.z());
+  };
+  for (const image_t id : reconstruction->RegImageIds()) {
+    colmap::Image& image = reconstruction->Image(id);
+    const Rigid3d pose = CamFromWorld(image);
+    const Eigen::Vector3d center = pose.TargetOriginInSource();
+    SetCamFromWorld(
+        CamFromWorldWithCenter(
+            pose.rotation * ExpSo3({0.0, 0.0, -center.x() / radius_m}),
+            bend(center)),
+        &image);
+  }
+  for (const auto point_id : reconstruction->Point3DIds()) {
+    colmap::Point3D& point = reconstruction->Point3D(point_id);
+    SetXyz(bend(XyzOf(point)), &point);
+  }
+}
+
 // RMSE of the camera centres against the world's, as they stand.
 inline double CenterError(const BundleWorldOptions& options,
                           const colmap::Reconstruction& reconstruction) {
