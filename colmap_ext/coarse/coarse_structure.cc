@@ -281,16 +281,15 @@ CoarseModel BuildCoarseModel(
     if (!model.rounds.back().success) break;
   }
   model.cameras_refined = options.bundle.RefinesCameras();
-  options.refine_lenses =
-      options.refine_lenses && !IsAnyFocalLengthKnown(model.reconstruction);
+  const bool is_any_known = IsAnyFocalLengthKnown(model.reconstruction);
+  options.refine_lenses = options.refine_lenses && !is_any_known;
   if (model.rounds.back().success && !model.cameras_refined &&
       !options.refine_lenses) {
     model.focal_length_error = FindFocalLengthError(
         options.balance, options.bundle, problem, model.reconstruction);
   }
   const bool is_wrong = model.focal_length_error &&
-                        options.refine_unknown_focal_length &&
-                        !HasPriorFocalLengths(model.reconstruction);
+                        options.refine_unknown_focal_length && !is_any_known;
   if (model.rounds.back().success && !model.cameras_refined &&
       (is_wrong || options.refine_lenses)) {
     RepeatWithFreeLenses(options, scene, bearings, input, tracks, problem,

@@ -44,7 +44,7 @@ constexpr double kMaxPairCost = 25.0;
 constexpr double kMinNumSigmas = 3.0;
 // 1 sigma over the focal length of what all pairs have in common: exposure row
 // by row, a principal point off the middle. On three handheld recordings the
-// pairs were 2 to 5 % too long, two to seven times the sigma of their scatter.
+// pairs were 2 to 5 % too long, three to seven times their scatter.
 constexpr double kSharedSigma = 0.035;
 
 struct PairPoints {
@@ -55,8 +55,10 @@ struct PairPoints {
 
 using CostCurve = std::vector<double>;
 
-// The logarithm of a focal length's factor, and the first two coefficients of
-// the distortion; the first 1 + NumUnknownDistortions of them are estimated.
+// The logarithm of a focal length's factor, the distortion near the rim (its
+// first coefficient, plus the second one times SquaredRimTangent: the two
+// hardly differ elsewhere) and its second coefficient. The first 1 +
+// NumUnknownDistortions of them are estimated.
 using Lens = Eigen::Vector3d;
 
 // Coefficients of distortion that are unknown: nobody has given any. Not of
@@ -86,14 +88,23 @@ colmap::Camera WithTwoRadialTerms(camera_t camera_id,
       camera.Width(), camera.Height(), params, HasPriorFocalLength(camera));
 }
 
+// Three quarters of the squared tangent at the image's corner.
+double SquaredRimTangent(const colmap::Camera& camera) {
+  return 0.75 * 0.25 *
+         (std::pow(camera.Width(), 2) + std::pow(camera.Height(), 2)) /
+         std::pow(camera.MeanFocalLength(), 2);
+}
+
 colmap::Camera WithLens(colmap::Camera camera, const Lens& lens) {
   const size_t num_distortions = NumUnknownDistortions(camera);
-  for (size_t k = 0; k < num_distortions; ++k) {
-    ParamsOf(&camera)[camera.ExtraParamsIdxs()[k]] = lens[1 + k];
-  }
   for (const size_t index : camera.FocalLengthIdxs()) {
     ParamsOf(&camera)[index] *= std::exp(lens[0]);
   }
+  const double second = num_distortions > 1 ? lens[2] : 0.0;
+  const double first = lens[1] - SquaredRimTangent(camera) * second;
+  const auto& indices = camera.ExtraParamsIdxs();
+  if (num_distortions > 0) ParamsOf(&camera)[indices[0]] = first;
+  if (num_distortions > 1) ParamsOf(&camera)[indices[1]] = second;
   return camera;
 }
 
