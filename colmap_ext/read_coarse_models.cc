@@ -87,14 +87,16 @@ bool IsLargeEnough(const CoarseModelFile& model) {
   return model.poses.size() >= kMinImagesOfComponent && model.num_points > 0;
 }
 
-// Poses belong to the cameras that they were adjusted with.
+// Poses belong to the cameras that they were adjusted with. Another camera
+// model is only taken where the database does not say that it knows the camera.
 void TakeCameras(const CoarseModelFile& model, SceneData* scene,
                  std::vector<std::string>* warnings) {
   for (const auto& [camera_id, camera] : model.cameras) {
     const auto given = scene->cameras.find(camera_id);
-    if (given == scene->cameras.end() ||
-        ModelIdOf(given->second) != ModelIdOf(camera) ||
-        ParamsOf(given->second) == ParamsOf(camera)) {
+    if (given == scene->cameras.end()) continue;
+    const bool is_same_model = ModelIdOf(given->second) == ModelIdOf(camera);
+    if (is_same_model ? ParamsOf(given->second) == ParamsOf(camera)
+                      : HasPriorFocalLength(given->second)) {
       continue;
     }
     std::ostringstream text;
@@ -103,7 +105,9 @@ void TakeCameras(const CoarseModelFile& model, SceneData* scene,
          << model.coarse_index << " and " << given->second.MeanFocalLength()
          << " px in the database; the coarse model's camera is used";
     warnings->push_back(text.str());
-    ParamsOf(&given->second) = ParamsOf(camera);
+    given->second = MakeCamera(camera_id, ModelIdOf(camera), camera.Width(),
+                               camera.Height(), ParamsOf(camera),
+                               HasPriorFocalLength(given->second));
   }
 }
 

@@ -209,9 +209,15 @@ PriorBundleAdjustmentSummary AdjustRound(
       balance, bundle, problem, reconstruction, keypoint_sigma_factor);
 }
 
+bool IsAnyFocalLengthKnown(const colmap::Reconstruction& reconstruction) {
+  return std::any_of(
+      reconstruction.Cameras().begin(), reconstruction.Cameras().end(),
+      [](const auto& entry) { return HasPriorFocalLength(entry.second); });
+}
+
 // The last round once more, after an adjustment that has found the focal
-// length.
-void RepeatWithFreeFocalLength(
+// length, and the distortion where nobody measured it.
+void RepeatWithFreeLenses(
     CoarseStructureOptions options, const SceneData& scene,
     const std::map<image_t, std::vector<Bearing>>& bearings,
     const CoarseModelInput& input, const RoundTracks& tracks,
@@ -219,6 +225,7 @@ void RepeatWithFreeFocalLength(
     CoarseModel* model) {
   const int last = options.num_rounds - 1;
   options.bundle.refine_focal_length = true;
+  options.bundle.refine_extra_params = options.refine_lenses;
   *keypoint_sigma_factor = 1.0;
   model->cameras_refined = true;
   model->rounds.push_back(AdjustRound(options, problem, last, model->positions,
@@ -248,9 +255,10 @@ bool CoarseStructureOptions::IsValid(std::string* error) const {
 }
 
 CoarseModel BuildCoarseModel(
-    const CoarseStructureOptions& options, const SceneData& scene,
+    const CoarseStructureOptions& given_options, const SceneData& scene,
     const std::map<image_t, std::vector<Bearing>>& bearings,
     CoarseModelInput input) {
+  CoarseStructureOptions options = given_options;
   CoarseModel model;
   AlignInput(scene, &input, &model.positions);
   const bool is_georeferenced = model.positions.success;
@@ -273,14 +281,19 @@ CoarseModel BuildCoarseModel(
     if (!model.rounds.back().success) break;
   }
   model.cameras_refined = options.bundle.RefinesCameras();
-  if (model.rounds.back().success && !model.cameras_refined) {
+  const bool is_any_known = IsAnyFocalLengthKnown(model.reconstruction);
+  options.refine_lenses = options.refine_lenses && !is_any_known;
+  if (model.rounds.back().success && !model.cameras_refined &&
+      !options.refine_lenses) {
     model.focal_length_error = FindFocalLengthError(
         options.balance, options.bundle, problem, model.reconstruction);
   }
-  if (model.focal_length_error && options.refine_unknown_focal_length &&
-      !HasPriorFocalLengths(model.reconstruction)) {
-    RepeatWithFreeFocalLength(options, scene, bearings, input, tracks, problem,
-                              &keypoint_sigma_factor, &model);
+  const bool is_wrong = model.focal_length_error &&
+                        options.refine_unknown_focal_length && !is_any_known;
+  if (model.rounds.back().success && !model.cameras_refined &&
+      (is_wrong || options.refine_lenses)) {
+    RepeatWithFreeLenses(options, scene, bearings, input, tracks, problem,
+                         &keypoint_sigma_factor, &model);
   }
   FilterPoints(options.final_max_reproj_error_px,
                std::min(options.min_angle_floor_deg,

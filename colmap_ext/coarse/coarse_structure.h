@@ -46,8 +46,14 @@ struct CoarseStructureOptions {
   // Sensor priors take part in the adjustment.
   bool use_priors = true;
   // Focal lengths that the database does not mark as known are adjusted when
-  // FindFocalLengthError finds them wrong; known ones are only reported.
+  // FindFocalLengthError finds them wrong and the scene has no known ones;
+  // those are only reported.
   bool refine_unknown_focal_length = true;
+  // Nobody measured the lenses, and pairs told their focal lengths and
+  // distortions (CalibrateFocalLengths), which the adjustment then goes on
+  // with: points that many images see tell them better, and so do the sensors'
+  // rotations. Not where one of the cameras is known.
+  bool refine_lenses = false;
 
   CoarseStructureOptions() { balance.max_sigma_factor = 8.0; }
   bool IsValid(std::string* error) const;

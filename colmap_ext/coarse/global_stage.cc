@@ -219,6 +219,9 @@ StatusOr<GlobalStageResult> RunGlobalStage(
   CoarseStructureOptions structure_options = options.structure;
   structure_options.bundle.shared_errors.length_drift_ratio =
       scene.length_drift_ratio;
+  structure_options.refine_lenses =
+      structure_options.refine_unknown_focal_length &&
+      !result.focal_lengths.empty();
   for (const CoarseComponent& component : result.poses.components) {
     CoarseModelInput input = CreateModelInput(
         MatchAnew(options.refinement, scene, raw_matches,

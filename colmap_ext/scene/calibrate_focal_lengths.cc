@@ -4,11 +4,13 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 #include <limits>
 #include <optional>
 #include <sstream>
 
 #include "colmap_ext/host/camera.h"
+#include "colmap_ext/host/camera_models.h"
 #include "colmap_ext/host/two_view.h"
 #include "colmap_ext/scene/two_view_poses.h"
 #include "core/option_checker.h"
@@ -25,14 +27,13 @@ namespace {
 constexpr int kNumSteps = 6;  // to either side
 constexpr double kCoarseStep = 0.16;
 constexpr double kCoarseDistortions[] = {-0.2, -0.1, 0.0, 0.1};
-struct Steps {
-  double log_factor;
-  double distortion;
-};
-constexpr Steps kSteps[] = {{0.08, 0.1}, {0.03, 0.04}};
+const Eigen::Vector3d kSteps[] = {{0.08, 0.1, 0.1}, {0.03, 0.04, 0.04}};
 constexpr int kMaxNumMoves = 20;
-// What is believed of a lens that nobody has calibrated: the share by which it
-// moves a point 45 degrees off the axis.
+// Newton steps at the finest ones; the last is shorter than this share of them.
+constexpr int kMaxNumFits = 6;
+constexpr double kSmallStep = 0.1;
+// What is believed of a lens that nobody has calibrated: the share by which
+// each term of its distortion moves a point 45 degrees off the axis.
 constexpr double kDistortionSigma = 0.2;
 // Pairs with few matches fit many focal lengths.
 constexpr size_t kMinNumMatches = 30;
@@ -41,6 +42,10 @@ constexpr int kMinNumPairs = 5;
 // and things that move, want focal lengths of their own.
 constexpr double kMaxPairCost = 25.0;
 constexpr double kMinNumSigmas = 3.0;
+// 1 sigma over the focal length of what all pairs have in common: exposure row
+// by row, a principal point off the middle. On three handheld recordings the
+// pairs were 2 to 5 % too long, three to seven times their scatter.
+constexpr double kSharedSigma = 0.035;
 
 struct PairPoints {
   std::vector<Eigen::Vector2d> points1;
@@ -50,31 +55,56 @@ struct PairPoints {
 
 using CostCurve = std::vector<double>;
 
-// A camera's focal length, as the logarithm of its factor, and its first
-// coefficient of distortion.
-struct Lens {
-  double log_factor = 0.0;
-  double distortion = 0.0;
-};
+// The logarithm of a focal length's factor, the distortion near the rim (its
+// first coefficient, plus the second one times SquaredRimTangent: the two
+// hardly differ elsewhere) and its second coefficient. The first 1 +
+// NumUnknownDistortions of them are estimated.
+using Lens = Eigen::Vector3d;
 
-// Where the first coefficient of distortion stands when it is unknown: nobody
-// has given one. Not for FOV, where zero is no lens.
-std::optional<size_t> FindUnknownDistortion(const colmap::Camera& camera) {
+// Coefficients of distortion that are unknown: nobody has given any. Not of
+// FOV, where zero is no lens.
+size_t NumUnknownDistortions(const colmap::Camera& camera) {
   const auto& indices = camera.ExtraParamsIdxs();
-  if (indices.empty() || camera.ModelName() == "FOV") return std::nullopt;
+  if (camera.ModelName() == "FOV") return 0;
   for (const size_t index : indices) {
-    if (ParamsOf(camera)[index] != 0.0) return std::nullopt;
+    if (ParamsOf(camera)[index] != 0.0) return 0;
   }
-  return indices[0];
+  return std::min<size_t>(2, indices.size());
+}
+
+// One radial term makes up for a second one that it lacks by a wrong focal
+// length, so lenses that nobody has calibrated have two.
+colmap::Camera WithTwoRadialTerms(camera_t camera_id,
+                                  const colmap::Camera& camera) {
+  const std::string name = CameraModelName(ModelIdOf(camera));
+  if ((name != "SIMPLE_RADIAL" && name != "SIMPLE_RADIAL_FISHEYE") ||
+      NumUnknownDistortions(camera) == 0) {
+    return camera;
+  }
+  std::vector<double> params = ParamsOf(camera);
+  params.push_back(0.0);
+  return MakeCamera(
+      camera_id, *CameraModelId(name.substr(std::strlen("SIMPLE_"))),
+      camera.Width(), camera.Height(), params, HasPriorFocalLength(camera));
+}
+
+// Three quarters of the squared tangent at the image's corner.
+double SquaredRimTangent(const colmap::Camera& camera) {
+  return 0.75 * 0.25 *
+         (std::pow(camera.Width(), 2) + std::pow(camera.Height(), 2)) /
+         std::pow(camera.MeanFocalLength(), 2);
 }
 
 colmap::Camera WithLens(colmap::Camera camera, const Lens& lens) {
-  if (const auto index = FindUnknownDistortion(camera)) {
-    ParamsOf(&camera)[*index] = lens.distortion;
-  }
+  const size_t num_distortions = NumUnknownDistortions(camera);
   for (const size_t index : camera.FocalLengthIdxs()) {
-    ParamsOf(&camera)[index] *= std::exp(lens.log_factor);
+    ParamsOf(&camera)[index] *= std::exp(lens[0]);
   }
+  const double second = num_distortions > 1 ? lens[2] : 0.0;
+  const double first = lens[1] - SquaredRimTangent(camera) * second;
+  const auto& indices = camera.ExtraParamsIdxs();
+  if (num_distortions > 0) ParamsOf(&camera)[indices[0]] = first;
+  if (num_distortions > 1) ParamsOf(&camera)[indices[1]] = second;
   return camera;
 }
 
@@ -163,7 +193,7 @@ std::vector<CostCurve> ComputeCurves(
 }
 
 double PriorCost(const Lens& lens) {
-  return std::pow(lens.distortion / kDistortionSigma, 2);
+  return lens.tail<2>().squaredNorm() / std::pow(kDistortionSigma, 2);
 }
 
 int FindBest(const std::vector<CostCurve>& curves,
@@ -181,100 +211,135 @@ int FindBest(const std::vector<CostCurve>& curves,
   return best;
 }
 
-// A lens between its neighbours: three of its distortion or, where that is an
-// unknown, row by row of three distortions.
-std::vector<Lens> Neighbors(const Lens& lens, const Steps& steps) {
-  std::vector<Lens> neighbors;
-  const int num_rows = steps.distortion > 0.0 ? 1 : 0;
-  for (int row = -num_rows; row <= num_rows; ++row) {
-    for (int column = -1; column <= 1; ++column) {
-      neighbors.push_back({lens.log_factor + column * steps.log_factor,
-                           lens.distortion + row * steps.distortion});
+// A lens amid its neighbours, one step to either side in all combinations of
+// the unknowns: 3, 9 or 27, the first unknown changing fastest.
+std::vector<Lens> Neighbors(const Lens& lens, const Lens& steps,
+                            int num_unknowns) {
+  std::vector<Lens> neighbors = {lens};
+  for (int i = num_unknowns - 1; i >= 0; --i) {
+    std::vector<Lens> extended;
+    for (const Lens& neighbor : neighbors) {
+      for (const double sign : {-1.0, 0.0, 1.0}) {
+        extended.push_back(neighbor + sign * steps[i] * Lens::Unit(i));
+      }
     }
+    neighbors = std::move(extended);
   }
   return neighbors;
+}
+
+// Derivatives of a curve over Neighbors at their middle, per step.
+struct Derivatives {
+  Eigen::Vector3d slope = Eigen::Vector3d::Zero();
+  Eigen::Matrix3d curvature = Eigen::Matrix3d::Zero();
+};
+
+Derivatives Differentiate(const CostCurve& c, int num_unknowns) {
+  constexpr int kStrides[] = {1, 3, 9};
+  const int middle = static_cast<int>(c.size()) / 2;
+  Derivatives result;
+  for (int i = 0; i < num_unknowns; ++i) {
+    const int di = kStrides[i];
+    result.slope[i] = 0.5 * (c[middle + di] - c[middle - di]);
+    result.curvature(i, i) = c[middle + di] - 2.0 * c[middle] + c[middle - di];
+    for (int j = 0; j < i; ++j) {
+      const int dj = kStrides[j];
+      result.curvature(i, j) = result.curvature(j, i) =
+          0.25 * (c[middle + di + dj] - c[middle + di - dj] -
+                  c[middle - di + dj] + c[middle - di - dj]);
+    }
+  }
+  return result;
 }
 
 struct Minimum {
   Lens lens;
   double sigma = 0.0;  // of the logarithm
+  // Squared distance from the given lens, in sigmas, per unknown.
+  double chi2_per_unknown = 0.0;
 };
-
-// Derivatives of a curve over Neighbors, per step.
-Eigen::Vector2d Slope(const CostCurve& c) {
-  if (c.size() == 3) return {0.5 * (c[2] - c[0]), 0.0};
-  return 0.5 * Eigen::Vector2d(c[5] - c[3], c[7] - c[1]);
-}
-
-Eigen::Matrix2d Curvature(const CostCurve& c) {
-  Eigen::Matrix2d curvature = Eigen::Matrix2d::Zero();
-  if (c.size() == 3) {
-    curvature(0, 0) = c[2] - 2.0 * c[1] + c[0];
-    return curvature;
-  }
-  const double mixed = 0.25 * (c[8] - c[6] - c[2] + c[0]);
-  curvature << c[5] - 2.0 * c[4] + c[3], mixed, mixed, c[7] - 2.0 * c[4] + c[1];
-  return curvature;
-}
 
 // Of the paraboloid through the best lens and its neighbours.
 std::optional<Minimum> FitMinimum(const std::vector<CostCurve>& curves,
-                                  const Lens& best, const Steps& steps) {
+                                  const Lens& best, const Lens& steps,
+                                  int num_unknowns) {
   CostCurve prior;
-  for (const Lens& lens : Neighbors(best, steps)) {
+  for (const Lens& lens : Neighbors(best, steps, num_unknowns)) {
     prior.push_back(PriorCost(lens));
   }
-  Eigen::Vector2d slope = Slope(prior);
-  Eigen::Matrix2d curvature = Curvature(prior);
-  Eigen::Matrix2d squared_slopes = Eigen::Matrix2d::Zero();
+  Derivatives sum = Differentiate(prior, num_unknowns);
+  Eigen::Matrix3d squared_slopes = Eigen::Matrix3d::Zero();
   for (const CostCurve& curve : curves) {
-    const Eigen::Vector2d of_pair = Slope(curve);
-    slope += of_pair;
-    squared_slopes += of_pair * of_pair.transpose();
-    curvature += Curvature(curve);
+    const Derivatives of_pair = Differentiate(curve, num_unknowns);
+    sum.slope += of_pair.slope;
+    squared_slopes += of_pair.slope * of_pair.slope.transpose();
+    sum.curvature += of_pair.curvature;
   }
-  if (steps.distortion == 0.0) curvature(1, 1) = 1.0;
-  const Eigen::LLT<Eigen::Matrix2d> llt(curvature);
+  for (int i = num_unknowns; i < 3; ++i) sum.curvature(i, i) = 1.0;
+  const Eigen::LLT<Eigen::Matrix3d> llt(sum.curvature);
   if (llt.info() != Eigen::Success) return std::nullopt;
-  const Eigen::Vector2d step = -llt.solve(slope).cwiseMax(-1.0).cwiseMin(1.0);
-  const Eigen::Vector2d gain = llt.solve(Eigen::Vector2d::UnitX());
-  return Minimum{{best.log_factor + steps.log_factor * step[0],
-                  best.distortion + steps.distortion * step[1]},
-                 steps.log_factor * std::sqrt(gain.dot(squared_slopes * gain))};
+  const Lens step = -llt.solve(sum.slope).cwiseMax(-1.0).cwiseMin(1.0);
+  const Eigen::Matrix3d gains = llt.solve(Eigen::Matrix3d::Identity());
+  const Eigen::Matrix3d covariance = gains * squared_slopes * gains;
+  Minimum minimum;
+  minimum.lens = best + steps.cwiseProduct(step);
+  minimum.sigma = steps[0] * std::sqrt(covariance(0, 0));
+  const Lens change = minimum.lens.cwiseQuotient(steps);
+  minimum.chi2_per_unknown =
+      change.head(num_unknowns)
+          .dot(covariance.topLeftCorner(num_unknowns, num_unknowns)
+                   .ldlt()
+                   .solve(change.head(num_unknowns))) /
+      num_unknowns;
+  return minimum;
+}
+
+// The best of a grid over all lenses; none at its rim.
+std::optional<Lens> FindCoarseLens(const FocalLengthCalibrationOptions& options,
+                                   const std::vector<PairPoints>& pairs,
+                                   const colmap::Camera& camera) {
+  const double of_longer_side = std::log(
+      std::max(camera.Width(), camera.Height()) / camera.MeanFocalLength());
+  std::vector<Lens> grid;
+  for (const double distortion : kCoarseDistortions) {
+    if (distortion != 0.0 && NumUnknownDistortions(camera) == 0) continue;
+    for (int k = -kNumSteps; k <= kNumSteps; ++k) {
+      grid.push_back({of_longer_side + k * kCoarseStep, distortion, 0.0});
+    }
+  }
+  const int best = FindBest(ComputeCurves(options, pairs, camera, grid), grid);
+  const int of_row = best % (2 * kNumSteps + 1);
+  if (of_row == 0 || of_row == 2 * kNumSteps) return std::nullopt;
+  return grid[best];
 }
 
 std::optional<Minimum> FindFocalLength(
     const FocalLengthCalibrationOptions& options,
     const std::vector<PairPoints>& pairs, const colmap::Camera& camera) {
-  const bool has_distortion = FindUnknownDistortion(camera).has_value();
-  const double of_longer_side = std::log(
-      std::max(camera.Width(), camera.Height()) / camera.MeanFocalLength());
-  std::vector<Lens> coarse;
-  for (const double distortion : kCoarseDistortions) {
-    if (distortion != 0.0 && !has_distortion) continue;
-    for (int k = -kNumSteps; k <= kNumSteps; ++k) {
-      coarse.push_back({of_longer_side + k * kCoarseStep, distortion});
-    }
-  }
-  const int first =
-      FindBest(ComputeCurves(options, pairs, camera, coarse), coarse);
-  const int of_row = first % (2 * kNumSteps + 1);
-  if (of_row == 0 || of_row == 2 * kNumSteps) return std::nullopt;
-  Lens best = coarse[first];
-  std::optional<Minimum> fit;
+  const int num_unknowns = 1 + static_cast<int>(NumUnknownDistortions(camera));
+  const std::optional<Lens> coarse = FindCoarseLens(options, pairs, camera);
+  if (!coarse) return std::nullopt;
+  Lens best = *coarse;
   int num_moves = 0;
-  for (Steps steps : kSteps) {
-    if (!has_distortion) steps.distortion = 0.0;
+  for (const Lens& steps : kSteps) {
     while (num_moves++ < kMaxNumMoves) {
-      const std::vector<Lens> lenses = Neighbors(best, steps);
-      const std::vector<CostCurve> curves =
-          ComputeCurves(options, pairs, camera, lenses);
-      const size_t k = FindBest(curves, lenses);
-      fit = FitMinimum(curves, best, steps);
+      const std::vector<Lens> lenses = Neighbors(best, steps, num_unknowns);
+      const size_t k =
+          FindBest(ComputeCurves(options, pairs, camera, lenses), lenses);
       if (2 * k + 1 == lenses.size()) break;
       best = lenses[k];
-      fit.reset();
     }
+  }
+  const Lens& steps = kSteps[1];
+  std::optional<Minimum> fit;
+  for (int k = 0; k < kMaxNumFits; ++k) {
+    fit = FitMinimum(ComputeCurves(options, pairs, camera,
+                                   Neighbors(best, steps, num_unknowns)),
+                     best, steps, num_unknowns);
+    if (!fit) return std::nullopt;
+    const Lens step = (fit->lens - best).cwiseQuotient(steps);
+    best = fit->lens;
+    if (step.cwiseAbs().maxCoeff() < kSmallStep) break;
   }
   return fit;
 }
@@ -295,22 +360,23 @@ std::vector<CalibratedFocalLength> CalibrateFocalLengths(
     const FocalLengthCalibrationOptions& options, SceneData* scene) {
   std::vector<CalibratedFocalLength> calibrated;
   if (!options.enabled) return calibrated;
-  for (auto& [camera_id, camera] : scene->cameras) {
-    if (HasPriorFocalLength(camera)) continue;
+  for (auto& [camera_id, given] : scene->cameras) {
+    if (HasPriorFocalLength(given)) continue;
+    const colmap::Camera camera = WithTwoRadialTerms(camera_id, given);
     const std::vector<PairPoints> pairs =
         SelectPairs(options, *scene, camera_id);
     if (pairs.size() < kMinNumPairs) continue;
     const std::optional<Minimum> minimum =
         FindFocalLength(options, pairs, camera);
     if (!minimum || minimum->sigma > options.max_relative_sigma ||
-        std::abs(minimum->lens.log_factor) < kMinNumSigmas * minimum->sigma) {
+        minimum->chi2_per_unknown < std::pow(kMinNumSigmas, 2)) {
       continue;
     }
     CalibratedFocalLength found;
     found.camera_id = camera_id;
-    found.given_px = camera.MeanFocalLength();
-    camera = WithLens(camera, minimum->lens);
-    found.found_px = camera.MeanFocalLength();
+    found.given_px = given.MeanFocalLength();
+    given = WithLens(camera, minimum->lens);
+    found.found_px = given.MeanFocalLength();
     found.relative_sigma = minimum->sigma;
     found.num_pairs = static_cast<int>(pairs.size());
     calibrated.push_back(found);
@@ -321,10 +387,11 @@ std::vector<CalibratedFocalLength> CalibrateFocalLengths(
 std::string DescribeFocalLength(const CalibratedFocalLength& calibrated) {
   std::ostringstream text;
   text.precision(4);
+  const double sigma = std::hypot(calibrated.relative_sigma, kSharedSigma);
   text << "camera " << calibrated.camera_id
        << ": the database gives no measured focal length; "
        << calibrated.num_pairs << " pairs tell " << calibrated.found_px
-       << " +- " << calibrated.found_px * calibrated.relative_sigma
+       << " +- " << calibrated.found_px * sigma
        << " px, which is used in place of " << calibrated.given_px << " px";
   return text.str();
 }

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <sstream>
 #include <string>
 
@@ -383,6 +384,83 @@ TEST(RunGlobalStageTest, FindsAFocalLengthThatNobodyKnows) {
   EXPECT_NEAR(
       result.models[0].reconstruction.Camera(1).MeanFocalLength() / focal_px,
       1.0, 0.01);
+}
+
+// Keypoints of a lens with two radial terms, of which the database knows
+// neither these nor the focal length.
+void UseUnknownLens(double k1, double k2, SceneData* scene) {
+  colmap::Camera& camera = scene->cameras.at(1);
+  const double focal_px = camera.MeanFocalLength();
+  const Eigen::Vector2d center(camera.PrincipalPointX(),
+                               camera.PrincipalPointY());
+  camera.SetModelIdFromName("SIMPLE_RADIAL");
+  camera.SetParams({1.6 * focal_px, center.x(), center.y(), 0.0});
+  camera.SetPriorFocalLength(false);
+  for (auto& [image_id, image] : scene->images) {
+    for (Eigen::Vector2d& keypoint : image.keypoints) {
+      const Eigen::Vector2d ray = (keypoint - center) / focal_px;
+      const double r2 = ray.squaredNorm();
+      keypoint = center + focal_px * (1.0 + k1 * r2 + k2 * r2 * r2) * ray;
+    }
+  }
+}
+
+// The root mean square of the angles to the priors' rotations.
+double RotationErrorDeg(const std::vector<RelativePosePrior>& priors,
+                        const colmap::Reconstruction& model) {
+  double sum = 0.0;
+  for (const RelativePosePrior& prior : priors) {
+    const Rigid3d motion =
+        ComputeCam2FromCam1(CamFromWorld(model.Image(prior.image_id1)),
+                            CamFromWorld(model.Image(prior.image_id2)));
+    sum += std::pow(
+        motion.rotation.angularDistance(prior.cam2_from_cam1.rotation), 2);
+  }
+  return RadToDeg(std::sqrt(sum / priors.size()));
+}
+
+// Worlds that turn: the roads of seeds 1 and 4 tell no lens.
+TEST(RunGlobalStageTest, AdjustsALensThatNobodyKnows) {
+  for (const uint64_t seed : {2, 3}) {
+    SyntheticWorldOptions world_options = TurningWorld();
+    world_options.seed = seed;
+    const SyntheticWorld world = BuildSyntheticWorld(world_options);
+    SceneData scene = BuildSyntheticScene(world, SyntheticPriorOptions());
+    UseUnknownLens(0.12, -0.12, &scene);
+    const GlobalStageResult result = RunStage(scene);
+    ASSERT_EQ(result.models.size(), 1) << seed;
+    EXPECT_TRUE(result.models[0].cameras_refined);
+    const colmap::Reconstruction& model = result.models[0].reconstruction;
+    EXPECT_EQ(model.NumRegImages(), world.images.size());
+    const colmap::Camera& camera = model.Camera(1);
+    EXPECT_EQ(camera.ModelName(), "RADIAL");
+    EXPECT_NEAR(camera.MeanFocalLength() / world.camera.focal_px, 1.0, 0.01)
+        << seed;
+    EXPECT_NEAR(camera.Params(3), 0.12, 0.02) << seed;
+    EXPECT_NEAR(camera.Params(4), -0.12, 0.02) << seed;
+    // The priors' sigma is 0.03 deg about each axis.
+    EXPECT_LT(RotationErrorDeg(scene.priors, model), 0.1) << seed;
+  }
+}
+
+TEST(RunGlobalStageTest, LeavesLensesAloneNextToAKnownOne) {
+  const SyntheticWorld world = BuildSyntheticWorld(TurningWorld());
+  SceneData scene = BuildSyntheticScene(world, SyntheticPriorOptions());
+  UseUnknownLens(0.12, -0.12, &scene);
+  scene.cameras[2] = scene.cameras.at(1);
+  scene.cameras.at(2).SetCameraId(2);
+  scene.cameras.at(2).SetPriorFocalLength(true);
+  scene.images.at(1).camera_id = 2;
+  const std::vector<double> known = ParamsOf(scene.cameras.at(2));
+  const GlobalStageResult result = RunStage(scene);
+  ASSERT_GE(result.models.size(), 1);
+  EXPECT_EQ(result.focal_lengths.size(), 1);
+  for (const CoarseModel& model : result.models) {
+    EXPECT_FALSE(model.cameras_refined);
+    if (model.reconstruction.ExistsCamera(2)) {
+      EXPECT_EQ(ParamsOf(model.reconstruction.Camera(2)), known);
+    }
+  }
 }
 
 TEST(RunGlobalStageTest, SwitchesOffMatchRefinement) {

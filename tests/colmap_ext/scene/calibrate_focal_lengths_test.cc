@@ -49,8 +49,9 @@ TEST(CalibrateFocalLengths, FindsTheTruthWithinItsSigma) {
   }
 }
 
-// Keypoints of a lens with barrel distortion, which the database gives as zero.
-void DistortKeypoints(double coefficient, SceneData* scene) {
+// Keypoints of a lens with radial distortion, which the database gives as one
+// term that is zero.
+void DistortKeypoints(double k1, double k2, SceneData* scene) {
   colmap::Camera& camera = scene->cameras.at(1);
   const double focal_px = camera.MeanFocalLength();
   const Eigen::Vector2d center(camera.PrincipalPointX(),
@@ -60,8 +61,8 @@ void DistortKeypoints(double coefficient, SceneData* scene) {
   for (auto& [image_id, image] : scene->images) {
     for (Eigen::Vector2d& keypoint : image.keypoints) {
       const Eigen::Vector2d ray = (keypoint - center) / focal_px;
-      keypoint =
-          center + focal_px * (1.0 + coefficient * ray.squaredNorm()) * ray;
+      const double r2 = ray.squaredNorm();
+      keypoint = center + focal_px * (1.0 + k1 * r2 + k2 * r2 * r2) * ray;
     }
   }
 }
@@ -73,7 +74,7 @@ TEST(CalibrateFocalLengths, FindsTheTruthOfADistortingLens) {
   for (const uint64_t seed : {1, 2, 3}) {
     const SyntheticWorld world = BuildSyntheticWorld(Drive(seed));
     SceneData scene = SceneWithFocalLength(world, 1.0);
-    DistortKeypoints(kDistortion, &scene);
+    DistortKeypoints(kDistortion, 0.0, &scene);
     colmap::Camera& camera = scene.cameras.at(1);
     camera.SetFocalLength(1.6 * camera.FocalLength());
     const auto found =
@@ -86,6 +87,41 @@ TEST(CalibrateFocalLengths, FindsTheTruthOfADistortingLens) {
   }
 }
 
+// A phone's: outwards near the middle, inwards at the rim.
+TEST(CalibrateFocalLengths, FindsTheTruthOfALensWithTwoRadialTerms) {
+  constexpr double kFirst = 0.12;
+  constexpr double kSecond = -0.12;
+  for (const uint64_t seed : {1, 2, 3}) {
+    const SyntheticWorld world = BuildSyntheticWorld(Drive(seed));
+    SceneData scene = SceneWithFocalLength(world, 1.0);
+    DistortKeypoints(kFirst, kSecond, &scene);
+    colmap::Camera& camera = scene.cameras.at(1);
+    camera.SetFocalLength(1.6 * camera.FocalLength());
+    const auto found =
+        CalibrateFocalLengths(FocalLengthCalibrationOptions(), &scene);
+    ASSERT_EQ(found.size(), 1) << seed;
+    EXPECT_EQ(camera.ModelName(), "RADIAL");
+    EXPECT_FALSE(camera.HasPriorFocalLength());
+    EXPECT_NEAR(std::log(found[0].found_px / world.camera.focal_px), 0.0,
+                4.0 * found[0].relative_sigma)
+        << seed;
+    EXPECT_LT(found[0].relative_sigma, 0.05);
+    EXPECT_NEAR(camera.Params(3), kFirst, 0.06) << seed;
+    EXPECT_NEAR(camera.Params(4), kSecond, 0.06) << seed;
+  }
+}
+
+// A right focal length is no reason to leave out the distortion.
+TEST(CalibrateFocalLengths, FindsTheDistortionAtARightFocalLength) {
+  const SyntheticWorld world = BuildSyntheticWorld(Drive(1));
+  SceneData scene = SceneWithFocalLength(world, 1.0);
+  DistortKeypoints(-0.08, 0.0, &scene);
+  const auto found =
+      CalibrateFocalLengths(FocalLengthCalibrationOptions(), &scene);
+  ASSERT_EQ(found.size(), 1);
+  EXPECT_NEAR(scene.cameras.at(1).Params(3), -0.08, 0.04);
+}
+
 // Guesses by different programs lead to the same lens.
 TEST(CalibrateFocalLengths, WhatIsGivenDoesNotMatter) {
   for (const uint64_t seed : {1, 2}) {
@@ -93,7 +129,7 @@ TEST(CalibrateFocalLengths, WhatIsGivenDoesNotMatter) {
     std::vector<double> found_px;
     for (const double factor : {0.5, 1.4, 2.3}) {
       SceneData scene = SceneWithFocalLength(world, 1.0);
-      DistortKeypoints(-0.08, &scene);
+      DistortKeypoints(-0.08, 0.0, &scene);
       colmap::Camera& camera = scene.cameras.at(1);
       camera.SetFocalLength(factor * camera.FocalLength());
       const auto found =
