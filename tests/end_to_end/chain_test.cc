@@ -75,10 +75,35 @@ class ChainTest : public CommandLineTest {
     }
   }
 
-  double FocalLength(const std::string& model) {
+  // What COLMAP guesses of an image without EXIF.
+  void ForgetTheCamera() {
+    SqliteConnection database(database_, SqliteConnection::Mode::kWrite);
+    for (auto& [camera_id, camera] : ReadCameras(&database)) {
+      const std::vector<double> params = {1.2 * camera.Width(),
+                                          0.5 * camera.Width(),
+                                          0.5 * camera.Height(), 0.0};
+      SqliteStatement statement(
+          &database,
+          "UPDATE cameras SET model = 2, params = ?, prior_focal_length = 0 "
+          "WHERE camera_id = ?");
+      BindDoubles(&statement, 1, params.data(), params.size());
+      statement.BindInt(2, camera_id);
+      statement.Step();
+    }
+  }
+
+  double ReadFocalLength() {
+    SqliteConnection database(database_, SqliteConnection::Mode::kRead);
+    return ReadCameras(&database).begin()->second.MeanFocalLength();
+  }
+
+  colmap::Camera CameraOf(const std::string& model) {
     const auto reconstruction = ReadModel(folder_.File(model));
     EXPECT_TRUE(reconstruction.ok());
-    return reconstruction->Cameras().begin()->second.MeanFocalLength();
+    return reconstruction->Cameras().begin()->second;
+  }
+  double FocalLength(const std::string& model) {
+    return CameraOf(model).MeanFocalLength();
   }
 
   std::string database_ = folder_.File("database.db");
@@ -172,6 +197,25 @@ TEST_F(ChainTest, TheMapperTakesTheCoarseModelsCameras) {
   EXPECT_NEAR(FocalLength("wrong/0") / FocalLength("right/0"), 1.0, 0.003);
   EXPECT_EQ(FocalLength("wrong/0"), FocalLength("global/0"));
   ExpectGoodMetricModel(Evaluate("wrong/0"), 80);
+}
+
+// A guessed SIMPLE_RADIAL becomes a RADIAL camera, in the models only; where
+// the database says that it knows its camera, the mapper keeps that one.
+TEST_F(ChainTest, TheMapperTakesALensWithMoreTerms) {
+  Make("--num_images 80 --seed 4");
+  const double focal_px = ReadFocalLength();
+  ForgetTheCamera();
+  Import();
+  ExpectSuccess(GlobalArguments());
+  Run run = ExpectSuccess(MapperArguments());
+  EXPECT_NE(run.out.find("coarse model's camera"), std::string::npos);
+  EXPECT_EQ(CameraOf("sparse/0").ModelName(), "RADIAL");
+  EXPECT_NEAR(FocalLength("sparse/0"), focal_px, 0.01 * focal_px);
+  ExpectGoodMetricModel(Evaluate("sparse/0"), 80);
+  Sql("UPDATE cameras SET prior_focal_length = 1");
+  run = ExpectSuccess(MapperArguments("known"));
+  EXPECT_EQ(run.out.find("coarse model's camera"), std::string::npos);
+  EXPECT_EQ(CameraOf("known/0").ModelName(), "SIMPLE_RADIAL");
 }
 
 TEST_F(ChainTest, WithoutSensorsThereIsOneWarningAndAModel) {
