@@ -50,8 +50,11 @@ bool IsSupportedByPrior(const PriorSupportOptions& options,
 
 std::optional<bool> IsTorn(const RelativePosePrior& prior,
                            const colmap::Reconstruction& model) {
-  if (prior.flags & kPriorWheelSlip || !IsRegistered(model, prior.image_id1) ||
-      !IsRegistered(model, prior.image_id2)) {
+  const auto has = [&model](image_t image_id) {
+    return model.ExistsImage(image_id) && IsRegistered(model, image_id);
+  };
+  if (prior.flags & kPriorWheelSlip || !has(prior.image_id1) ||
+      !has(prior.image_id2)) {
     return std::nullopt;
   }
   PriorSupportOptions options;
