@@ -32,8 +32,8 @@ constexpr int kMaxNumMoves = 20;
 // Newton steps at the finest ones; the last is shorter than this share of them.
 constexpr int kMaxNumFits = 6;
 constexpr double kSmallStep = 0.1;
-// What is believed of a lens that nobody has calibrated: the share by which
-// each term of its distortion moves a point 45 degrees off the axis.
+// What is believed of a lens that nobody has calibrated: its distortion near
+// the rim, and its second coefficient.
 constexpr double kDistortionSigma = 0.2;
 // Pairs with few matches fit many focal lengths.
 constexpr size_t kMinNumMatches = 30;
