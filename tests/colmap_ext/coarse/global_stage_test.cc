@@ -14,23 +14,11 @@
 #include "colmap_ext/host/pose_conversion.h"
 #include "colmap_ext/scene/raw_matches.h"
 #include "colmap_ext/scene/scene_bearings.h"
+#include "tests/testing/colmap_ext/global_stage_run.h"
 #include "tests/testing/colmap_ext/synthetic_scene.h"
 
 namespace adasfm {
 namespace {
-
-SyntheticWorldOptions SmallWorld() {
-  SyntheticWorldOptions options;
-  options.num_images = 60;
-  return options;
-}
-
-GlobalStageResult RunStage(SceneData scene,
-                           const GlobalStageOptions& options = {}) {
-  StatusOr<GlobalStageResult> result = RunGlobalStage(options, &scene);
-  EXPECT_TRUE(result.ok()) << result.status().message();
-  return std::move(result).value();
-}
 
 TEST(RunGlobalStageTest, FindsAMetricUprightModel) {
   for (const uint64_t seed : {1, 2}) {
@@ -198,37 +186,6 @@ TEST(RunGlobalStageTest, SameResultOnAnyNumberOfThreads) {
   EXPECT_EQ(single.geometries.size(), several.geometries.size());
 }
 
-// A focal length that is 3 % too long bends the epipolar lines; once the
-// adjustment has found the right one, the matches are judged by that.
-TEST(RunGlobalStageTest, MatchesAreRefinedUnderRefinedCameras) {
-  for (const uint64_t seed : {1, 2}) {
-    SyntheticWorldOptions world_options = SmallWorld();
-    world_options.seed = seed;
-    const SyntheticWorld world = BuildSyntheticWorld(world_options);
-    SceneData scene = BuildSyntheticScene(world, SyntheticPriorOptions());
-    const auto set_focal_length = [&](double focal_px) {
-      scene.cameras.at(1).InitializeWithName(
-          "SIMPLE_PINHOLE", focal_px, world.camera.width, world.camera.height);
-      scene.cameras.at(1).SetCameraId(1);
-    };
-    set_focal_length(world.camera.focal_px);
-    const GlobalStageResult right = RunStage(scene);
-    set_focal_length(1.03 * world.camera.focal_px);
-    GlobalStageOptions options;
-    options.structure.bundle.refine_focal_length = true;
-    // A gyroscope without bias tells the focal length of so short a drive.
-    options.structure.bundle.shared_errors.enabled = false;
-    const GlobalStageResult refined = RunStage(scene, options);
-    ASSERT_EQ(refined.models.size(), 1);
-    EXPECT_NEAR(refined.models[0].reconstruction.Camera(1).FocalLength() /
-                    world.camera.focal_px,
-                1.0, 0.003);
-    EXPECT_NEAR(refined.refinement.num_kept, right.refinement.num_kept,
-                0.005 * right.refinement.num_kept)
-        << seed;
-  }
-}
-
 // A camera that is mounted 3 deg off what the calibration says: no weights
 // bring vision and sensors together, unless the mount is corrected or the
 // adjustment finds the direction of driving.
@@ -268,78 +225,6 @@ TEST(RunGlobalStageTest, CorrectsTheMountOrWarnsOfTheContradiction) {
   EXPECT_TRUE(ListGlobalWarnings(scene, uncertain).empty());
 }
 
-void ScaleFocalLength(double ratio, SceneData* scene) {
-  for (const size_t i : scene->cameras.at(1).FocalLengthIdxs()) {
-    scene->cameras.at(1).Params(i) *= ratio;
-  }
-}
-
-// 90 m of road that turns by 93 deg.
-SyntheticWorldOptions TurningWorld() {
-  SyntheticWorldOptions options = SmallWorld();
-  options.seed = 2;
-  return options;
-}
-
-TEST(RunGlobalStageTest, WarnsOfAWrongFocalLength) {
-  for (const double ratio : {0.9, 0.97, 1.0, 1.03}) {
-    const SyntheticWorld world = BuildSyntheticWorld(TurningWorld());
-    SceneData scene = BuildSyntheticScene(world, SyntheticPriorOptions());
-    ScaleFocalLength(ratio, &scene);
-    scene.cameras.at(1).SetPriorFocalLength(true);
-    const GlobalStageResult result = RunStage(scene);
-    const auto& error = result.models[0].focal_length_error;
-    ASSERT_EQ(error.has_value(), ratio != 1.0) << ratio;
-    if (!error) continue;
-    EXPECT_NEAR(error->ratio, 1.0 / ratio, 0.01);
-    EXPECT_NEAR(error->ratio, 1.0 / ratio, 4.0 * error->sigma);
-    const std::vector<std::string> warnings = ListGlobalWarnings(scene, result);
-    ASSERT_FALSE(warnings.empty());
-    EXPECT_NE(warnings[0].find(ratio > 1.0 ? "shorter" : "longer"),
-              std::string::npos);
-    // The cameras are the user's: told, not changed.
-    EXPECT_FALSE(result.models[0].cameras_refined);
-    EXPECT_EQ(result.models[0].reconstruction.Camera(1).Params(),
-              scene.cameras.at(1).Params());
-  }
-}
-
-// Straight on, the errors that priors share pass for a focal length.
-TEST(RunGlobalStageTest, SaysNothingOfFocalLengthsOnStraightRoads) {
-  SyntheticWorldOptions options = SmallWorld();
-  options.trajectory = SyntheticTrajectory::kStraight;
-  const SyntheticWorld world = BuildSyntheticWorld(options);
-  SceneData scene = BuildSyntheticScene(world, SyntheticPriorOptions());
-  ScaleFocalLength(1.1, &scene);
-  EXPECT_FALSE(RunStage(scene).models[0].focal_length_error.has_value());
-}
-
-TEST(RunGlobalStageTest, RefinesAFocalLengthThatNobodyKnows) {
-  const SyntheticWorld world = BuildSyntheticWorld(TurningWorld());
-  SceneData scene = BuildSyntheticScene(world, SyntheticPriorOptions());
-  const double focal_px = scene.cameras.at(1).MeanFocalLength();
-  const GlobalStageResult right = RunStage(scene);
-  ScaleFocalLength(1.05, &scene);
-  scene.cameras.at(1).SetPriorFocalLength(false);
-  GlobalStageOptions options;
-  options.focal_lengths.enabled = false;
-  const GlobalStageResult refined = RunStage(scene, options);
-  EXPECT_TRUE(refined.models[0].cameras_refined);
-  EXPECT_NEAR(refined.refinement.num_kept, right.refinement.num_kept,
-              0.005 * right.refinement.num_kept);
-  options.structure.refine_unknown_focal_length = false;
-  const GlobalStageResult left = RunStage(scene, options);
-  EXPECT_FALSE(left.models[0].cameras_refined);
-  ASSERT_TRUE(left.models[0].focal_length_error.has_value());
-  const double sigma = left.models[0].focal_length_error->sigma;
-  EXPECT_LT(sigma, 0.003);
-  EXPECT_NEAR(
-      refined.models[0].reconstruction.Camera(1).MeanFocalLength() / focal_px,
-      1.0, 3.0 * sigma);
-  EXPECT_LT(ComparePoses(world, refined.models[0].reconstruction).rmse_m,
-            ComparePoses(world, left.models[0].reconstruction).rmse_m);
-}
-
 // A phone that never lay still, under vision too poor to tell more: true loops
 // contradict the odometry unless the stage hears how badly the bias is known.
 TEST(RunGlobalStageTest, GatesLoopsByTheStatedBias) {
@@ -367,100 +252,6 @@ TEST(RunGlobalStageTest, GatesLoopsByTheStatedBias) {
   scene.gyroscope_bias_covariance =
       std::pow(0.03, 2) * Eigen::Matrix3d::Identity();
   EXPECT_EQ(count_refuted(scene), 0);
-}
-
-// Before all other steps, as COLMAP's guess spoils two-view rotations.
-TEST(RunGlobalStageTest, FindsAFocalLengthThatNobodyKnows) {
-  const SyntheticWorld world = BuildSyntheticWorld(TurningWorld());
-  SceneData scene = BuildSyntheticScene(world, SyntheticPriorOptions());
-  const double focal_px = scene.cameras.at(1).MeanFocalLength();
-  ScaleFocalLength(1.5, &scene);
-  scene.cameras.at(1).SetPriorFocalLength(false);
-  GlobalStageOptions options;
-  options.focal_lengths.enabled = false;
-  EXPECT_TRUE(RunStage(scene, options).focal_lengths.empty());
-  const GlobalStageResult result = RunStage(scene);
-  ASSERT_EQ(result.focal_lengths.size(), 1);
-  EXPECT_NEAR(
-      result.models[0].reconstruction.Camera(1).MeanFocalLength() / focal_px,
-      1.0, 0.01);
-}
-
-// Keypoints of a lens with two radial terms, of which the database knows
-// neither these nor the focal length.
-void UseUnknownLens(double k1, double k2, SceneData* scene) {
-  colmap::Camera& camera = scene->cameras.at(1);
-  const double focal_px = camera.MeanFocalLength();
-  const Eigen::Vector2d center(camera.PrincipalPointX(),
-                               camera.PrincipalPointY());
-  camera.SetModelIdFromName("SIMPLE_RADIAL");
-  camera.SetParams({1.6 * focal_px, center.x(), center.y(), 0.0});
-  camera.SetPriorFocalLength(false);
-  for (auto& [image_id, image] : scene->images) {
-    for (Eigen::Vector2d& keypoint : image.keypoints) {
-      const Eigen::Vector2d ray = (keypoint - center) / focal_px;
-      const double r2 = ray.squaredNorm();
-      keypoint = center + focal_px * (1.0 + k1 * r2 + k2 * r2 * r2) * ray;
-    }
-  }
-}
-
-// The root mean square of the angles to the priors' rotations.
-double RotationErrorDeg(const std::vector<RelativePosePrior>& priors,
-                        const colmap::Reconstruction& model) {
-  double sum = 0.0;
-  for (const RelativePosePrior& prior : priors) {
-    const Rigid3d motion =
-        ComputeCam2FromCam1(CamFromWorld(model.Image(prior.image_id1)),
-                            CamFromWorld(model.Image(prior.image_id2)));
-    sum += std::pow(
-        motion.rotation.angularDistance(prior.cam2_from_cam1.rotation), 2);
-  }
-  return RadToDeg(std::sqrt(sum / priors.size()));
-}
-
-// Worlds that turn: the roads of seeds 1 and 4 tell no lens.
-TEST(RunGlobalStageTest, AdjustsALensThatNobodyKnows) {
-  for (const uint64_t seed : {2, 3}) {
-    SyntheticWorldOptions world_options = TurningWorld();
-    world_options.seed = seed;
-    const SyntheticWorld world = BuildSyntheticWorld(world_options);
-    SceneData scene = BuildSyntheticScene(world, SyntheticPriorOptions());
-    UseUnknownLens(0.12, -0.12, &scene);
-    const GlobalStageResult result = RunStage(scene);
-    ASSERT_EQ(result.models.size(), 1) << seed;
-    EXPECT_TRUE(result.models[0].cameras_refined);
-    const colmap::Reconstruction& model = result.models[0].reconstruction;
-    EXPECT_EQ(model.NumRegImages(), world.images.size());
-    const colmap::Camera& camera = model.Camera(1);
-    EXPECT_EQ(camera.ModelName(), "RADIAL");
-    EXPECT_NEAR(camera.MeanFocalLength() / world.camera.focal_px, 1.0, 0.01)
-        << seed;
-    EXPECT_NEAR(camera.Params(3), 0.12, 0.02) << seed;
-    EXPECT_NEAR(camera.Params(4), -0.12, 0.02) << seed;
-    // The priors' sigma is 0.03 deg about each axis.
-    EXPECT_LT(RotationErrorDeg(scene.priors, model), 0.1) << seed;
-  }
-}
-
-TEST(RunGlobalStageTest, LeavesLensesAloneNextToAKnownOne) {
-  const SyntheticWorld world = BuildSyntheticWorld(TurningWorld());
-  SceneData scene = BuildSyntheticScene(world, SyntheticPriorOptions());
-  UseUnknownLens(0.12, -0.12, &scene);
-  scene.cameras[2] = scene.cameras.at(1);
-  scene.cameras.at(2).SetCameraId(2);
-  scene.cameras.at(2).SetPriorFocalLength(true);
-  scene.images.at(1).camera_id = 2;
-  const std::vector<double> known = ParamsOf(scene.cameras.at(2));
-  const GlobalStageResult result = RunStage(scene);
-  ASSERT_GE(result.models.size(), 1);
-  EXPECT_EQ(result.focal_lengths.size(), 1);
-  for (const CoarseModel& model : result.models) {
-    EXPECT_FALSE(model.cameras_refined);
-    if (model.reconstruction.ExistsCamera(2)) {
-      EXPECT_EQ(ParamsOf(model.reconstruction.Camera(2)), known);
-    }
-  }
 }
 
 TEST(RunGlobalStageTest, SwitchesOffMatchRefinement) {

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "tests/testing/colmap_ext/synthetic_scene.h"
+#include "tests/testing/colmap_ext/unknown_lens.h"
 
 namespace adasfm {
 namespace {
@@ -49,24 +50,6 @@ TEST(CalibrateFocalLengths, FindsTheTruthWithinItsSigma) {
   }
 }
 
-// Keypoints of a lens with radial distortion, which the database gives as one
-// term that is zero.
-void DistortKeypoints(double k1, double k2, SceneData* scene) {
-  colmap::Camera& camera = scene->cameras.at(1);
-  const double focal_px = camera.MeanFocalLength();
-  const Eigen::Vector2d center(camera.PrincipalPointX(),
-                               camera.PrincipalPointY());
-  camera.SetModelIdFromName("SIMPLE_RADIAL");
-  camera.SetParams({focal_px, center.x(), center.y(), 0.0});
-  for (auto& [image_id, image] : scene->images) {
-    for (Eigen::Vector2d& keypoint : image.keypoints) {
-      const Eigen::Vector2d ray = (keypoint - center) / focal_px;
-      const double r2 = ray.squaredNorm();
-      keypoint = center + focal_px * (1.0 + k1 * r2 + k2 * r2 * r2) * ray;
-    }
-  }
-}
-
 // With the distortion taken for zero the second seed is 26 % too long, at a
 // sigma of 2 %.
 TEST(CalibrateFocalLengths, FindsTheTruthOfADistortingLens) {
@@ -74,9 +57,8 @@ TEST(CalibrateFocalLengths, FindsTheTruthOfADistortingLens) {
   for (const uint64_t seed : {1, 2, 3}) {
     const SyntheticWorld world = BuildSyntheticWorld(Drive(seed));
     SceneData scene = SceneWithFocalLength(world, 1.0);
-    DistortKeypoints(kDistortion, 0.0, &scene);
-    colmap::Camera& camera = scene.cameras.at(1);
-    camera.SetFocalLength(1.6 * camera.FocalLength());
+    UseUnknownLens(kDistortion, 0.0, 1.6, &scene);
+    const colmap::Camera& camera = scene.cameras.at(1);
     const auto found =
         CalibrateFocalLengths(FocalLengthCalibrationOptions(), &scene);
     ASSERT_EQ(found.size(), 1) << seed;
@@ -94,9 +76,8 @@ TEST(CalibrateFocalLengths, FindsTheTruthOfALensWithTwoRadialTerms) {
   for (const uint64_t seed : {1, 2, 3}) {
     const SyntheticWorld world = BuildSyntheticWorld(Drive(seed));
     SceneData scene = SceneWithFocalLength(world, 1.0);
-    DistortKeypoints(kFirst, kSecond, &scene);
-    colmap::Camera& camera = scene.cameras.at(1);
-    camera.SetFocalLength(1.6 * camera.FocalLength());
+    UseUnknownLens(kFirst, kSecond, 1.6, &scene);
+    const colmap::Camera& camera = scene.cameras.at(1);
     const auto found =
         CalibrateFocalLengths(FocalLengthCalibrationOptions(), &scene);
     ASSERT_EQ(found.size(), 1) << seed;
@@ -115,7 +96,7 @@ TEST(CalibrateFocalLengths, FindsTheTruthOfALensWithTwoRadialTerms) {
 TEST(CalibrateFocalLengths, FindsTheDistortionAtARightFocalLength) {
   const SyntheticWorld world = BuildSyntheticWorld(Drive(1));
   SceneData scene = SceneWithFocalLength(world, 1.0);
-  DistortKeypoints(-0.08, 0.0, &scene);
+  UseUnknownLens(-0.08, 0.0, 1.0, &scene);
   const auto found =
       CalibrateFocalLengths(FocalLengthCalibrationOptions(), &scene);
   ASSERT_EQ(found.size(), 1);
@@ -129,9 +110,7 @@ TEST(CalibrateFocalLengths, WhatIsGivenDoesNotMatter) {
     std::vector<double> found_px;
     for (const double factor : {0.5, 1.4, 2.3}) {
       SceneData scene = SceneWithFocalLength(world, 1.0);
-      DistortKeypoints(-0.08, 0.0, &scene);
-      colmap::Camera& camera = scene.cameras.at(1);
-      camera.SetFocalLength(factor * camera.FocalLength());
+      UseUnknownLens(-0.08, 0.0, factor, &scene);
       const auto found =
           CalibrateFocalLengths(FocalLengthCalibrationOptions(), &scene);
       ASSERT_EQ(found.size(), 1) << seed << ", " << factor;

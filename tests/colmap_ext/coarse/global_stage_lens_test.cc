@@ -1,0 +1,199 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <string>
+#include <vector>
+
+#include "colmap_ext/coarse/global_report.h"
+#include "colmap_ext/coarse/global_stage.h"
+#include "colmap_ext/host/colmap.h"
+#include "colmap_ext/host/pose_conversion.h"
+#include "core/so3.h"
+#include "tests/testing/colmap_ext/global_stage_run.h"
+#include "tests/testing/colmap_ext/synthetic_scene.h"
+#include "tests/testing/colmap_ext/unknown_lens.h"
+
+namespace adasfm {
+namespace {
+
+// Its road turns by 93 deg.
+SyntheticWorldOptions TurningWorld() {
+  SyntheticWorldOptions options = SmallWorld();
+  options.seed = 2;
+  return options;
+}
+
+void ScaleFocalLength(double ratio, SceneData* scene) {
+  for (const size_t i : scene->cameras.at(1).FocalLengthIdxs()) {
+    scene->cameras.at(1).Params(i) *= ratio;
+  }
+}
+
+// A focal length that is 3 % too long bends the epipolar lines; once the
+// adjustment has found the right one, the matches are judged by that.
+TEST(GlobalStageLensTest, MatchesAreRefinedUnderRefinedCameras) {
+  for (const uint64_t seed : {1, 2}) {
+    SyntheticWorldOptions world_options = SmallWorld();
+    world_options.seed = seed;
+    const SyntheticWorld world = BuildSyntheticWorld(world_options);
+    SceneData scene = BuildSyntheticScene(world, SyntheticPriorOptions());
+    const auto set_focal_length = [&](double focal_px) {
+      scene.cameras.at(1).InitializeWithName(
+          "SIMPLE_PINHOLE", focal_px, world.camera.width, world.camera.height);
+      scene.cameras.at(1).SetCameraId(1);
+    };
+    set_focal_length(world.camera.focal_px);
+    const GlobalStageResult right = RunStage(scene);
+    set_focal_length(1.03 * world.camera.focal_px);
+    GlobalStageOptions options;
+    options.structure.bundle.refine_focal_length = true;
+    // A gyroscope without bias tells the focal length of so short a drive.
+    options.structure.bundle.shared_errors.enabled = false;
+    const GlobalStageResult refined = RunStage(scene, options);
+    ASSERT_EQ(refined.models.size(), 1);
+    EXPECT_NEAR(refined.models[0].reconstruction.Camera(1).FocalLength() /
+                    world.camera.focal_px,
+                1.0, 0.003);
+    EXPECT_NEAR(refined.refinement.num_kept, right.refinement.num_kept,
+                0.005 * right.refinement.num_kept)
+        << seed;
+  }
+}
+
+TEST(GlobalStageLensTest, WarnsOfAWrongFocalLength) {
+  for (const double ratio : {0.9, 0.97, 1.0, 1.03}) {
+    const SyntheticWorld world = BuildSyntheticWorld(TurningWorld());
+    SceneData scene = BuildSyntheticScene(world, SyntheticPriorOptions());
+    ScaleFocalLength(ratio, &scene);
+    scene.cameras.at(1).SetPriorFocalLength(true);
+    const GlobalStageResult result = RunStage(scene);
+    const auto& error = result.models[0].focal_length_error;
+    ASSERT_EQ(error.has_value(), ratio != 1.0) << ratio;
+    if (!error) continue;
+    EXPECT_NEAR(error->ratio, 1.0 / ratio, 0.01);
+    EXPECT_NEAR(error->ratio, 1.0 / ratio, 4.0 * error->sigma);
+    const std::vector<std::string> warnings = ListGlobalWarnings(scene, result);
+    ASSERT_FALSE(warnings.empty());
+    EXPECT_NE(warnings[0].find(ratio > 1.0 ? "shorter" : "longer"),
+              std::string::npos);
+    // The cameras are the user's: told, not changed.
+    EXPECT_FALSE(result.models[0].cameras_refined);
+    EXPECT_EQ(result.models[0].reconstruction.Camera(1).Params(),
+              scene.cameras.at(1).Params());
+  }
+}
+
+// Straight on, the errors that priors share pass for a focal length.
+TEST(GlobalStageLensTest, SaysNothingOfFocalLengthsOnStraightRoads) {
+  SyntheticWorldOptions options = SmallWorld();
+  options.trajectory = SyntheticTrajectory::kStraight;
+  const SyntheticWorld world = BuildSyntheticWorld(options);
+  SceneData scene = BuildSyntheticScene(world, SyntheticPriorOptions());
+  ScaleFocalLength(1.1, &scene);
+  EXPECT_FALSE(RunStage(scene).models[0].focal_length_error.has_value());
+}
+
+TEST(GlobalStageLensTest, RefinesAFocalLengthThatNobodyKnows) {
+  const SyntheticWorld world = BuildSyntheticWorld(TurningWorld());
+  SceneData scene = BuildSyntheticScene(world, SyntheticPriorOptions());
+  const double focal_px = scene.cameras.at(1).MeanFocalLength();
+  const GlobalStageResult right = RunStage(scene);
+  ScaleFocalLength(1.05, &scene);
+  scene.cameras.at(1).SetPriorFocalLength(false);
+  GlobalStageOptions options;
+  options.focal_lengths.enabled = false;
+  const GlobalStageResult refined = RunStage(scene, options);
+  EXPECT_TRUE(refined.models[0].cameras_refined);
+  EXPECT_NEAR(refined.refinement.num_kept, right.refinement.num_kept,
+              0.005 * right.refinement.num_kept);
+  options.structure.refine_unknown_focal_length = false;
+  const GlobalStageResult left = RunStage(scene, options);
+  EXPECT_FALSE(left.models[0].cameras_refined);
+  ASSERT_TRUE(left.models[0].focal_length_error.has_value());
+  const double sigma = left.models[0].focal_length_error->sigma;
+  EXPECT_LT(sigma, 0.003);
+  EXPECT_NEAR(
+      refined.models[0].reconstruction.Camera(1).MeanFocalLength() / focal_px,
+      1.0, 3.0 * sigma);
+  EXPECT_LT(ComparePoses(world, refined.models[0].reconstruction).rmse_m,
+            ComparePoses(world, left.models[0].reconstruction).rmse_m);
+}
+
+// Before all other steps, as COLMAP's guess spoils two-view rotations.
+TEST(GlobalStageLensTest, FindsAFocalLengthThatNobodyKnows) {
+  const SyntheticWorld world = BuildSyntheticWorld(TurningWorld());
+  SceneData scene = BuildSyntheticScene(world, SyntheticPriorOptions());
+  const double focal_px = scene.cameras.at(1).MeanFocalLength();
+  ScaleFocalLength(1.5, &scene);
+  scene.cameras.at(1).SetPriorFocalLength(false);
+  GlobalStageOptions options;
+  options.focal_lengths.enabled = false;
+  EXPECT_TRUE(RunStage(scene, options).focal_lengths.empty());
+  const GlobalStageResult result = RunStage(scene);
+  ASSERT_EQ(result.focal_lengths.size(), 1);
+  EXPECT_NEAR(
+      result.models[0].reconstruction.Camera(1).MeanFocalLength() / focal_px,
+      1.0, 0.01);
+}
+
+// The root mean square of the angles to the priors' rotations.
+double RotationErrorDeg(const std::vector<RelativePosePrior>& priors,
+                        const colmap::Reconstruction& model) {
+  double sum = 0.0;
+  for (const RelativePosePrior& prior : priors) {
+    const Rigid3d motion =
+        ComputeCam2FromCam1(CamFromWorld(model.Image(prior.image_id1)),
+                            CamFromWorld(model.Image(prior.image_id2)));
+    sum += std::pow(
+        motion.rotation.angularDistance(prior.cam2_from_cam1.rotation), 2);
+  }
+  return RadToDeg(std::sqrt(sum / priors.size()));
+}
+
+// Worlds that turn: the roads of seeds 1 and 4 tell no lens.
+TEST(GlobalStageLensTest, AdjustsALensThatNobodyKnows) {
+  for (const uint64_t seed : {2, 3}) {
+    SyntheticWorldOptions world_options = TurningWorld();
+    world_options.seed = seed;
+    const SyntheticWorld world = BuildSyntheticWorld(world_options);
+    SceneData scene = BuildSyntheticScene(world, SyntheticPriorOptions());
+    UseUnknownLens(0.12, -0.12, 1.6, &scene);
+    const GlobalStageResult result = RunStage(scene);
+    ASSERT_EQ(result.models.size(), 1) << seed;
+    EXPECT_TRUE(result.models[0].cameras_refined);
+    const colmap::Reconstruction& model = result.models[0].reconstruction;
+    EXPECT_EQ(model.NumRegImages(), world.images.size());
+    const colmap::Camera& camera = model.Camera(1);
+    EXPECT_EQ(camera.ModelName(), "RADIAL");
+    EXPECT_NEAR(camera.MeanFocalLength() / world.camera.focal_px, 1.0, 0.01)
+        << seed;
+    EXPECT_NEAR(camera.Params(3), 0.12, 0.02) << seed;
+    EXPECT_NEAR(camera.Params(4), -0.12, 0.02) << seed;
+    // The priors' sigma is 0.03 deg about each axis.
+    EXPECT_LT(RotationErrorDeg(scene.priors, model), 0.1) << seed;
+  }
+}
+
+TEST(GlobalStageLensTest, LeavesLensesAloneNextToAKnownOne) {
+  const SyntheticWorld world = BuildSyntheticWorld(TurningWorld());
+  SceneData scene = BuildSyntheticScene(world, SyntheticPriorOptions());
+  UseUnknownLens(0.12, -0.12, 1.6, &scene);
+  scene.cameras[2] = scene.cameras.at(1);
+  scene.cameras.at(2).SetCameraId(2);
+  scene.cameras.at(2).SetPriorFocalLength(true);
+  scene.images.at(1).camera_id = 2;
+  const std::vector<double> known = ParamsOf(scene.cameras.at(2));
+  const GlobalStageResult result = RunStage(scene);
+  ASSERT_GE(result.models.size(), 1);
+  EXPECT_EQ(result.focal_lengths.size(), 1);
+  for (const CoarseModel& model : result.models) {
+    EXPECT_FALSE(model.cameras_refined);
+    if (model.reconstruction.ExistsCamera(2)) {
+      EXPECT_EQ(ParamsOf(model.reconstruction.Camera(2)), known);
+    }
+  }
+}
+
+}  // namespace
+}  // namespace adasfm
