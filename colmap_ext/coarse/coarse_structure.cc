@@ -225,7 +225,7 @@ void RepeatWithFreeLenses(
     CoarseModel* model) {
   const int last = options.num_rounds - 1;
   options.bundle.refine_focal_length = true;
-  options.bundle.refine_extra_params = options.refine_lenses;
+  options.bundle.refine_extra_params = input.refine_lenses;
   *keypoint_sigma_factor = 1.0;
   model->cameras_refined = true;
   model->rounds.push_back(AdjustRound(options, problem, last, model->positions,
@@ -255,10 +255,9 @@ bool CoarseStructureOptions::IsValid(std::string* error) const {
 }
 
 CoarseModel BuildCoarseModel(
-    const CoarseStructureOptions& given_options, const SceneData& scene,
+    const CoarseStructureOptions& options, const SceneData& scene,
     const std::map<image_t, std::vector<Bearing>>& bearings,
     CoarseModelInput input) {
-  CoarseStructureOptions options = given_options;
   CoarseModel model;
   AlignInput(scene, &input, &model.positions);
   const bool is_georeferenced = model.positions.success;
@@ -282,16 +281,15 @@ CoarseModel BuildCoarseModel(
   }
   model.cameras_refined = options.bundle.RefinesCameras();
   const bool is_any_known = IsAnyFocalLengthKnown(model.reconstruction);
-  options.refine_lenses = options.refine_lenses && !is_any_known;
-  if (model.rounds.back().success && !model.cameras_refined &&
-      !options.refine_lenses) {
+  const bool refine_lenses = input.refine_lenses && !is_any_known;
+  if (model.rounds.back().success && !model.cameras_refined && !refine_lenses) {
     model.focal_length_error = FindFocalLengthError(
         options.balance, options.bundle, problem, model.reconstruction);
   }
   const bool is_wrong = model.focal_length_error &&
                         options.refine_unknown_focal_length && !is_any_known;
   if (model.rounds.back().success && !model.cameras_refined &&
-      (is_wrong || options.refine_lenses)) {
+      (is_wrong || refine_lenses)) {
     RepeatWithFreeLenses(options, scene, bearings, input, tracks, problem,
                          &keypoint_sigma_factor, &model);
   }

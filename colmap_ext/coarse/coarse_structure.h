@@ -49,11 +49,6 @@ struct CoarseStructureOptions {
   // FindFocalLengthError finds them wrong and the scene has no known ones;
   // those are only reported.
   bool refine_unknown_focal_length = true;
-  // Nobody measured the lenses, and pairs told their focal lengths and
-  // distortions (CalibrateFocalLengths), which the adjustment then goes on
-  // with: points that many images see tell them better, and so do the sensors'
-  // rotations. Not where one of the cameras is known.
-  bool refine_lenses = false;
 
   CoarseStructureOptions() { balance.max_sigma_factor = 8.0; }
   bool IsValid(std::string* error) const;
@@ -71,6 +66,11 @@ struct CoarseModelInput {
   // By which the cameras are turned against the scene's gravity directions;
   // the priors have it already.
   Eigen::Quaterniond camera_mount = Eigen::Quaterniond::Identity();
+  // Pairs told focal lengths and distortions of lenses that nobody measured
+  // (CalibrateFocalLengths), which the adjustment goes on with: points that
+  // many images see tell them better, and so do the sensors' rotations. Not
+  // where one of the cameras is known.
+  bool refine_lenses = false;
 };
 
 struct CoarseModel {

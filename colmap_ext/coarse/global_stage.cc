@@ -219,14 +219,13 @@ StatusOr<GlobalStageResult> RunGlobalStage(
   CoarseStructureOptions structure_options = options.structure;
   structure_options.bundle.shared_errors.length_drift_ratio =
       scene.length_drift_ratio;
-  structure_options.refine_lenses =
-      structure_options.refine_unknown_focal_length &&
-      !result.focal_lengths.empty();
   for (const CoarseComponent& component : result.poses.components) {
     CoarseModelInput input = CreateModelInput(
         MatchAnew(options.refinement, scene, raw_matches,
                   correspondences.bearings, component, result.poses.graph),
         component, result.poses, &correspondences);
+    input.refine_lenses = options.structure.refine_unknown_focal_length &&
+                          !result.focal_lengths.empty();
     watch = begin(DescribeTrackMemory(input), 0.5);
     result.models.push_back(BuildCoarseModel(
         structure_options, scene, correspondences.bearings, std::move(input)));

@@ -55,7 +55,7 @@ struct CalibratedFocalLength {
 // `scene` and returned; the principal point stays, and so does a distortion
 // that is given. SIMPLE_RADIAL and SIMPLE_RADIAL_FISHEYE become RADIAL and
 // RADIAL_FISHEYE then. The caller goes on from there: an adjustment of many
-// images tells a lens better (CoarseStructureOptions::refine_lenses).
+// images tells a lens better (CoarseModelInput::refine_lenses).
 std::vector<CalibratedFocalLength> CalibrateFocalLengths(
     const FocalLengthCalibrationOptions& options, SceneData* scene);
 
