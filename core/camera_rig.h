@@ -14,6 +14,11 @@
 
 namespace adasfm {
 
+// How well a good calibration knows the cameras of a rig against each other, 1
+// sigma, per axis.
+inline constexpr double kRigRotationSigmaDeg = 0.05;
+inline constexpr double kRigTranslationSigmaM = 2e-3;
+
 // A camera of a rig: cameras that are mounted together and take their images at
 // the same times. The reference camera's frame is the rig's.
 struct RigCamera {
@@ -21,10 +26,9 @@ struct RigCamera {
   bool is_reference = false;
   // The identity for the reference camera; none when nobody knows it.
   std::optional<Rigid3d> cam_from_rig;
-  // 1 sigma of its error, which all frames share, per axis: a good calibration
-  // of two cameras.
-  double rotation_sigma_rad = DegToRad(0.05);
-  double translation_sigma_m = 2e-3;
+  // 1 sigma of its error, which all frames share, per axis.
+  double rotation_sigma_rad = DegToRad(kRigRotationSigmaDeg);
+  double translation_sigma_m = kRigTranslationSigmaM;
 };
 
 struct RigImage {

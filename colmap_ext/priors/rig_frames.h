@@ -15,8 +15,8 @@ namespace adasfm {
 // How well the calibration knows the cameras of a rig against each other, 1
 // sigma, per axis.
 struct RigOptions {
-  double rotation_sigma_deg = 0.05;
-  double translation_sigma_m = 2e-3;
+  double rotation_sigma_deg = kRigRotationSigmaDeg;
+  double translation_sigma_m = kRigTranslationSigmaM;
 
   bool IsValid(std::string* error) const;
 };

@@ -41,6 +41,11 @@ TEST(FindRigCameras, TakesFoldersElseTheOrderOfIds) {
   ASSERT_TRUE(by_folder.ok()) << by_folder.status().message();
   EXPECT_TRUE(by_folder->at(8).is_reference);
   EXPECT_EQ(by_folder->at(3).rig_id, 8u);
+  // Trusted as a rig of the host's tables is.
+  EXPECT_EQ(by_folder->at(3).rotation_sigma_rad,
+            RigCamera().rotation_sigma_rad);
+  EXPECT_EQ(by_folder->at(3).translation_sigma_m,
+            RigCamera().translation_sigma_m);
   EXPECT_TRUE(PosesNear(
       *by_folder->at(3).cam_from_rig,
       Rigid3d(Eigen::Quaterniond::Identity(), Eigen::Vector3d(-0.5, 0.0, 0.0)),
