@@ -2,6 +2,8 @@
 #include "colmap_ext/io/output_files.h"
 
 #include <fcntl.h>
+#include <sys/file.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <cerrno>
@@ -47,15 +49,34 @@ int WriteAll(int file, const char* data, size_t num_bytes) {
   return 0;
 }
 
-// Creates or replaces the file and syncs it.
-int WriteAndSync(const std::string& path, const std::string& text) {
-  const int file =
-      open(path.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
-  if (file < 0) return errno;
-  int error = WriteAll(file, text.data(), text.size());
-  if (error == 0 && fsync(file) != 0) error = errno;
-  if (close(file) != 0 && error == 0) error = errno;
-  return error;
+// Whether the name is still that of the open file.
+bool HasName(int file, const std::string& path) {
+  struct stat opened, named;
+  return fstat(file, &opened) == 0 && stat(path.c_str(), &named) == 0 &&
+         opened.st_dev == named.st_dev && opened.st_ino == named.st_ino;
+}
+
+// Opens or creates a file for this writer alone until it is closed; -1: errno
+// says why not. File systems that know no locks are trusted to have one writer.
+int OpenAlone(const std::string& path) {
+  for (;;) {
+    const int file = open(path.c_str(), O_WRONLY | O_CREAT | O_CLOEXEC, 0666);
+    if (file < 0) return file;
+    while (flock(file, LOCK_EX) != 0 && errno == EINTR) {
+    }
+    if (HasName(file, path)) return file;
+    close(file);  // The writer before has given it its final name.
+  }
+}
+
+// Replaces what the file holds, syncs it and renames it.
+int WriteAndRename(int file, const std::string& text,
+                   const std::string& temporary, const std::string& path) {
+  if (ftruncate(file, 0) != 0) return errno;
+  const int error = WriteAll(file, text.data(), text.size());
+  if (error != 0) return error;
+  if (fsync(file) != 0) return errno;
+  return rename(temporary.c_str(), path.c_str()) == 0 ? 0 : errno;
 }
 
 // Some file systems cannot sync folders, or nothing at all.
@@ -81,10 +102,14 @@ Status PrepareOutputFolder(const std::string& path) {
 
 Status WriteTextFile(const std::string& path, const std::string& text) {
   const std::string temporary = path + ".tmp";
-  int error = WriteAndSync(temporary, text);
-  if (error == 0 && rename(temporary.c_str(), path.c_str()) != 0) error = errno;
+  const int file = OpenAlone(temporary);
+  int error = file < 0 ? errno : WriteAndRename(file, text, temporary, path);
+  if (file >= 0) {
+    // Before others may open it.
+    if (error != 0) unlink(temporary.c_str());
+    close(file);
+  }
   if (error != 0) {
-    unlink(temporary.c_str());
     return Status::Error("cannot write " + path + ": " +
                          ReasonAndAdvice(error));
   }

@@ -14,7 +14,8 @@ namespace adasfm {
 Status PrepareOutputFolder(const std::string& path);
 
 // Writes a file under a temporary name, waits until it is on the disk and
-// renames it. The error names the cause, such as a full disk.
+// renames it. Of writers at the same time, threads or processes, the last one's
+// text stays, whole. The error names the cause, such as a full disk.
 Status WriteTextFile(const std::string& path, const std::string& text);
 
 // An error when no file can be written there: the folder is missing or not

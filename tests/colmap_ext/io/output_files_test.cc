@@ -5,6 +5,9 @@
 #include <gtest/gtest.h>
 
 #include <filesystem>
+#include <string>
+#include <thread>
+#include <vector>
 
 #include "colmap_ext/io/digest.h"
 #include "colmap_ext/io/folder_lock.h"
@@ -31,6 +34,26 @@ TEST(WriteTextFile, NamesTheCauseAndKeepsTheOldFile) {
   EXPECT_EQ(ReadBytes(path), "new");
   EXPECT_THAT(WriteTextFile(folder.File("none/text"), "x").message(),
               HasSubstr("No such file"));
+}
+
+TEST(WriteTextFile, WritersAtTheSameTimeLeaveOneWholeText) {
+  constexpr size_t kNumBytes = 200000;
+  const TemporaryFolder folder;
+  const std::string path = folder.Write("text", std::string(kNumBytes, 'z'));
+  std::vector<std::thread> writers;
+  for (const char letter : {'a', 'b', 'c', 'd'}) {
+    writers.emplace_back([&path, letter] {
+      const std::string text(kNumBytes, letter);
+      for (int k = 0; k < 25; ++k) {
+        const Status status = WriteTextFile(path, text);
+        EXPECT_TRUE(status.ok()) << status.message();
+        const std::string found = ReadBytes(path);
+        EXPECT_EQ(found, std::string(kNumBytes, found[0]));
+      }
+    });
+  }
+  for (std::thread& writer : writers) writer.join();
+  EXPECT_FALSE(std::filesystem::exists(path + ".tmp"));
 }
 
 TEST(CheckOutputIsNoInput, SeesThroughOtherNames) {
