@@ -124,6 +124,8 @@ struct PriorBundleAdjustmentProblem {
   std::set<image_t> images;
   // Registered images that take part with fixed poses.
   std::set<image_t> constant_images;
+  // Cameras whose intrinsics stay, whatever the options refine.
+  std::set<camera_t> constant_cameras;
   // Those of sensors in order of time: a window of the shared errors ends where
   // a prior does not begin with the image that the last one ended with.
   std::vector<PosePriorEdge> priors;

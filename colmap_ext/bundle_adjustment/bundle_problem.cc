@@ -61,8 +61,10 @@ void BundleProblem::AddImages(const PriorBundleAdjustmentProblem& problem,
     if (!IsRegistered(reconstruction, image_id)) return;
     ImageBlock& block = images_[image_id];
     block.is_constant = is_constant;
-    const colmap::Camera& camera = reconstruction.Camera(image.CameraId());
-    cameras_[image.CameraId()].params = ParamsOf(camera);
+    CameraBlock& camera = cameras_[image.CameraId()];
+    camera.params = ParamsOf(reconstruction.Camera(image.CameraId()));
+    camera.is_constant = !options_.RefinesCameras() ||
+                         problem.constant_cameras.count(image.CameraId()) > 0;
   };
   for (const image_t image_id : problem.images) add(image_id, false);
   for (const image_t image_id : problem.constant_images) add(image_id, true);
@@ -220,15 +222,15 @@ void BundleProblem::AddObservation(const colmap::Reconstruction& reconstruction,
     observations_.push_back({observation.keypoint, block.pose});
     return;
   }
-  if (!options_.RefinesCameras()) {
+  const camera_t camera_id =
+      reconstruction.Image(observation.image_id).CameraId();
+  CameraBlock& camera = cameras_.at(camera_id);
+  if (camera.is_constant) {
     reprojection_costs_.emplace_back(observation.keypoint, block.pose);
     AddCost(&reprojection_costs_.back(), reprojection_loss_.get(), {&block},
             {point->xyz.data()});
     return;
   }
-  const camera_t camera_id =
-      reconstruction.Image(observation.image_id).CameraId();
-  CameraBlock& camera = cameras_.at(camera_id);
   camera.is_used = true;
   other_costs_.push_back(
       CreateCameraCost(reconstruction.Camera(camera_id), observation.xy,

@@ -110,6 +110,7 @@ class BundleProblem final : private ceres::EvaluationCallback {
   };
   struct CameraBlock {
     std::vector<double> params;
+    bool is_constant = false;
     bool is_used = false;
   };
   struct SharedBlock {

@@ -44,6 +44,7 @@ PriorBundleAdjustmentProblem SelectImages(
     if (turn[k + length] - turn[k] > turn[best + length] - turn[best]) best = k;
   }
   PriorBundleAdjustmentProblem selected;
+  selected.constant_cameras = problem.constant_cameras;
   selected.priors.assign(priors.begin() + best, priors.begin() + best + length);
   for (const PosePriorEdge& prior : selected.priors) {
     selected.images.insert({prior.image_id1, prior.image_id2});
@@ -63,25 +64,32 @@ double LargestTurnRad(const std::vector<PosePriorEdge>& priors) {
   return largest;
 }
 
-// Of the camera that is farthest from 1.
-double FarthestRatio(const colmap::Reconstruction& before,
-                     const colmap::Reconstruction& after) {
-  double farthest = 1.0;
+// The camera whose ratio is farthest from 1; the sigma is left open.
+FocalLengthError FindFarthest(const colmap::Reconstruction& before,
+                              const colmap::Reconstruction& after) {
+  FocalLengthError farthest;
   for (const auto& [camera_id, camera] : before.Cameras()) {
     const double ratio =
         after.Camera(camera_id).MeanFocalLength() / camera.MeanFocalLength();
-    if (std::abs(ratio - 1.0) > std::abs(farthest - 1.0)) farthest = ratio;
+    if (std::abs(ratio - 1.0) > std::abs(farthest.ratio - 1.0)) {
+      farthest.camera_id = camera_id;
+      farthest.ratio = ratio;
+    }
   }
   return farthest;
 }
 
-}  // namespace
-
-bool HasPriorFocalLengths(const colmap::Reconstruction& reconstruction) {
-  return std::all_of(
-      reconstruction.Cameras().begin(), reconstruction.Cameras().end(),
-      [](const auto& entry) { return HasPriorFocalLength(entry.second); });
+// Whether all cameras that are tried are marked as of measured focal length.
+bool HasPriorFocalLengths(const std::set<camera_t>& constant_cameras,
+                          const colmap::Reconstruction& reconstruction) {
+  return std::all_of(reconstruction.Cameras().begin(),
+                     reconstruction.Cameras().end(), [&](const auto& entry) {
+                       return HasPriorFocalLength(entry.second) ||
+                              constant_cameras.count(entry.first) > 0;
+                     });
 }
+
+}  // namespace
 
 std::optional<FocalLengthError> FindFocalLengthError(
     const VarianceComponentOptions& balance,
@@ -113,11 +121,11 @@ std::optional<FocalLengthError> FindFocalLengthError(
   const double num_sigmas = std::sqrt(
       2.0 * std::max(0.0, with_given.final_cost - with_free.final_cost) /
       variance);
-  FocalLengthError error;
-  error.ratio = FarthestRatio(reconstruction, free);
-  const double min_num_sigmas = HasPriorFocalLengths(reconstruction)
-                                    ? kMinNumSigmas
-                                    : kMinNumSigmasOfUnknown;
+  FocalLengthError error = FindFarthest(reconstruction, free);
+  const double min_num_sigmas =
+      HasPriorFocalLengths(problem.constant_cameras, reconstruction)
+          ? kMinNumSigmas
+          : kMinNumSigmasOfUnknown;
   if (std::abs(error.ratio - 1.0) < kMinRatio || num_sigmas < min_num_sigmas) {
     return std::nullopt;
   }

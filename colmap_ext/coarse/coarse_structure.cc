@@ -209,10 +209,15 @@ PriorBundleAdjustmentSummary AdjustRound(
       balance, bundle, problem, reconstruction, keypoint_sigma_factor);
 }
 
-bool IsAnyFocalLengthKnown(const colmap::Reconstruction& reconstruction) {
-  return std::any_of(
-      reconstruction.Cameras().begin(), reconstruction.Cameras().end(),
-      [](const auto& entry) { return HasPriorFocalLength(entry.second); });
+std::set<camera_t> FindCameras(const colmap::Reconstruction& reconstruction,
+                               bool has_known_focal_length) {
+  std::set<camera_t> camera_ids;
+  for (const auto& [camera_id, camera] : reconstruction.Cameras()) {
+    if (HasPriorFocalLength(camera) == has_known_focal_length) {
+      camera_ids.insert(camera_id);
+    }
+  }
+  return camera_ids;
 }
 
 // The last round once more, after an adjustment that has found the focal
@@ -235,6 +240,33 @@ void RepeatWithFreeLenses(
   model->rounds.push_back(AdjustRound(options, problem, last, model->positions,
                                       &model->reconstruction,
                                       keypoint_sigma_factor));
+}
+
+// Refines the lenses that nobody knows where they are wrong, the known ones
+// held, then looks for errors of those, which it leaves.
+void AdjustLenses(const CoarseStructureOptions& options, const SceneData& scene,
+                  const std::map<image_t, std::vector<Bearing>>& bearings,
+                  const CoarseModelInput& input, const RoundTracks& tracks,
+                  PriorBundleAdjustmentProblem problem,
+                  double* keypoint_sigma_factor, CoarseModel* model) {
+  const std::set<camera_t> known = FindCameras(model->reconstruction, true);
+  const std::set<camera_t> unknown = FindCameras(model->reconstruction, false);
+  const auto find_error = [&] {
+    model->focal_length_error = FindFocalLengthError(
+        options.balance, options.bundle, problem, model->reconstruction);
+    return model->focal_length_error.has_value();
+  };
+  if (!unknown.empty()) {
+    problem.constant_cameras = known;
+    if (input.refine_lenses ||
+        (find_error() && options.refine_unknown_focal_length)) {
+      RepeatWithFreeLenses(options, scene, bearings, input, tracks, problem,
+                           keypoint_sigma_factor, model);
+    }
+  }
+  if (known.empty() || model->focal_length_error) return;
+  problem.constant_cameras = unknown;
+  find_error();
 }
 
 }  // namespace
@@ -280,18 +312,9 @@ CoarseModel BuildCoarseModel(
     if (!model.rounds.back().success) break;
   }
   model.cameras_refined = options.bundle.RefinesCameras();
-  const bool is_any_known = IsAnyFocalLengthKnown(model.reconstruction);
-  const bool refine_lenses = input.refine_lenses && !is_any_known;
-  if (model.rounds.back().success && !model.cameras_refined && !refine_lenses) {
-    model.focal_length_error = FindFocalLengthError(
-        options.balance, options.bundle, problem, model.reconstruction);
-  }
-  const bool is_wrong = model.focal_length_error &&
-                        options.refine_unknown_focal_length && !is_any_known;
-  if (model.rounds.back().success && !model.cameras_refined &&
-      (is_wrong || refine_lenses)) {
-    RepeatWithFreeLenses(options, scene, bearings, input, tracks, problem,
-                         &keypoint_sigma_factor, &model);
+  if (model.rounds.back().success && !model.cameras_refined) {
+    AdjustLenses(options, scene, bearings, input, tracks, problem,
+                 &keypoint_sigma_factor, &model);
   }
   FilterPoints(options.final_max_reproj_error_px,
                std::min(options.min_angle_floor_deg,

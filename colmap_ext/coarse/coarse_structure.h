@@ -46,8 +46,8 @@ struct CoarseStructureOptions {
   // Sensor priors take part in the adjustment.
   bool use_priors = true;
   // Focal lengths that the database does not mark as known are adjusted when
-  // FindFocalLengthError finds them wrong and the scene has no known ones;
-  // those are only reported.
+  // FindFocalLengthError finds them wrong, beside known ones that are held;
+  // of wrong ones among those is only told.
   bool refine_unknown_focal_length = true;
 
   CoarseStructureOptions() { balance.max_sigma_factor = 8.0; }
@@ -68,8 +68,8 @@ struct CoarseModelInput {
   Eigen::Quaterniond camera_mount = Eigen::Quaterniond::Identity();
   // Pairs told focal lengths and distortions of lenses that nobody measured
   // (CalibrateFocalLengths), which the adjustment goes on with: points that
-  // many images see tell them better, and so do the sensors' rotations. Not
-  // where one of the cameras is known.
+  // many images see tell them better, and so do the sensors' rotations. Lenses
+  // that are known are held.
   bool refine_lenses = false;
 };
 
@@ -94,7 +94,9 @@ struct CoarseModel {
   double prior_chi2_per_dof = 0.0;
   // Whether vision and the priors agree within what the balance may ask for.
   bool priors_agree = true;
-  // FindFocalLengthError, of the focal lengths that the scene states.
+  // FindFocalLengthError, of the focal lengths that the scene states: of the
+  // unknown ones or, where these are right or refined with their distortion, of
+  // the known ones.
   std::optional<FocalLengthError> focal_length_error;
   // The cameras are not the scene's any more.
   bool cameras_refined = false;

@@ -195,12 +195,17 @@ void AppendPriorWarnings(const CoarseModel& model,
   text << std::fixed << std::setprecision(1);
   if (model.focal_length_error) {
     const FocalLengthError& error = *model.focal_length_error;
+    const bool is_known =
+        HasPriorFocalLength(model.reconstruction.Camera(error.camera_id));
     text << std::setprecision(2)
          << "vision and sensors agree with a focal length that is "
          << 100.0 * std::abs(error.ratio - 1.0) << " +- " << 100.0 * error.sigma
          << " % " << (error.ratio > 1.0 ? "longer" : "shorter")
          << " than the database says";
-    if (model.cameras_refined) {
+    if (model.reconstruction.NumCameras() > 1) {
+      text << " of camera " << error.camera_id;
+    }
+    if (model.cameras_refined && !is_known) {
       text << "; it was refined, as it is not marked as known";
     } else {
       text << ": check the intrinsics, or have them refined "

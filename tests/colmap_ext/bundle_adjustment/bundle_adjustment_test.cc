@@ -247,6 +247,23 @@ TEST(AdjustBundleTest, RefinesTheFocalLength) {
   EXPECT_EQ(reconstruction.Camera(1).Params(1), 400.0);
 }
 
+TEST(AdjustBundleTest, ConstantCamerasKeepTheirLens) {
+  BundleWorldOptions world;
+  world.camera_model = "SIMPLE_RADIAL";
+  world.camera_params = {480, 400, 250, 0.05};
+  world.pixel_noise_px = world.second_camera_noise_px = 0.01;
+  colmap::Reconstruction reconstruction = BuildBundleWorld(world);
+  reconstruction.Camera(2).SetParams({470, 400, 250, 0.0});
+  PriorBundleAdjustmentOptions options = ConvergeFully();
+  options.refine_focal_length = options.refine_extra_params = true;
+  PriorBundleAdjustmentProblem problem = ProblemOfAll(reconstruction);
+  problem.constant_cameras = {1};
+  ASSERT_TRUE(AdjustBundle(options, problem, &reconstruction).success);
+  EXPECT_EQ(reconstruction.Camera(1).Params(), world.camera_params);
+  EXPECT_NEAR(reconstruction.Camera(2).Params(0), 480.0, 0.5);
+  EXPECT_NEAR(reconstruction.Camera(2).Params(3), 0.05, 0.001);
+}
+
 TEST(AdjustBundleTest, ConstantImagesDoNotMove) {
   BundleWorldOptions world;
   colmap::Reconstruction reconstruction = BuildBundleWorld(world);

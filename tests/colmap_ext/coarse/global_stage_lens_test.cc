@@ -24,10 +24,9 @@ SyntheticWorldOptions TurningWorld() {
   return options;
 }
 
-void ScaleFocalLength(double ratio, SceneData* scene) {
-  for (const size_t i : scene->cameras.at(1).FocalLengthIdxs()) {
-    scene->cameras.at(1).Params(i) *= ratio;
-  }
+void ScaleFocalLength(double ratio, SceneData* scene, camera_t camera_id = 1) {
+  colmap::Camera& camera = scene->cameras.at(camera_id);
+  for (const size_t i : camera.FocalLengthIdxs()) camera.Params(i) *= ratio;
 }
 
 // A focal length that is 3 % too long bends the epipolar lines; once the
@@ -175,22 +174,108 @@ TEST(GlobalStageLensTest, AdjustsALensThatNobodyKnows) {
   }
 }
 
-TEST(GlobalStageLensTest, LeavesLensesAloneNextToAKnownOne) {
-  const SyntheticWorld world = BuildSyntheticWorld(TurningWorld());
+// Which images of a drive of 60 are of camera 2, whose focal length is 1.2
+// times that of camera 1.
+enum class SecondCamera { kEveryOther, kSecondHalf };
+constexpr SecondCamera kSecondCameras[] = {SecondCamera::kEveryOther,
+                                           SecondCamera::kSecondHalf};
+
+SceneData SceneOfTwoCameras(const SyntheticWorld& world, SecondCamera which) {
   SceneData scene = BuildSyntheticScene(world, SyntheticPriorOptions());
-  UseUnknownLens(0.12, -0.12, 1.6, &scene);
   scene.cameras[2] = scene.cameras.at(1);
   scene.cameras.at(2).SetCameraId(2);
-  scene.cameras.at(2).SetPriorFocalLength(true);
-  scene.images.at(1).camera_id = 2;
-  const std::vector<double> known = ParamsOf(scene.cameras.at(2));
-  const GlobalStageResult result = RunStage(scene);
-  ASSERT_GE(result.models.size(), 1);
-  EXPECT_EQ(result.focal_lengths.size(), 1);
-  for (const CoarseModel& model : result.models) {
-    EXPECT_FALSE(model.cameras_refined);
-    if (model.reconstruction.ExistsCamera(2)) {
-      EXPECT_EQ(ParamsOf(model.reconstruction.Camera(2)), known);
+  ScaleFocalLength(1.2, &scene, 2);
+  const Eigen::Vector2d center(world.camera.principal_x_px,
+                               world.camera.principal_y_px);
+  for (auto& [image_id, image] : scene.images) {
+    if (which == SecondCamera::kEveryOther ? image_id % 2 : image_id <= 30) {
+      continue;
+    }
+    image.camera_id = 2;
+    for (Eigen::Vector2d& keypoint : image.keypoints) {
+      keypoint = center + 1.2 * (keypoint - center);
+    }
+  }
+  return scene;
+}
+
+// A guess that is 10 % too long, with the search among pairs and without.
+TEST(GlobalStageLensTest, RefinesAFocalLengthNextToAKnownOne) {
+  const SyntheticWorld world = BuildSyntheticWorld(TurningWorld());
+  for (const SecondCamera which : kSecondCameras) {
+    SceneData scene = SceneOfTwoCameras(world, which);
+    const double focal_px = scene.cameras.at(2).MeanFocalLength();
+    const std::vector<double> known = ParamsOf(scene.cameras.at(1));
+    ScaleFocalLength(1.1, &scene, 2);
+    scene.cameras.at(2).SetPriorFocalLength(false);
+    GlobalStageOptions options;
+    options.focal_lengths.enabled = false;
+    options.structure.refine_unknown_focal_length = false;
+    const GlobalStageResult left = RunStage(scene, options);
+    EXPECT_FALSE(left.models[0].cameras_refined);
+    ASSERT_TRUE(left.models[0].focal_length_error.has_value());
+    EXPECT_EQ(left.models[0].focal_length_error->camera_id, 2);
+    // By the change of the cost that the noise leaves.
+    const double sigma = left.models[0].focal_length_error->sigma;
+    EXPECT_LT(sigma, 0.005);
+    options.structure.refine_unknown_focal_length = true;
+    for (const bool is_searched : {false, true}) {
+      options.focal_lengths.enabled = is_searched;
+      const GlobalStageResult refined = RunStage(scene, options);
+      ASSERT_EQ(refined.models.size(), 1);
+      EXPECT_EQ(refined.focal_lengths.size(), is_searched);
+      EXPECT_TRUE(refined.models[0].cameras_refined);
+      const colmap::Reconstruction& model = refined.models[0].reconstruction;
+      EXPECT_EQ(model.NumRegImages(), 60);
+      EXPECT_NEAR(model.Camera(2).MeanFocalLength() / focal_px, 1.0,
+                  3.0 * sigma)
+          << is_searched;
+      EXPECT_EQ(ParamsOf(model.Camera(1)), known);
+      EXPECT_LT(ComparePoses(world, model).rmse_m,
+                ComparePoses(world, left.models[0].reconstruction).rmse_m);
+    }
+  }
+}
+
+// Its distortion, too.
+TEST(GlobalStageLensTest, AdjustsALensNextToAKnownOne) {
+  const SyntheticWorld world = BuildSyntheticWorld(TurningWorld());
+  for (const SecondCamera which : kSecondCameras) {
+    SceneData scene = SceneOfTwoCameras(world, which);
+    const double focal_px = scene.cameras.at(2).MeanFocalLength();
+    const std::vector<double> known = ParamsOf(scene.cameras.at(1));
+    UseUnknownLens(0.12, -0.12, 1.6, &scene, 2);
+    const GlobalStageResult result = RunStage(scene);
+    ASSERT_EQ(result.models.size(), 1);
+    EXPECT_EQ(result.focal_lengths.size(), 1);
+    EXPECT_TRUE(result.models[0].cameras_refined);
+    const colmap::Reconstruction& model = result.models[0].reconstruction;
+    const colmap::Camera& camera = model.Camera(2);
+    EXPECT_EQ(camera.ModelName(), "RADIAL");
+    EXPECT_NEAR(camera.MeanFocalLength() / focal_px, 1.0, 0.01);
+    EXPECT_NEAR(camera.Params(3), 0.12, 0.02);
+    EXPECT_NEAR(camera.Params(4), -0.12, 0.02);
+    EXPECT_EQ(ParamsOf(model.Camera(1)), known);
+  }
+}
+
+// Told, not changed; nor is the unknown one, which is right.
+TEST(GlobalStageLensTest, WarnsOfAWrongKnownLensNextToAnUnknownOne) {
+  const SyntheticWorld world = BuildSyntheticWorld(TurningWorld());
+  for (const SecondCamera which : kSecondCameras) {
+    SceneData scene = SceneOfTwoCameras(world, which);
+    ScaleFocalLength(1.05, &scene);
+    scene.cameras.at(2).SetPriorFocalLength(false);
+    const GlobalStageResult result = RunStage(scene);
+    ASSERT_TRUE(result.models[0].focal_length_error.has_value());
+    EXPECT_EQ(result.models[0].focal_length_error->camera_id, 1);
+    const std::vector<std::string> warnings = ListGlobalWarnings(scene, result);
+    ASSERT_FALSE(warnings.empty());
+    EXPECT_NE(warnings[0].find("of camera 1: check"), std::string::npos)
+        << warnings[0];
+    for (const camera_t camera_id : {1, 2}) {
+      EXPECT_EQ(ParamsOf(result.models[0].reconstruction.Camera(camera_id)),
+                ParamsOf(scene.cameras.at(camera_id)));
     }
   }
 }

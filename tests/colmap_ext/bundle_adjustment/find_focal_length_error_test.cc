@@ -1,0 +1,66 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "colmap_ext/bundle_adjustment/find_focal_length_error.h"
+
+#include <gtest/gtest.h>
+
+#include "tests/testing/colmap_ext/bundle_world_problem.h"
+
+namespace adasfm {
+namespace {
+
+// A street that turns by 23 deg to both sides, driven by two cameras.
+BundleWorldOptions TurningStreet(int num_images) {
+  BundleWorldOptions world;
+  world.num_images = num_images;
+  world.num_keypoints_per_image = 40;
+  world.weave_rad = 0.4;
+  world.camera_params = {480, 480, 400, 250};
+  world.pixel_noise_px = world.second_camera_noise_px = 0.5;
+  return world;
+}
+
+// The error that is found when the focal length of camera 1 is given so many
+// times too long, and that of another is taken for right.
+std::optional<FocalLengthError> FindError(const BundleWorldOptions& world,
+                                          double ratio, bool is_known,
+                                          camera_t constant_camera) {
+  colmap::Reconstruction reconstruction = BuildBundleWorld(world);
+  for (const camera_t camera_id : {1, 2}) {
+    reconstruction.Camera(camera_id).SetPriorFocalLength(camera_id == 1 &&
+                                                         is_known);
+  }
+  for (const size_t i : {0, 1}) reconstruction.Camera(1).Params(i) *= ratio;
+  PriorBundleAdjustmentProblem problem = ProblemOfAll(reconstruction);
+  problem.priors = TruePriors(world);
+  problem.constant_cameras = {constant_camera};
+  return FindFocalLengthError(VarianceComponentOptions(),
+                              PriorBundleAdjustmentOptions(), problem,
+                              reconstruction);
+}
+
+// Of some of the images, too.
+TEST(FindFocalLengthError, TakesConstantCamerasForRight) {
+  for (const int num_images : {60, 320}) {
+    const BundleWorldOptions world = TurningStreet(num_images);
+    const auto error = FindError(world, 1.03, false, 2);
+    ASSERT_TRUE(error.has_value()) << num_images;
+    EXPECT_EQ(error->camera_id, 1);
+    EXPECT_NEAR(error->ratio, 1.0 / 1.03, 4.0 * error->sigma);
+    const auto beside = FindError(world, 1.03, false, 1);
+    EXPECT_TRUE(!beside || beside->camera_id == 2) << num_images;
+  }
+}
+
+// Against a focal length that somebody measured it takes 10 sigmas, against
+// others 3, whatever stands beside it.
+TEST(FindFocalLengthError, TrustsAMeasuredLensNextToAnUnknownOne) {
+  BundleWorldOptions world = TurningStreet(40);
+  world.num_keypoints_per_image = 20;
+  // 0.5 % are 8 sigmas.
+  EXPECT_TRUE(FindError(world, 1.005, false, 2).has_value());
+  EXPECT_FALSE(FindError(world, 1.005, true, 2).has_value());
+  EXPECT_TRUE(FindError(world, 1.01, true, 2).has_value());
+}
+
+}  // namespace
+}  // namespace adasfm
