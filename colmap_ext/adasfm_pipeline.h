@@ -69,7 +69,8 @@ StatusOr<CoarseModelReport> EstimateCoarseModel(
 struct MapOptions {
   MapperStageOptions stage;
   // Whether stage.refine adjusts the intrinsics: 0, 1, or -1 for cameras whose
-  // focal length nobody has measured; a calibrated robot's are left alone.
+  // focal length nobody has measured. A calibrated robot's are left alone,
+  // beside others, too, unless some intrinsics are asked for by a 1.
   int refine_focal_length = -1;
   int refine_extra_params = -1;
 

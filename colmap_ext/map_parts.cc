@@ -122,13 +122,21 @@ std::optional<double> ReadWheelScaleSigma(const MapRequest& request) {
 // The stage's options for this scene's cameras.
 MapperStageOptions ResolveOptions(const MapOptions& options,
                                   const SceneData& scene) {
-  const bool is_calibrated = std::all_of(
-      scene.cameras.begin(), scene.cameras.end(),
-      [](const auto& entry) { return HasPriorFocalLength(entry.second); });
+  std::set<camera_t> calibrated;
+  for (const auto& [camera_id, camera] : scene.cameras) {
+    if (HasPriorFocalLength(camera)) calibrated.insert(camera_id);
+  }
+  const bool is_calibrated = calibrated.size() == scene.cameras.size();
   const auto resolve = [is_calibrated](int choice) {
     return choice < 0 ? !is_calibrated : choice != 0;
   };
   MapperStageOptions stage = options.stage;
+  const bool is_asked_for = options.refine_focal_length > 0 ||
+                            options.refine_extra_params > 0 ||
+                            stage.refine.refine_principal_point;
+  if (!is_calibrated && !is_asked_for) {
+    stage.refine.constant_cameras = std::move(calibrated);
+  }
   stage.refine.refine_focal_length = resolve(options.refine_focal_length);
   stage.refine.refine_extra_params = resolve(options.refine_extra_params);
   return stage;

@@ -176,6 +176,7 @@ class ModelRefiner {
       options.position_loss_scale = options_.initial_position_loss_scale;
     }
     AddPositions(&problem);
+    problem.constant_cameras = options_.constant_cameras;
     options.refine_focal_length = options_.refine_focal_length;
     options.refine_principal_point = options_.refine_principal_point;
     options.refine_extra_params = options_.refine_extra_params;

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <map>
+#include <set>
 
 #include "colmap_ext/mapper/local_mapper.h"
 #include "colmap_ext/mapper/local_mapper_scene.h"
@@ -15,6 +16,8 @@ struct RefineModelOptions {
   bool refine_focal_length = false;
   bool refine_principal_point = false;
   bool refine_extra_params = false;
+  // Cameras whose intrinsics stay all the same.
+  std::set<camera_t> constant_cameras;
   // Parts that were put together need a round with loose thresholds, in which
   // tracks of different parts find each other.
   bool join_parts = true;

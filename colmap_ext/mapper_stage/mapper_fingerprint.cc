@@ -112,6 +112,7 @@ void AddRefineOptions(const RefineModelOptions& refine, Hash* hash) {
   hash->Add(refine.refine_focal_length);
   hash->Add(refine.refine_principal_point);
   hash->Add(refine.refine_extra_params);
+  for (const camera_t camera_id : refine.constant_cameras) hash->Add(camera_id);
   hash->Add(refine.initial_position_loss_scale);
 }
 

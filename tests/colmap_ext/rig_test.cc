@@ -65,6 +65,28 @@ class RigTest : public CommandLineTest {
     }
   }
 
+  // Gives the second camera a focal length that is so many times too long and
+  // that nobody measured; the parameters of the first camera, which is known.
+  std::vector<double> MistakeSecondLens(double ratio) {
+    SqliteConnection database(database_, SqliteConnection::Mode::kWrite);
+    std::vector<double> params;
+    {
+      SqliteStatement statement(
+          &database, "SELECT params FROM cameras WHERE camera_id = 1");
+      EXPECT_TRUE(statement.Step());
+      params.resize(statement.NumBytes(0) / sizeof(double));
+      std::memcpy(params.data(), statement.Blob(0), statement.NumBytes(0));
+    }
+    std::vector<double> mistaken = params;
+    for (const size_t i : {0, 1}) mistaken.at(i) *= ratio;
+    SqliteStatement statement(&database,
+                              "UPDATE cameras SET params = ?, "
+                              "prior_focal_length = 0 WHERE camera_id = 2");
+    statement.BindBlob(1, mistaken.data(), mistaken.size() * sizeof(double));
+    statement.Step();
+    return params;
+  }
+
   // The second camera's pose of the calibration, as COLMAP writes it.
   std::string SensorFromRig() {
     SqliteConnection database(database_, SqliteConnection::Mode::kRead);
@@ -140,6 +162,21 @@ TEST_F(RigTest, LogsMoveTheFrames) {
   Reconstruct();
   ExpectRigidFrames();
   EXPECT_NEAR(Scale(), 1.0, 0.01);
+}
+
+// The two lenses are the same, and one is known: it stays as it is, to the last
+// bit, and the other is found.
+TEST_F(RigTest, AnUnknownLensIsRefinedBesideAKnownOne) {
+  Synthesize(40);
+  const std::vector<double> known = MistakeSecondLens(1.1);
+  Import(" --imu_path " + folder_.File("imu.csv") + " --wheel_path " +
+         folder_.File("wheel.csv"));
+  Reconstruct();
+  for (const colmap::Reconstruction& model : {*ReadModel(coarse_), model_}) {
+    EXPECT_EQ(ParamsOf(model.Camera(1)), known);
+    EXPECT_NEAR(model.Camera(2).MeanFocalLength() / known[0], 1.0, 0.01);
+  }
+  ExpectRigidFrames();
 }
 
 // Where a database has no rigs, the calibration brings it; COLMAP 3.12 and

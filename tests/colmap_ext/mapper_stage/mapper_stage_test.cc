@@ -211,6 +211,8 @@ TEST_F(MapperStageTest, UnknownFocalLengthIsRefined) {
   };
   EXPECT_EQ(run(false), 1.02);
   EXPECT_NEAR(run(true), 1.0, 0.005);
+  options_.refine.constant_cameras = {1};
+  EXPECT_EQ(run(true), 1.02);
 }
 
 // The ablations of the paper.
