@@ -24,6 +24,7 @@ struct MinimizeBundleSummary {
   bool success = false;
   // The start counts as one.
   int num_iterations = 0;
+  int num_factorizations = 0;
   double initial_cost = 0.0;
   double final_cost = 0.0;
   std::string message;
@@ -34,8 +35,9 @@ struct MinimizeBundleSummary {
 //
 // Method: Levenberg-Marquardt with the rules of Ceres for damping, acceptance
 // and end, so that both make the same steps; the normal equations of
-// bundle_reducer.h, factorised by CHOLMOD.
-// On failure, where no step is possible, the parameters are the best found.
+// bundle_reducer.h, factorised by CHOLMOD or, where that takes longer, solved
+// by conjugate gradients with the last factor as preconditioner. On failure,
+// where no step is possible, the parameters are the best found.
 MinimizeBundleSummary MinimizeBundle(const MinimizeBundleOptions& options,
                                      BundleProblem* bundle);
 

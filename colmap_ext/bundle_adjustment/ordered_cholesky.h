@@ -19,6 +19,11 @@ class OrderedCholesky
     cholmod().method[0].ordering = CHOLMOD_NATURAL;
     cholmod().postorder = false;
   }
+
+  // After analyzePattern, by its count: the floating-point operations of a
+  // factorisation, and the entries of the factor.
+  double NumOperations() { return cholmod().fl; }
+  double NumEntries() { return cholmod().lnz; }
 };
 
 }  // namespace adasfm

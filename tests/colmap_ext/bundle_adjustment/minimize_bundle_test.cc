@@ -67,5 +67,42 @@ TEST(MinimizeBundleTest, MakesTheStepsOfCeres) {
   }
 }
 
+// Spacing so small that images see most of each other's points: a factorisation
+// takes longer than iterations with an earlier factor.
+TEST(MinimizeBundleTest, ReusesAFactorThatTakesLong) {
+  for (uint64_t seed = 1; seed <= 3; ++seed) {
+    BundleWorldOptions world;
+    world.num_images = 200;
+    world.spacing_m = 0.3;
+    world.pixel_noise_px = 0.5;
+    world.seed = seed;
+    colmap::Reconstruction models[] = {BuildBundleWorld(world),
+                                       BuildBundleWorld(world)};
+    for (auto& model : models) PerturbBundleWorld(2e-3, 0.05, seed, &model);
+    PriorBundleAdjustmentProblem problem = ProblemOfAll(models[0]);
+    problem.priors = TruePriors(world);
+    const PriorBundleAdjustmentOptions options;
+    MinimizeBundleOptions minimize;
+    minimize.function_tolerance = 1e-8;
+    minimize.initial_radius = 1e10;
+    BundleProblem listed(options, problem, models[0]);
+    listed.FixFirstPose();
+    const ceres::Solver::Summary expected = SolveWithCeres(minimize, &listed);
+    BundleProblem apart(options, problem, models[1],
+                        /*may_keep_points_apart=*/true);
+    apart.FixFirstPose();
+    const MinimizeBundleSummary summary = MinimizeBundle(minimize, &apart);
+    ASSERT_TRUE(summary.success) << "seed " << seed;
+    EXPECT_LT(summary.num_factorizations, summary.num_iterations)
+        << "seed " << seed;
+    EXPECT_EQ(summary.num_iterations,
+              expected.num_successful_steps + expected.num_unsuccessful_steps)
+        << "seed " << seed;
+    EXPECT_NEAR(summary.final_cost, expected.final_cost,
+                1e-8 * expected.final_cost)
+        << "seed " << seed;
+  }
+}
+
 }  // namespace
 }  // namespace adasfm
