@@ -100,14 +100,21 @@ std::optional<FocalLengthError> FindFocalLengthError(
   if (LargestTurnRad(problem.priors) < DegToRad(kMinTurnDeg)) {
     return std::nullopt;
   }
-  colmap::Reconstruction given = reconstruction;
-  const PriorBundleAdjustmentSummary with_given =
-      AdjustBundle(options, problem, &given);
+  // Wrong points fall behind their cameras, or away from them, sooner or later;
+  // two costs compare only where the same ones have. So the given lens comes
+  // once more, after the free one.
+  colmap::Reconstruction free = reconstruction;
+  AdjustBundle(options, problem, &free);
   PriorBundleAdjustmentOptions free_options = options;
   free_options.refine_focal_length = true;
-  colmap::Reconstruction free = given;
   const PriorBundleAdjustmentSummary with_free =
       AdjustBundle(free_options, problem, &free);
+  colmap::Reconstruction given = free;
+  for (const auto& [camera_id, camera] : reconstruction.Cameras()) {
+    ParamsOf(&given.Camera(camera_id)) = ParamsOf(camera);
+  }
+  const PriorBundleAdjustmentSummary with_given =
+      AdjustBundle(options, problem, &given);
   if (!with_given.success || !with_free.success ||
       ComputePriorMeanSquare(
           CorrectSharedErrors(options.shared_errors, with_free.shared_errors,

@@ -19,12 +19,35 @@ BundleWorldOptions TurningStreet(int num_images) {
   return world;
 }
 
+// Leaves a point two observations, whose rays meet behind the cameras.
+void MatchWrongly(colmap::point3D_t id,
+                  colmap::Reconstruction* reconstruction) {
+  while (reconstruction->Point3D(id).Track().Length() > 2) {
+    const colmap::TrackElement last =
+        reconstruction->Point3D(id).Track().Elements().back();
+    reconstruction->DeleteObservation(last.image_id, last.point2D_idx);
+  }
+  const std::vector<colmap::TrackElement> seen =
+      reconstruction->Point3D(id).Track().Elements();
+  colmap::Point2D& a =
+      reconstruction->Image(seen[0].image_id).Point2D(seen[0].point2D_idx);
+  colmap::Point2D& b =
+      reconstruction->Image(seen[1].image_id).Point2D(seen[1].point2D_idx);
+  const Eigen::Vector2d xy = a.XY();
+  a.SetXY(b.XY());
+  b.SetXY(xy);
+}
+
 // The error that is found when the focal length of camera 1 is given so many
 // times too long, and that of another is taken for right.
 std::optional<FocalLengthError> FindError(const BundleWorldOptions& world,
                                           double ratio, bool is_known,
-                                          camera_t constant_camera) {
+                                          camera_t constant_camera,
+                                          int num_wrong_points = 0) {
   colmap::Reconstruction reconstruction = BuildBundleWorld(world);
+  for (int k = 1; k <= num_wrong_points; ++k) {
+    MatchWrongly(k, &reconstruction);
+  }
   for (const camera_t camera_id : {1, 2}) {
     reconstruction.Camera(camera_id).SetPriorFocalLength(camera_id == 1 &&
                                                          is_known);
@@ -60,6 +83,16 @@ TEST(FindFocalLengthError, TrustsAMeasuredLensNextToAnUnknownOne) {
   EXPECT_TRUE(FindError(world, 1.005, false, 2).has_value());
   EXPECT_FALSE(FindError(world, 1.005, true, 2).has_value());
   EXPECT_TRUE(FindError(world, 1.01, true, 2).has_value());
+}
+
+// What they cost until they fall behind their cameras is not the lens' error.
+TEST(FindFocalLengthError, ComparesTheSamePoints) {
+  BundleWorldOptions world = TurningStreet(40);
+  world.num_keypoints_per_image = 20;
+  for (int num_wrong_points = 1; num_wrong_points <= 8; ++num_wrong_points) {
+    EXPECT_FALSE(FindError(world, 1.005, true, 2, num_wrong_points).has_value())
+        << num_wrong_points;
+  }
 }
 
 }  // namespace
