@@ -183,6 +183,7 @@ class BundleMinimizer {
 
   bool EndsWithInvalidStep() {
     region_.Reject();
+    has_factor_ = false;  // Conjugate gradients may be what failed.
     if (++num_invalid_steps_ < options_.max_num_invalid_steps) return false;
     Finish(false, "too many invalid steps");
     return true;

@@ -57,14 +57,16 @@ bool HasName(int file, const std::string& path) {
 }
 
 // Opens or creates a file for this writer alone until it is closed; -1: errno
-// says why not. File systems that know no locks are trusted to have one writer.
+// says why not. File systems that know no locks, or whose files have another
+// identity each time, are trusted to have one writer.
 int OpenAlone(const std::string& path) {
-  for (;;) {
+  constexpr int kMaxNumWritersBefore = 1000;
+  for (int num_before = 0;; ++num_before) {
     const int file = open(path.c_str(), O_WRONLY | O_CREAT | O_CLOEXEC, 0666);
     if (file < 0) return file;
     while (flock(file, LOCK_EX) != 0 && errno == EINTR) {
     }
-    if (HasName(file, path)) return file;
+    if (HasName(file, path) || num_before == kMaxNumWritersBefore) return file;
     close(file);  // The writer before has given it its final name.
   }
 }

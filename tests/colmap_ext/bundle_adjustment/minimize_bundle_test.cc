@@ -25,44 +25,63 @@ ceres::Solver::Summary SolveWithCeres(const MinimizeBundleOptions& options,
   return summary;
 }
 
+// One adjustment with its true priors, by Ceres and by MinimizeBundle.
+struct Solutions {
+  ceres::Solver::Summary expected;
+  MinimizeBundleSummary summary;
+  // Adjusted, in this order.
+  colmap::Reconstruction models[2];
+};
+
+Solutions SolveBoth(const BundleWorldOptions& world,
+                    const MinimizeBundleOptions& minimize,
+                    double rotation_error_rad, double position_error_m) {
+  Solutions solutions;
+  for (colmap::Reconstruction& model : solutions.models) {
+    model = BuildBundleWorld(world);
+    PerturbBundleWorld(rotation_error_rad, position_error_m, world.seed,
+                       &model);
+  }
+  PriorBundleAdjustmentProblem problem = ProblemOfAll(solutions.models[0]);
+  problem.priors = TruePriors(world);
+  const PriorBundleAdjustmentOptions options;
+  BundleProblem listed(options, problem, solutions.models[0]);
+  listed.FixFirstPose();
+  solutions.expected = SolveWithCeres(minimize, &listed);
+  BundleProblem apart(options, problem, solutions.models[1],
+                      /*may_keep_points_apart=*/true);
+  apart.FixFirstPose();
+  EXPECT_EQ(apart.NumPointsApart(), listed.NumPoints());
+  EXPECT_EQ(apart.NumResiduals(), listed.NumResiduals());
+  solutions.summary = MinimizeBundle(minimize, &apart);
+  EXPECT_TRUE(solutions.summary.success);
+  EXPECT_EQ(solutions.summary.num_iterations,
+            solutions.expected.num_successful_steps +
+                solutions.expected.num_unsuccessful_steps);
+  EXPECT_NEAR(solutions.summary.initial_cost, solutions.expected.initial_cost,
+              1e-10 * solutions.expected.initial_cost);
+  EXPECT_NEAR(solutions.summary.final_cost, solutions.expected.final_cost,
+              1e-8 * solutions.expected.final_cost);
+  listed.WriteTo(&solutions.models[0]);
+  apart.WriteTo(&solutions.models[1]);
+  return solutions;
+}
+
 // From near the minimum, and from where steps are refused.
 TEST(MinimizeBundleTest, MakesTheStepsOfCeres) {
   BundleWorldOptions world;
   world.pixel_noise_px = 0.5;
+  MinimizeBundleOptions minimize;
+  minimize.initial_radius = 1e7;
   for (const double position_error_m : {0.05, 2.0}) {
-    colmap::Reconstruction models[] = {BuildBundleWorld(world),
-                                       BuildBundleWorld(world)};
-    for (auto& model : models) {
-      PerturbBundleWorld(2e-2, position_error_m, 1, &model);
-    }
-    PriorBundleAdjustmentProblem problem = ProblemOfAll(models[0]);
-    problem.priors = TruePriors(world);
-    const PriorBundleAdjustmentOptions options;
-    MinimizeBundleOptions minimize;
-    minimize.initial_radius = 1e7;
-    BundleProblem listed(options, problem, models[0]);
-    listed.FixFirstPose();
-    const ceres::Solver::Summary expected = SolveWithCeres(minimize, &listed);
-    BundleProblem apart(options, problem, models[1],
-                        /*may_keep_points_apart=*/true);
-    apart.FixFirstPose();
-    ASSERT_EQ(apart.NumPointsApart(), listed.NumPoints());
-    EXPECT_EQ(apart.NumResiduals(), listed.NumResiduals());
-    const MinimizeBundleSummary summary = MinimizeBundle(minimize, &apart);
-    ASSERT_TRUE(summary.success);
-    EXPECT_GT(summary.num_iterations, 3);
-    EXPECT_EQ(summary.num_iterations,
-              expected.num_successful_steps + expected.num_unsuccessful_steps);
-    EXPECT_NEAR(summary.initial_cost, expected.initial_cost,
-                1e-10 * expected.initial_cost);
-    EXPECT_NEAR(summary.final_cost, expected.final_cost,
-                1e-8 * expected.final_cost);
-    listed.WriteTo(&models[0]);
-    apart.WriteTo(&models[1]);
-    for (const image_t id : models[0].RegImageIds()) {
-      EXPECT_LT(
-          (models[1].Image(id).Tvec() - models[0].Image(id).Tvec()).norm(),
-          1e-6);
+    SCOPED_TRACE(position_error_m);
+    const Solutions solutions =
+        SolveBoth(world, minimize, 2e-2, position_error_m);
+    EXPECT_GT(solutions.summary.num_iterations, 3);
+    const auto& [by_ceres, by_points] = solutions.models;
+    for (const image_t id : by_ceres.RegImageIds()) {
+      EXPECT_LT((by_points.Image(id).Tvec() - by_ceres.Image(id).Tvec()).norm(),
+                1e-6);
     }
   }
 }
@@ -70,37 +89,19 @@ TEST(MinimizeBundleTest, MakesTheStepsOfCeres) {
 // Spacing so small that images see most of each other's points: a factorisation
 // takes longer than iterations with an earlier factor.
 TEST(MinimizeBundleTest, ReusesAFactorThatTakesLong) {
+  MinimizeBundleOptions minimize;
+  minimize.function_tolerance = 1e-8;
+  minimize.initial_radius = 1e10;
   for (uint64_t seed = 1; seed <= 3; ++seed) {
+    SCOPED_TRACE(seed);
     BundleWorldOptions world;
     world.num_images = 200;
     world.spacing_m = 0.3;
     world.pixel_noise_px = 0.5;
     world.seed = seed;
-    colmap::Reconstruction models[] = {BuildBundleWorld(world),
-                                       BuildBundleWorld(world)};
-    for (auto& model : models) PerturbBundleWorld(2e-3, 0.05, seed, &model);
-    PriorBundleAdjustmentProblem problem = ProblemOfAll(models[0]);
-    problem.priors = TruePriors(world);
-    const PriorBundleAdjustmentOptions options;
-    MinimizeBundleOptions minimize;
-    minimize.function_tolerance = 1e-8;
-    minimize.initial_radius = 1e10;
-    BundleProblem listed(options, problem, models[0]);
-    listed.FixFirstPose();
-    const ceres::Solver::Summary expected = SolveWithCeres(minimize, &listed);
-    BundleProblem apart(options, problem, models[1],
-                        /*may_keep_points_apart=*/true);
-    apart.FixFirstPose();
-    const MinimizeBundleSummary summary = MinimizeBundle(minimize, &apart);
-    ASSERT_TRUE(summary.success) << "seed " << seed;
-    EXPECT_LT(summary.num_factorizations, summary.num_iterations)
-        << "seed " << seed;
-    EXPECT_EQ(summary.num_iterations,
-              expected.num_successful_steps + expected.num_unsuccessful_steps)
-        << "seed " << seed;
-    EXPECT_NEAR(summary.final_cost, expected.final_cost,
-                1e-8 * expected.final_cost)
-        << "seed " << seed;
+    const Solutions solutions = SolveBoth(world, minimize, 2e-3, 0.05);
+    EXPECT_LT(solutions.summary.num_factorizations,
+              solutions.summary.num_iterations);
   }
 }
 
