@@ -15,6 +15,9 @@ enum PriorFlags : uint32_t {
   kPriorDirection = 1u << 1,  // of the translation
   kPriorLength = 1u << 2,     // of the translation, in metres
   kPriorWheelSlip = 1u << 3,  // wheels contradicted the IMU: weights are low
+  // Its length is vision's, in metres of the accelerometer: no measurement of
+  // this motion alone.
+  kPriorInertialLength = 1u << 4,
 };
 
 // The motion between two images as the sensors saw it (design, section 6).

@@ -7,6 +7,7 @@
 #include <stdexcept>
 
 #include "core/option_checker.h"
+#include "core/prior_lengths.h"
 #include "core/so3.h"
 #include "sensors/build_fusion_problem.h"
 #include "sensors/calibration_check/wheel_clock.h"
@@ -14,6 +15,7 @@
 #include "sensors/io/format_figures.h"
 #include "sensors/noise_figures.h"
 #include "sensors/select_images.h"
+#include "sensors/smoother/compose_inertial_motion.h"
 #include "sensors/smoother/compose_prior.h"
 #include "sensors/use_vision.h"
 #include "sensors/visual_links.h"
@@ -59,6 +61,7 @@ class PriorEstimator {
   Status CheckMotion();
   void Fuse();
   void BuildPriors();
+  void BuildInertialMotions();
   void FillSummary();
   Status CheckWheelScale();
 
@@ -203,6 +206,20 @@ void PriorEstimator::BuildPriors() {
   }
 }
 
+void PriorEstimator::BuildInertialMotions() {
+  // The wheels know the metre better.
+  if (HasLengths(estimate_.priors)) return;
+  for (size_t i = 0; i + 1 < images_.size(); ++i) {
+    std::optional<InertialMotion> motion = ComposeInertialMotion(
+        problem_, fused_, timeline_.indices[i], timeline_.indices[i + 1],
+        calibration_.cam_from_imu);
+    if (!motion) continue;
+    motion->image_id1 = images_[i].image_id;
+    motion->image_id2 = images_[i + 1].image_id;
+    estimate_.inertial_motions.push_back(*motion);
+  }
+}
+
 void PriorEstimator::FillSummary() {
   SensorSummary& summary = estimate_.summary;
   summary.num_images = static_cast<int>(all_images_.size());
@@ -270,6 +287,7 @@ StatusOr<PriorEstimate> PriorEstimator::Run(
   Fuse();
   // 5. Camera frames and figures.
   BuildPriors();
+  BuildInertialMotions();
   FillSummary();
   status = CheckWheelScale();
   if (!status.ok()) return status;

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "core/inertial_motion.h"
 #include "core/relative_pose_prior.h"
 #include "core/sensor_log.h"
 #include "core/status.h"
@@ -73,6 +74,9 @@ struct PriorEstimationOptions {
 struct PriorEstimate {
   // Consecutive images in order of time; a pair without data has none.
   std::vector<RelativePosePrior> priors;
+  // Of consecutive images between which the IMU has no gap; none where a prior
+  // has a length.
+  std::vector<InertialMotion> inertial_motions;
   // Unit vectors that point down.
   std::map<image_t, Eigen::Vector3d> gravity_in_cam;
   // Also what all priors share: gyroscope_bias (rad/s, body frame) with

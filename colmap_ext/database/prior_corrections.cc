@@ -7,6 +7,7 @@
 #include <string>
 #include <utility>
 
+#include "colmap_ext/database/inertial_tables.h"
 #include "colmap_ext/database/prior_tables.h"
 #include "colmap_ext/host/database.h"
 #include "colmap_ext/io/double_blob.h"
@@ -44,19 +45,23 @@ void WriteCameraMount(const Eigen::Quaterniond& camera_mount,
 
 void WritePriorCorrections(
     const std::optional<Eigen::Quaterniond>& camera_mount,
-    SqliteConnection* database) {
+    const std::vector<InertialLength>& lengths, SqliteConnection* database) {
   RemovePriorCorrections(database);
-  if (!camera_mount) return;
+  if (!camera_mount && lengths.empty()) return;
   CreateMetaTable(database);
-  WriteCameraMount(*camera_mount, database);
+  if (camera_mount) WriteCameraMount(*camera_mount, database);
+  WriteInertialLengths(lengths, database);
 }
 
 bool HasPriorCorrections(SqliteConnection* database) {
-  return database->HasTable(kMountTable);
+  return database->HasTable(kMountTable) ||
+         database->HasTable(kInertialLengthTable);
 }
 
 void RemovePriorCorrections(SqliteConnection* database) {
-  database->Execute(std::string("DROP TABLE IF EXISTS ") + kMountTable);
+  for (const char* table : {kMountTable, kInertialLengthTable}) {
+    database->Execute(std::string("DROP TABLE IF EXISTS ") + table);
+  }
 }
 
 std::optional<Eigen::Quaterniond> ReadCameraMount(SqliteConnection* database) {
@@ -67,11 +72,12 @@ std::optional<Eigen::Quaterniond> ReadCameraMount(SqliteConnection* database) {
   return ReadRotation(statement, 0, std::string("table ") + kMountTable);
 }
 
-void ApplyPriorCorrections(SqliteConnection* database,
-                           std::vector<RelativePosePrior>* priors) {
+double ApplyPriorCorrections(SqliteConnection* database,
+                             std::vector<RelativePosePrior>* priors) {
   if (const auto camera_mount = ReadCameraMount(database)) {
     for (RelativePosePrior& prior : *priors) TurnPrior(*camera_mount, &prior);
   }
+  return AddInertialLengths(ReadInertialLengths(database), priors);
 }
 
 }  // namespace adasfm

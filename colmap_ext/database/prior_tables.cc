@@ -5,6 +5,7 @@
 #include <map>
 #include <utility>
 
+#include "colmap_ext/database/inertial_tables.h"
 #include "colmap_ext/database/prior_corrections.h"
 #include "colmap_ext/database/rig_table.h"
 #include "colmap_ext/host/database.h"
@@ -202,6 +203,7 @@ Status WritePriorTables(const std::string& database_path,
     WritePositions(names, tables.positions, &database);
     WriteGyroscopeBias(names, tables, &database);
     WriteLengthDrift(names, tables, &database);
+    WriteInertialMotions(tables.inertial_motions, &database);
     WritePositionOrigin(tables.position_origin, &database);
     WriteRigCameras(tables.rig_cameras, &database);
     RemovePriorCorrections(&database);

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "core/camera_rig.h"
+#include "core/inertial_motion.h"
 #include "core/position_prior.h"
 #include "core/relative_pose_prior.h"
 #include "core/sqlite.h"
@@ -17,10 +18,10 @@
 namespace adasfm {
 
 // The tables adasfm_image_times, adasfm_relative_pose_priors, adasfm_gravity,
-// adasfm_position_priors, adasfm_gyroscope_bias, adasfm_length_drift and
-// adasfm_rig_cameras inside a COLMAP database (docs/reference/formats.md).
-// Databases of before the last four are read as having no positions, no stated
-// bias or drift and no rig.
+// adasfm_position_priors, adasfm_gyroscope_bias, adasfm_length_drift,
+// adasfm_inertial_motions and adasfm_rig_cameras inside a COLMAP database
+// (docs/reference/formats.md). Databases of before the last five are read as
+// having no positions, no stated bias or drift, no such motions and no rig.
 
 struct ImageTimeRow {
   image_t image_id = kInvalidImageId;
@@ -47,6 +48,8 @@ struct PriorTables {
   // 1 sigma of the error that the lengths of neighbouring priors share, as a
   // ratio; 0 where nothing shows one, and in databases of before it.
   double length_drift_ratio = 0.0;
+  // Of imports without lengths: consecutive images, in order of time.
+  std::vector<InertialMotion> inertial_motions;
   // Of one rig of several cameras; all known. Written here, and read by
   // ReadCameraRigs.
   std::map<camera_t, RigCamera> rig_cameras;

@@ -9,6 +9,7 @@
 #include <tuple>
 #include <utility>
 
+#include "colmap_ext/database/inertial_tables.h"
 #include "colmap_ext/database/prior_tables.h"
 #include "colmap_ext/host/database.h"
 #include "colmap_ext/io/double_blob.h"
@@ -17,6 +18,7 @@
 namespace adasfm {
 namespace {
 
+// As imported: lengths of adasfm_global are no rows here.
 constexpr uint32_t kAllFlags =
     kPriorRotation | kPriorDirection | kPriorLength | kPriorWheelSlip;
 
@@ -277,6 +279,8 @@ LoadedPriorTables ReadPriorTables(SqliteConnection* database) {
   ReadPositions(ids, database, &loaded);
   ReadGyroscopeBias(database, &loaded.tables);
   ReadLengthDrift(database, &loaded.tables);
+  loaded.tables.inertial_motions =
+      ReadInertialMotions(database, &loaded.num_ignored_rows);
   ReadPositionOrigin(database, &loaded.tables);
   return loaded;
 }

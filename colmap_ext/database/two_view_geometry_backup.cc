@@ -264,7 +264,8 @@ Status RewriteTwoViewGeometries(
     const std::string& database_path,
     const std::vector<NewTwoViewGeometry>& rows,
     const std::vector<ImagePair>& removed,
-    const std::optional<Eigen::Quaterniond>& camera_mount) {
+    const std::optional<Eigen::Quaterniond>& camera_mount,
+    const std::vector<InertialLength>& lengths) {
   const Status checked = CheckDatabase(database_path);
   if (!checked.ok()) return checked;
   std::vector<ImagePair> pairs = removed;
@@ -279,7 +280,7 @@ Status RewriteTwoViewGeometries(
     RemoveRows(removed, &database);
     WriteTwoViewGeometries(&database, rows);
     RecordDigests(rows, &database);
-    WritePriorCorrections(camera_mount, &database);
+    WritePriorCorrections(camera_mount, lengths, &database);
     transaction.Commit();
   } catch (const SqliteError& error) {
     return Status::Error("cannot rewrite the two-view geometries of " +

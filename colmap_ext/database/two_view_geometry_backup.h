@@ -26,7 +26,8 @@ Status RewriteTwoViewGeometries(
     const std::string& database_path,
     const std::vector<NewTwoViewGeometry>& rows,
     const std::vector<ImagePair>& removed,
-    const std::optional<Eigen::Quaterniond>& camera_mount = {});
+    const std::optional<Eigen::Quaterniond>& camera_mount = {},
+    const std::vector<InertialLength>& lengths = {});
 
 struct RestoreSummary {
   int num_restored = 0;
@@ -36,7 +37,7 @@ struct RestoreSummary {
   bool priors_restored = false;
 };
 
-// Puts all originals that count back and drops the tables, that of corrected
+// Puts all originals that count back and drops the tables, those of corrected
 // priors too, in one transaction. Originals that do not count stay in their
 // table. In a file of COLMAP 4's form, matrices and poses of zeros come back as
 // NULL, as that form says "none". Without the tables there is nothing to do,

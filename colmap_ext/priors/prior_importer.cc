@@ -178,6 +178,18 @@ Status CheckEstimate(const PriorEstimate& estimate,
         "the prior between the images " + names.at(prior.image_id1) + " and " +
         names.at(prior.image_id2) + " is not finite" + kRemedy);
   }
+  for (const InertialMotion& motion : estimate.inertial_motions) {
+    if (motion.dt_s > 0.0 && motion.delta_velocity.allFinite() &&
+        motion.delta_position.allFinite() &&
+        motion.velocity_by_bias.allFinite() &&
+        motion.position_by_bias.allFinite()) {
+      continue;
+    }
+    return Status::Error("what the IMU integrates between the images " +
+                         names.at(motion.image_id1) + " and " +
+                         names.at(motion.image_id2) + " is not finite" +
+                         kRemedy);
+  }
   for (const auto& [image_id, gravity_in_cam] : estimate.gravity_in_cam) {
     if (std::abs(gravity_in_cam.norm() - 1.0) < 1e-6) continue;
     return Status::Error("the gravity of image " + names.at(image_id) +
@@ -387,6 +399,7 @@ StatusOr<PriorImport> ComputePriorImport(const PriorImportPaths& given_paths,
   status = CheckEstimate(*estimate, names);
   if (!status.ok()) return status;
   import.tables.priors = std::move(estimate->priors);
+  import.tables.inertial_motions = std::move(estimate->inertial_motions);
   for (const auto& [image_id, gravity_in_cam] : estimate->gravity_in_cam) {
     import.tables.gravity.push_back({image_id, gravity_in_cam});
   }

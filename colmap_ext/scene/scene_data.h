@@ -10,6 +10,7 @@
 #include "colmap_ext/host/colmap.h"
 #include "colmap_ext/host/frames.h"
 #include "core/camera_rig.h"
+#include "core/inertial_motion.h"
 #include "core/position_prior.h"
 #include "core/relative_pose_prior.h"
 #include "core/rigid3d.h"
@@ -58,6 +59,11 @@ struct SceneData {
   // As in PriorTables; the priors share these errors.
   std::optional<Eigen::Matrix3d> gyroscope_bias_covariance;
   double length_drift_ratio = 0.0;
+  // As in PriorTables.
+  std::vector<InertialMotion> inertial_motions;
+  // The largest scale_sigma of the InertialLengths that the priors got from
+  // adasfm_global; 0 without.
+  double inertial_scale_sigma = 0.0;
   // Cameras that are mounted together, and ComputeFramePriors of them.
   CameraRigs rigs;
   std::vector<RelativePosePrior> frame_priors;

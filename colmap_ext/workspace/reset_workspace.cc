@@ -65,7 +65,9 @@ Status ResetPriors(const std::string& database_path) {
                   "DROP TABLE IF EXISTS adasfm_relative_pose_priors",
                   "DROP TABLE IF EXISTS adasfm_gravity",
                   "DROP TABLE IF EXISTS adasfm_position_priors",
-                  "DROP TABLE IF EXISTS adasfm_gyroscope_bias"},
+                  "DROP TABLE IF EXISTS adasfm_gyroscope_bias",
+                  "DROP TABLE IF EXISTS adasfm_length_drift",
+                  "DROP TABLE IF EXISTS adasfm_inertial_motions"},
                  RemovePriorCorrections);
 }
 

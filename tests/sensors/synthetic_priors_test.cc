@@ -235,6 +235,50 @@ TEST(SyntheticPriors, ImuAloneClaimsRotationOnly) {
   EXPECT_FALSE(estimate.gravity_in_cam.empty());
 }
 
+// Positions of three images, in which the speed drops out of the equations of
+// core/inertial_motion.h.
+TEST(SyntheticPriors, ImuAloneStoresWhatItIntegrates) {
+  const Eigen::Vector3d gravity(0.0, 0.0, -9.81);
+  for (const uint64_t seed : {1, 2, 3}) {
+    Dataset data = ToDataset(BuildSyntheticWorld(SmallWorld(seed)));
+    EXPECT_TRUE(Estimate(data).inertial_motions.empty());
+    data.calibration.has_wheel = false;
+    data.logs.wheel.clear();
+    const PriorEstimate estimate = Estimate(data);
+    const std::vector<InertialMotion>& motions = estimate.inertial_motions;
+    ASSERT_EQ(motions.size(), estimate.priors.size());
+    const auto imu_position = [&](image_t image_id, const InertialMotion& m) {
+      const Rigid3d world_from_cam =
+          data.cams_from_world.at(image_id).Inverse();
+      return Eigen::Vector3d(world_from_cam.translation -
+                             world_from_cam.rotation *
+                                 m.camera_from_imu_origin);
+    };
+    for (size_t i = 0; i + 1 < motions.size(); ++i) {
+      const InertialMotion& a = motions[i];
+      const InertialMotion& b = motions[i + 1];
+      EXPECT_EQ(a.image_id1, estimate.priors[i].image_id1);
+      ASSERT_EQ(a.image_id2, b.image_id1);
+      EXPECT_NEAR(a.dt_s, SecondsFromNs(estimate.priors[i].dt_ns), 1e-9);
+      const Eigen::Quaterniond rotation1 =
+          data.cams_from_world.at(a.image_id1).rotation.conjugate();
+      const Eigen::Quaterniond rotation2 =
+          data.cams_from_world.at(b.image_id1).rotation.conjugate();
+      const Eigen::Vector3d p1 = imu_position(a.image_id1, a);
+      const Eigen::Vector3d p2 = imu_position(b.image_id1, a);
+      const Eigen::Vector3d p3 = imu_position(b.image_id2, a);
+      const Eigen::Vector3d speed_change =
+          (p3 - p2) / b.dt_s - (p2 - p1) / a.dt_s;
+      const Eigen::Vector3d expected =
+          0.5 * gravity * (a.dt_s + b.dt_s) +
+          rotation2 * b.delta_position / b.dt_s +
+          rotation1 * (a.delta_velocity - a.delta_position / a.dt_s);
+      // The accelerometer's bias is 0.03 m/s^2 on each axis.
+      EXPECT_LT((speed_change - expected).norm(), 0.1 * (a.dt_s + b.dt_s));
+    }
+  }
+}
+
 TEST(SyntheticPriors, SpeedAloneClaimsLengthOnly) {
   Dataset data = ToDataset(BuildSyntheticWorld(SmallWorld(8)));
   data.calibration.has_imu = false;
@@ -329,6 +373,7 @@ TEST(SyntheticPriors, AGapInTheImuCostsItsPairsOnly) {
   data.logs.imu = kept;
   const PriorEstimate estimate = Estimate(data);
   EXPECT_EQ(estimate.summary.num_priors, 76);
+  EXPECT_EQ(estimate.inertial_motions.size(), 76);
   EXPECT_LT(ComputePairErrors(estimate, data.cams_from_world).rotation_rms_deg,
             0.05);
 }

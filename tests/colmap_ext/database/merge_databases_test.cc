@@ -139,6 +139,11 @@ class MergeDatabasesTest : public testing::Test {
       prior.flags = kPriorRotation;
       prior.covariance.setIdentity();
       tables.priors.push_back(prior);
+      InertialMotion motion;
+      motion.image_id1 = prior.image_id1;
+      motion.image_id2 = prior.image_id2;
+      motion.dt_s = 0.1 * i;
+      tables.inertial_motions.push_back(motion);
     }
     const Status status = WritePriorTables(path, tables);
     ASSERT_TRUE(status.ok()) << status.message();
@@ -275,6 +280,13 @@ TEST_F(MergeDatabasesTest, SessionsAreKeptApartByTheirPrefixes) {
   // No prior and no pair joins the two.
   for (const RelativePosePrior& prior : both->tables.priors) {
     EXPECT_EQ(prior.image_id1 <= kNumImages, prior.image_id2 <= kNumImages);
+  }
+  // Each session's ids follow the order of its images.
+  const auto& motions = both->tables.inertial_motions;
+  ASSERT_EQ(motions.size(), 2 * one->tables.inertial_motions.size());
+  for (const InertialMotion& motion : motions) {
+    EXPECT_EQ(motion.image_id2, motion.image_id1 + 1);
+    EXPECT_EQ(motion.dt_s, 0.1 * ((motion.image_id1 - 1) % kNumImages + 1));
   }
   CountMatches(
       &database, "two_view_geometries", 0, [](const ImagePair& pair, int64_t) {

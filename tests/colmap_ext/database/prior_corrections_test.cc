@@ -3,6 +3,9 @@
 
 #include <gtest/gtest.h>
 
+#include <limits>
+
+#include "colmap_ext/database/inertial_tables.h"
 #include "colmap_ext/database/prior_tables.h"
 #include "colmap_ext/database/two_view_geometry_backup.h"
 #include "colmap_ext/datasets/write_synthetic_world.h"
@@ -111,6 +114,140 @@ TEST_F(PriorCorrectionsTest, TurnGravityToo) {
   EXPECT_EQ(gravity(true), Eigen::Vector3d::UnitY());
   ASSERT_TRUE(RestoreTwoViewGeometries(path_)->priors_restored);
   EXPECT_EQ(gravity(false), Eigen::Vector3d::UnitY());
+}
+
+TEST_F(PriorCorrectionsTest, TurnWhatTheImuIntegrates) {
+  InertialMotion motion;
+  motion.image_id1 = tables_.priors[0].image_id1;
+  motion.image_id2 = tables_.priors[0].image_id2;
+  motion.dt_s = 0.1;
+  motion.delta_velocity = Eigen::Vector3d::UnitY();
+  tables_.inertial_motions = {motion};
+  ASSERT_TRUE(WritePriorTables(path_, tables_).ok());
+  ASSERT_TRUE(RewriteTwoViewGeometries(path_, {}, {}, mount_).ok());
+  const StatusOr<SceneData> scene = ReadSceneData(path_, SceneDataOptions());
+  ASSERT_TRUE(scene.ok()) << scene.status().message();
+  EXPECT_LT((scene->inertial_motions.at(0).delta_velocity -
+             mount_ * motion.delta_velocity)
+                .norm(),
+            1e-9);
+}
+
+// The priors of an IMU without wheels, but for the last one.
+class InertialLengthsTest : public PriorCorrectionsTest {
+ protected:
+  InertialLengthsTest() {
+    for (size_t k = 0; k < tables_.priors.size(); ++k) {
+      RelativePosePrior& prior = tables_.priors[k];
+      lengths_.push_back(
+          {prior.image_id1, prior.image_id2, 1.0 + k, 0.1, 0.01 * (k + 1)});
+      if (k + 1 == tables_.priors.size()) break;
+      prior.flags = kPriorRotation;
+      prior.covariance.bottomRows<3>().setZero();
+      prior.covariance.rightCols<3>().setZero();
+      prior.covariance.diagonal().tail<3>().setConstant(
+          std::numeric_limits<double>::infinity());
+    }
+    EXPECT_TRUE(WritePriorTables(path_, tables_).ok());
+  }
+
+  Status Rewrite(const std::optional<Eigen::Quaterniond>& mount = {}) const {
+    return RewriteTwoViewGeometries(path_, {}, {}, mount, lengths_);
+  }
+
+  // Whether the priors have got their lengths.
+  bool AreApplied() const {
+    const StatusOr<SceneData> scene = ReadSceneData(path_, SceneDataOptions());
+    EXPECT_TRUE(scene.ok()) << scene.status().message();
+    EXPECT_EQ(scene->priors[0].HasLength(), scene->inertial_scale_sigma > 0.0);
+    return scene->priors[0].HasLength();
+  }
+
+  std::vector<InertialLength> lengths_;
+};
+
+TEST_F(InertialLengthsTest, AreReadAsWritten) {
+  ASSERT_TRUE(Rewrite().ok());
+  SqliteConnection database(path_, SqliteConnection::Mode::kRead);
+  const std::vector<InertialLength> read = ReadInertialLengths(&database);
+  ASSERT_EQ(read.size(), lengths_.size());
+  for (size_t k = 0; k < read.size(); ++k) {
+    EXPECT_EQ(read[k].image_id1, lengths_[k].image_id1);
+    EXPECT_EQ(read[k].image_id2, lengths_[k].image_id2);
+    EXPECT_EQ(read[k].length_m, lengths_[k].length_m);
+    EXPECT_EQ(read[k].sigma_m, lengths_[k].sigma_m);
+    EXPECT_EQ(read[k].scale_sigma, lengths_[k].scale_sigma);
+  }
+}
+
+TEST_F(InertialLengthsTest, GoToPriorsWithoutLength) {
+  ASSERT_TRUE(Rewrite(mount_).ok());
+  const StatusOr<SceneData> scene = ReadSceneData(path_, SceneDataOptions());
+  ASSERT_TRUE(scene.ok()) << scene.status().message();
+  for (size_t k = 0; k + 1 < lengths_.size(); ++k) {
+    const RelativePosePrior& prior = scene->priors[k];
+    EXPECT_EQ(prior.flags, static_cast<uint32_t>(kPriorRotation | kPriorLength |
+                                                 kPriorInertialLength));
+    EXPECT_EQ(prior.cam2_from_cam1.translation,
+              lengths_[k].length_m * Eigen::Vector3d::UnitZ());
+    EXPECT_NEAR(prior.covariance(5, 5), 0.01, 1e-12);
+    EXPECT_LT(AngleBetweenRad(prior.cam2_from_cam1.rotation,
+                              corrected_[k].cam2_from_cam1.rotation),
+              1e-9);
+  }
+  // The last one knows its own.
+  EXPECT_EQ(scene->priors.back().flags, tables_.priors.back().flags);
+  EXPECT_LT((scene->priors.back().cam2_from_cam1.translation -
+             corrected_.back().cam2_from_cam1.translation)
+                .norm(),
+            1e-9);
+  EXPECT_EQ(scene->inertial_scale_sigma,
+            lengths_[lengths_.size() - 2].scale_sigma);
+  // A second run of the global stage starts from the import.
+  const Priors originals = Read(true);
+  for (size_t k = 0; k < originals.size(); ++k) {
+    EXPECT_EQ(originals[k].flags, tables_.priors[k].flags);
+  }
+}
+
+TEST_F(InertialLengthsTest, StayUntilTheyAreReplaced) {
+  ASSERT_TRUE(Rewrite().ok());
+  EXPECT_TRUE(AreApplied());
+  ASSERT_TRUE(RestoreTwoViewGeometries(path_)->priors_restored);
+  EXPECT_FALSE(AreApplied());
+  ASSERT_TRUE(Rewrite(mount_).ok());
+  EXPECT_TRUE(AreApplied());
+  ASSERT_TRUE(RewriteTwoViewGeometries(path_, {}, {}, mount_).ok());
+  EXPECT_FALSE(AreApplied());
+  ASSERT_TRUE(Rewrite().ok());
+  ASSERT_TRUE(WritePriorTables(path_, tables_).ok());
+  EXPECT_FALSE(AreApplied());
+  SqliteConnection database(path_, SqliteConnection::Mode::kRead);
+  EXPECT_FALSE(HasPriorCorrections(&database));
+}
+
+TEST_F(InertialLengthsTest, AreMatchedByName) {
+  ASSERT_TRUE(Rewrite().ok());
+  SqliteConnection(path_, SqliteConnection::Mode::kWrite)
+      .Execute(
+          "PRAGMA foreign_keys = OFF;"
+          "UPDATE images SET image_id = 103 WHERE image_id = 3;"
+          "DELETE FROM images WHERE image_id = 5;");
+  SqliteConnection database(path_, SqliteConnection::Mode::kRead);
+  const std::vector<InertialLength> read = ReadInertialLengths(&database);
+  ASSERT_EQ(read.size(), lengths_.size() - 2);
+  EXPECT_EQ(read[1].image_id2, 103);
+  EXPECT_EQ(read[2].image_id1, 103);
+}
+
+TEST_F(InertialLengthsTest, DamagedRowsAreAnError) {
+  for (const char* column : {"sigma_m = 0.0", "length_m = -1.0",
+                             "length_m = 9e999", "scale_sigma = -0.1"}) {
+    ASSERT_TRUE(Rewrite().ok());
+    SqliteConnection(path_, SqliteConnection::Mode::kWrite)
+        .Execute(std::string("UPDATE adasfm_inertial_lengths SET ") + column);
+    EXPECT_FALSE(ReadSceneData(path_, SceneDataOptions()).ok()) << column;
+  }
 }
 
 }  // namespace

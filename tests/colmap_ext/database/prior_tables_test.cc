@@ -54,6 +54,16 @@ class PriorTablesTest : public testing::Test {
           Eigen::Matrix3d::Identity();
       position.antenna_in_cam = random.GaussianVector(1.0);
       tables.positions.push_back(position);
+      InertialMotion motion;
+      motion.image_id1 = prior.image_id1;
+      motion.image_id2 = prior.image_id2;
+      motion.dt_s = random.Uniform(0.05, 0.5);
+      motion.delta_velocity = random.GaussianVector(1.0);
+      motion.delta_position = random.GaussianVector(0.1);
+      motion.velocity_by_bias = root.topRightCorner<3, 3>();
+      motion.position_by_bias = root.bottomLeftCorner<3, 3>();
+      motion.camera_from_imu_origin = random.GaussianVector(0.2);
+      tables.inertial_motions.push_back(motion);
     }
     tables.position_origin = GeodeticPosition{
         random.Uniform(-90.0, 90.0), random.Uniform(-180.0, 180.0), 512.3};
@@ -114,6 +124,19 @@ void ExpectEqual(const PriorTables& a, const PriorTables& b) {
     EXPECT_EQ(a.positions[i].covariance, b.positions[i].covariance);
     EXPECT_EQ(a.positions[i].antenna_in_cam, b.positions[i].antenna_in_cam);
   }
+  ASSERT_EQ(a.inertial_motions.size(), b.inertial_motions.size());
+  for (size_t i = 0; i < a.inertial_motions.size(); ++i) {
+    const InertialMotion& motion1 = a.inertial_motions[i];
+    const InertialMotion& motion2 = b.inertial_motions[i];
+    EXPECT_EQ(motion1.image_id1, motion2.image_id1);
+    EXPECT_EQ(motion1.image_id2, motion2.image_id2);
+    EXPECT_EQ(motion1.dt_s, motion2.dt_s);
+    EXPECT_EQ(motion1.delta_velocity, motion2.delta_velocity);
+    EXPECT_EQ(motion1.delta_position, motion2.delta_position);
+    EXPECT_EQ(motion1.velocity_by_bias, motion2.velocity_by_bias);
+    EXPECT_EQ(motion1.position_by_bias, motion2.position_by_bias);
+    EXPECT_EQ(motion1.camera_from_imu_origin, motion2.camera_from_imu_origin);
+  }
   EXPECT_EQ(a.gyroscope_bias_covariance, b.gyroscope_bias_covariance);
   EXPECT_EQ(a.length_drift_ratio, b.length_drift_ratio);
   ASSERT_EQ(a.position_origin.has_value(), b.position_origin.has_value());
@@ -147,6 +170,8 @@ TEST_F(PriorTablesTest, ReadsWhatWasWrittenLast) {
   EXPECT_TRUE(scene->images.at(2).gravity_in_cam.has_value());
   EXPECT_TRUE(scene->gyroscope_bias_covariance.has_value());
   EXPECT_GT(scene->length_drift_ratio, 0.0);
+  EXPECT_EQ(scene->inertial_motions.size(), 5);
+  EXPECT_EQ(scene->inertial_scale_sigma, 0.0);
 }
 
 // As written before imports stated it, and again by one without a gyroscope.
@@ -156,6 +181,23 @@ TEST_F(PriorTablesTest, DatabasesWithoutSharedErrorsAreRead) {
   Execute("DROP TABLE adasfm_gyroscope_bias; DROP TABLE adasfm_length_drift;");
   tables.gyroscope_bias_covariance.reset();
   tables.length_drift_ratio = 0.0;
+  StatusOr<LoadedPriorTables> loaded = ReadPriorTables(path_);
+  ASSERT_TRUE(loaded.ok()) << loaded.status().message();
+  ExpectEqual(loaded->tables, tables);
+  ASSERT_TRUE(WritePriorTables(path_, MakeTables(2)).ok());
+  ASSERT_TRUE(WritePriorTables(path_, tables).ok());
+  loaded = ReadPriorTables(path_);
+  ASSERT_TRUE(loaded.ok());
+  ExpectEqual(loaded->tables, tables);
+}
+
+// As written before there were such motions, and again after an import with
+// wheels.
+TEST_F(PriorTablesTest, DatabasesWithoutInertialMotionsAreRead) {
+  PriorTables tables = MakeTables(1);
+  ASSERT_TRUE(WritePriorTables(path_, tables).ok());
+  Execute("DROP TABLE adasfm_inertial_motions;");
+  tables.inertial_motions.clear();
   StatusOr<LoadedPriorTables> loaded = ReadPriorTables(path_);
   ASSERT_TRUE(loaded.ok()) << loaded.status().message();
   ExpectEqual(loaded->tables, tables);
@@ -234,8 +276,11 @@ TEST_F(PriorTablesTest, NamesDecideWhenIdsChange) {
       "DELETE FROM images WHERE image_id = 6;");
   const StatusOr<LoadedPriorTables> loaded = ReadPriorTables(path_);
   ASSERT_TRUE(loaded.ok()) << loaded.status().message();
-  // Its time, its gravity, one prior and one position.
-  EXPECT_EQ(loaded->num_ignored_rows, 4);
+  // Its time, its gravity, one prior, one position and one inertial motion.
+  EXPECT_EQ(loaded->num_ignored_rows, 5);
+  ASSERT_EQ(loaded->tables.inertial_motions.size(), 4);
+  EXPECT_EQ(loaded->tables.inertial_motions[1].image_id2, 103);
+  EXPECT_EQ(loaded->tables.inertial_motions[2].image_id1, 103);
   EXPECT_EQ(loaded->tables.positions.size(), 4);
   EXPECT_EQ(loaded->tables.positions[2].image_id1, 103);
   ASSERT_EQ(loaded->tables.priors.size(), 4);
@@ -250,6 +295,8 @@ TEST_F(PriorTablesTest, RefusesRowsItCouldNotHaveWritten) {
       "UPDATE adasfm_relative_pose_priors SET qvec = zeroblob(32);",
       "UPDATE adasfm_relative_pose_priors SET tvec = zeroblob(23);",
       "UPDATE adasfm_relative_pose_priors SET flags = 1024;",
+      // What adasfm_global found is in a table of its own.
+      "UPDATE adasfm_relative_pose_priors SET flags = flags | 16;",
       "UPDATE adasfm_relative_pose_priors SET dt_ns = -1;",
       "UPDATE adasfm_gravity SET gravity_in_cam = zeroblob(24);",
       "DELETE FROM adasfm_image_times WHERE image_id = 2;",
@@ -260,6 +307,13 @@ TEST_F(PriorTablesTest, RefusesRowsItCouldNotHaveWritten) {
       "UPDATE adasfm_gyroscope_bias SET covariance = zeroblob(72);",
       "UPDATE adasfm_gyroscope_bias SET covariance = zeroblob(71);",
       "UPDATE adasfm_length_drift SET sigma_ratio = -0.01;",
+      "UPDATE adasfm_inertial_motions SET dt_s = 0.0;",
+      "UPDATE adasfm_inertial_motions SET dt_s = 9e999;",
+      "UPDATE adasfm_inertial_motions SET delta_velocity = zeroblob(23);",
+      "UPDATE adasfm_inertial_motions SET position_by_bias = zeroblob(24);",
+      // Not a number.
+      "UPDATE adasfm_inertial_motions SET delta_position = "
+      "X'FFFFFFFFFFFFFFFFFFFFFFFFFFFFFFFFFFFFFFFFFFFFFFFF';",
   };
   ASSERT_TRUE(WritePriorTables(path_, MakeTables(1)).ok());
   const std::string original = ReadBytes(path_);

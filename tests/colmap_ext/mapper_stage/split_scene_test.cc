@@ -44,6 +44,7 @@ class SplitSceneTest : public testing::Test {
     }
     scene_.position_origin = GeodeticPosition();
     scene_.length_drift_ratio = 0.01;
+    scene_.inertial_scale_sigma = 0.02;
     coarse_ = {{{1, {}}, {2, {}}, {3, {}}}, {{5, {}}, {6, {}}}};
   }
 
@@ -86,6 +87,7 @@ TEST_F(SplitSceneTest, EveryImageHasOneComponent) {
   EXPECT_EQ(split.rest.positions.size(), 2);
   EXPECT_TRUE(split.components[1].position_origin.has_value());
   EXPECT_EQ(split.components[1].length_drift_ratio, 0.01);
+  EXPECT_EQ(split.components[1].inertial_scale_sigma, 0.02);
   EXPECT_EQ(split.components[0].cameras.size(), 1);
 }
 

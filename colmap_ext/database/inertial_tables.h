@@ -1,0 +1,32 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <vector>
+
+#include "core/inertial_motion.h"
+#include "core/sqlite.h"
+
+namespace adasfm {
+
+// The tables adasfm_inertial_motions, of the import, and
+// adasfm_inertial_lengths, of adasfm_global (docs/reference/formats.md). Rows
+// are matched by image name, as those of prior_tables.h. All functions throw
+// SqliteError: writers for images that the database lacks, readers for rows
+// that could not have been written.
+
+// Replaces all rows; none of them removes the table.
+void WriteInertialMotions(const std::vector<InertialMotion>& motions,
+                          SqliteConnection* database);
+void WriteInertialLengths(const std::vector<InertialLength>& lengths,
+                          SqliteConnection* database);
+
+// In the order in which they were written; empty without the table. Rows of
+// images that are gone are left out, and counted in num_ignored_rows.
+std::vector<InertialMotion> ReadInertialMotions(SqliteConnection* database,
+                                                int* num_ignored_rows);
+// As above, uncounted: their priors are gone too.
+std::vector<InertialLength> ReadInertialLengths(SqliteConnection* database);
+
+inline constexpr char kInertialLengthTable[] = "adasfm_inertial_lengths";
+
+}  // namespace adasfm

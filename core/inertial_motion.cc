@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "core/inertial_motion.h"
+
+#include <algorithm>
+#include <map>
+#include <utility>
+
+namespace adasfm {
+
+void TurnInertialMotion(const Eigen::Quaterniond& turned_from_cam,
+                        InertialMotion* motion) {
+  const Eigen::Matrix3d turn = turned_from_cam.toRotationMatrix();
+  motion->delta_velocity = turn * motion->delta_velocity;
+  motion->delta_position = turn * motion->delta_position;
+  motion->velocity_by_bias = turn * motion->velocity_by_bias * turn.transpose();
+  motion->position_by_bias = turn * motion->position_by_bias * turn.transpose();
+  motion->camera_from_imu_origin = turn * motion->camera_from_imu_origin;
+}
+
+double AddInertialLengths(const std::vector<InertialLength>& lengths,
+                          std::vector<RelativePosePrior>* priors) {
+  std::map<std::pair<image_t, image_t>, const InertialLength*> by_pair;
+  for (const InertialLength& length : lengths) {
+    by_pair[{length.image_id1, length.image_id2}] = &length;
+  }
+  double scale_sigma = 0.0;
+  for (RelativePosePrior& prior : *priors) {
+    const auto found = by_pair.find({prior.image_id1, prior.image_id2});
+    if (found == by_pair.end() || prior.HasLength()) continue;
+    const InertialLength& length = *found->second;
+    prior.flags |= kPriorLength | kPriorInertialLength;
+    prior.cam2_from_cam1.translation =
+        length.length_m * Eigen::Vector3d::UnitZ();
+    prior.covariance.bottomRows<3>().setZero();
+    prior.covariance.rightCols<3>().setZero();
+    prior.covariance.diagonal().tail<3>().setConstant(length.sigma_m *
+                                                      length.sigma_m);
+    scale_sigma = std::max(scale_sigma, length.scale_sigma);
+  }
+  return scale_sigma;
+}
+
+}  // namespace adasfm

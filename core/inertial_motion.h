@@ -1,0 +1,56 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+#include <vector>
+
+#include "core/relative_pose_prior.h"
+#include "core/types.h"
+
+namespace adasfm {
+
+// What an IMU integrated between two images, free of the velocity at the start
+// and of gravity (Forster 2015, eqs. 33-38), seen from the camera of the first
+// image. With Q the rotation world_from_cam1, p and v position and velocity of
+// the IMU, g the gravity of the world and b the accelerometer's bias in the
+// camera's axes (m/s^2):
+//   v2 = v1 + g dt + Q (delta_velocity + velocity_by_bias b)
+//   p2 = p1 + v1 dt + g dt^2 / 2 + Q (delta_position + position_by_bias b)
+// The camera is at p + Q camera_from_imu_origin. The gyroscope's bias is taken
+// off; that of the accelerometer is not.
+struct InertialMotion {
+  image_t image_id1 = kInvalidImageId;  // the earlier one
+  image_t image_id2 = kInvalidImageId;
+  double dt_s = 0.0;
+  Eigen::Vector3d delta_velocity = Eigen::Vector3d::Zero();    // m/s
+  Eigen::Vector3d delta_position = Eigen::Vector3d::Zero();    // m
+  Eigen::Matrix3d velocity_by_bias = Eigen::Matrix3d::Zero();  // s
+  Eigen::Matrix3d position_by_bias = Eigen::Matrix3d::Zero();  // s^2
+  // From the IMU's origin to the camera's, in the camera's axes, m.
+  Eigen::Vector3d camera_from_imu_origin = Eigen::Vector3d::Zero();
+};
+
+// The motion as a camera sees it that is turned against the stated one.
+void TurnInertialMotion(const Eigen::Quaterniond& turned_from_cam,
+                        InertialMotion* motion);
+
+// Length of a prior's motion that vision and accelerometer found together.
+struct InertialLength {
+  image_t image_id1 = kInvalidImageId;  // the earlier one
+  image_t image_id2 = kInvalidImageId;
+  double length_m = 0.0;
+  // 1 sigma, such that all of a part together tell its size as well as they
+  // should.
+  double sigma_m = 0.0;
+  // 1 sigma of that size, as a ratio.
+  double scale_sigma = 0.0;
+};
+
+// Gives the priors of the same images that have no length theirs, with the flag
+// kPriorInertialLength; the direction stays unknown. Returns the largest
+// scale_sigma of those given, 0 for none.
+double AddInertialLengths(const std::vector<InertialLength>& lengths,
+                          std::vector<RelativePosePrior>* priors);
+
+}  // namespace adasfm
