@@ -168,9 +168,9 @@ Status WriteGlobalResult(const GlobalStageOptions& options,
                                CollectPosePriors(options, scene, result));
   }
   if (status.ok() && ChangesDatabase(options)) {
-    status = RewriteTwoViewGeometries(database_path, result.geometries,
-                                      result.removed_pairs,
-                                      FindCameraMount(result.poses));
+    status = RewriteTwoViewGeometries(
+        database_path, result.geometries, result.removed_pairs,
+        FindCameraMount(result.poses), result.inertial_lengths);
   }
   return status;
 }
@@ -246,6 +246,8 @@ StatusOr<CoarseModelReport> EstimateCoarseModel(
   scene_options.min_num_matches = options.poses.min_num_inliers;
   StatusOr<SceneData> scene = ReadSceneData(database_path, scene_options);
   if (!scene.ok()) return scene.status();
+  // The mapper could not know what is not written.
+  if (!ChangesDatabase(options)) scene->inertial_motions.clear();
   std::ostringstream text;
   text << scene->images.size() << " images, " << scene->pairs.size()
        << " verified pairs, " << scene->priors.size() << " priors";

@@ -15,8 +15,16 @@ inline bool HasLengths(const std::vector<RelativePosePrior>& priors) {
       [](const RelativePosePrior& prior) { return prior.HasLength(); });
 }
 
-// The same of the priors between images of a map or set: lengths between other
-// images, such as those of another coarse model, say nothing.
+// Whether a sensor measured any of them, such as wheels.
+inline bool HasMeasuredLengths(const std::vector<RelativePosePrior>& priors) {
+  return std::any_of(
+      priors.begin(), priors.end(), [](const RelativePosePrior& prior) {
+        return prior.HasLength() && !(prior.flags & kPriorInertialLength);
+      });
+}
+
+// The same as HasLengths of the priors between images of a map or set: lengths
+// between other images, such as those of another coarse model, say nothing.
 template <typename Images>
 bool HasLengthsBetween(const Images& images,
                        const std::vector<RelativePosePrior>& priors) {

@@ -214,6 +214,7 @@ PosePriorEdge PosePriorEdgeFromPrior(const RelativePosePrior& prior) {
   const double variance_across = (covariance.trace() - variance_along) / 2.0;
   if (prior.HasLength())
     edge.length_sigma_m = sigma_or_infinity(variance_along);
+  edge.is_length_measured = !(prior.flags & kPriorInertialLength);
   if (prior.HasDirection()) {
     edge.direction_sigma_rad = sigma_or_infinity(variance_across) / length;
   }

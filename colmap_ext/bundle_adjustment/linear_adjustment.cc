@@ -35,7 +35,8 @@ LinearAdjustment::LinearAdjustment(ReducedSystem* system,
 LinearAdjustment::~LinearAdjustment() = default;
 
 bool LinearAdjustment::IsTested(size_t i) const {
-  return IsTestedMeasurement(priors_[system_.priors[i].prior]);
+  const ReducedPriorRows& rows = system_.priors[i];
+  return IsTestedMeasurement(priors_[rows.prior], rows.term);
 }
 
 void LinearAdjustment::ComputeWeights(const PriorSigmaFactors& factors) {

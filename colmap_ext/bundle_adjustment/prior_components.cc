@@ -103,11 +103,11 @@ PriorComponents ComputePriorComponents(
     const colmap::Reconstruction& reconstruction) {
   PriorComponents components;
   for (const PosePriorEdge& edge : priors) {
-    if (!IsTestedMeasurement(edge)) continue;
     const std::optional<TermErrors> errors = ErrorsAt(edge, reconstruction);
     if (!errors) continue;
     for (int k = 0; k < kNumPriorTerms; ++k) {
       const auto term = static_cast<PriorTerm>(k);
+      if (!IsTestedMeasurement(edge, term)) continue;
       const double sigma = factors[k] * edge.SigmaOf(term);
       if (!std::isfinite(sigma)) continue;
       AddPriorTerm(term, ((*errors)[k] / sigma).squaredNorm(), &components);

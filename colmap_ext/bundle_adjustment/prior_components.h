@@ -39,8 +39,9 @@ using PriorComponents = std::array<PriorComponent, kNumPriorTerms>;
 // Whether keypoints test what the prior's sensors measured: edges without a
 // duration are no measurements, and those in gaps have nothing to contradict
 // them.
-inline bool IsTestedMeasurement(const PosePriorEdge& edge) {
-  return edge.dt_s >= 0.0 && edge.is_held_by_points;
+inline bool IsTestedMeasurement(const PosePriorEdge& edge, PriorTerm term) {
+  return edge.dt_s >= 0.0 && edge.is_held_by_points &&
+         (term != PriorTerm::kLength || edge.is_length_measured);
 }
 
 // Adds a term of this squared whitened residual; mean_square is known when all

@@ -77,6 +77,8 @@ struct CoarseModel {
   // Poses of all images of the component, points, and all of their keypoints.
   colmap::Reconstruction reconstruction;
   bool metric = false;
+  // 1 sigma of the unit, as a ratio, where the accelerometer tells it; else 0.
+  double inertial_scale_sigma = 0.0;
   // The world's z axis points up.
   bool gravity_aligned = false;
   // To the scene's positions; if it succeeded, the world is their frame.

@@ -116,6 +116,7 @@ Json ModelJson(const SceneData& scene, const CoarseComponent& component,
       {"focal_length_ratio_sigma", focal.sigma},
       {"cameras_refined", model.cameras_refined},
       {"metric", model.metric},
+      {"inertial_scale_sigma", model.inertial_scale_sigma},
       {"gravity_aligned", model.gravity_aligned},
       {"rotations_converged", component.rotations_converged},
       {"positions_converged", component.positions_converged},
@@ -275,8 +276,10 @@ std::string FormatGlobalReportText(const GlobalStageResult& result,
     const CoarseModel& model = result.models[i];
     text << "Model " << i << ": " << model.reconstruction.NumRegImages()
          << " images, " << model.num_points << " points, "
-         << (model.metric ? "in metres" : "scale unknown") << ", "
-         << (model.gravity_aligned ? "z up" : "gravity unknown");
+         << (model.inertial_scale_sigma > 0.0 ? "in metres of the accelerometer"
+             : model.metric                   ? "in metres"
+                                              : "scale unknown")
+         << ", " << (model.gravity_aligned ? "z up" : "gravity unknown");
     if (model.positions.success) {
       text << ", georeferenced by " << model.positions.num_inliers << " of "
            << model.positions.num_positions << " positions";

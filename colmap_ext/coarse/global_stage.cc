@@ -6,6 +6,7 @@
 #include <sstream>
 #include <stdexcept>
 
+#include "colmap_ext/coarse/measure_size.h"
 #include "colmap_ext/coarse/refine_stage_matches.h"
 #include "colmap_ext/scene/scene_bearings.h"
 #include "core/option_checker.h"
@@ -159,6 +160,32 @@ std::string DescribeMatches(const GlobalStageResult& result) {
   return text.str();
 }
 
+void MeasureSizes(const SceneData& scene, GlobalStageResult* result) {
+  const CameraMountReport& mount = result->poses.camera_mount;
+  const Eigen::Quaterniond camera_mount =
+      mount.corrected ? ExpSo3(mount.turn_rad) : Eigen::Quaterniond::Identity();
+  for (CoarseModel& model : result->models) {
+    const std::vector<InertialLength> lengths =
+        MeasureSize(scene, camera_mount, &model);
+    result->inertial_lengths.insert(result->inertial_lengths.end(),
+                                    lengths.begin(), lengths.end());
+  }
+}
+
+std::string DescribeSizes(const GlobalStageResult& result) {
+  std::ostringstream text;
+  text.precision(2);
+  for (const CoarseModel& model : result.models) {
+    text << (text.tellp() > 0 ? ", " : "");
+    if (model.inertial_scale_sigma > 0.0) {
+      text << "to " << 100.0 * model.inertial_scale_sigma << " %";
+    } else {
+      text << (model.metric ? "not needed" : "none");
+    }
+  }
+  return text.str();
+}
+
 }  // namespace
 
 bool GlobalStageOptions::IsValid(std::string* error) const {
@@ -243,6 +270,14 @@ StatusOr<GlobalStageResult> RunGlobalStage(
                        &result);
     result.steps.push_back(
         {"match refinement", watch.Seconds(), DescribeMatches(result)});
+  }
+
+  // 2.9 Metres without wheels.
+  if (!scene.inertial_motions.empty()) {
+    watch = begin("metres from the accelerometer", 0.95);
+    MeasureSizes(scene, &result);
+    result.steps.push_back({"metres from the accelerometer", watch.Seconds(),
+                            DescribeSizes(result)});
   }
   return result;
 }

@@ -11,6 +11,7 @@
 #include "colmap_ext/scene/raw_matches.h"
 #include "colmap_ext/scene/scene_data.h"
 #include "colmap_ext/scene/two_view_poses.h"
+#include "core/inertial_motion.h"
 #include "core/status.h"
 #include "global/estimate_coarse_poses.h"
 #include "global/structure/match_refinement.h"
@@ -60,6 +61,8 @@ struct GlobalStageResult {
   // pose are in neither. Both empty without match refinement.
   std::vector<NewTwoViewGeometry> geometries;
   std::vector<ImagePair> removed_pairs;
+  // Of priors that know none, in models that have metres by the accelerometer.
+  std::vector<InertialLength> inertial_lengths;
   std::vector<StepReport> steps;
 };
 
@@ -73,6 +76,7 @@ using StageProgress = std::function<void(const std::string&, double)>;
 //   2.1-2.6  coarse poses                EstimateCoarsePoses
 //   2.7      tracks, points, adjustment  BuildCoarseModel, per component
 //   2.8      match refinement            RefineMatches
+//   2.9      metres without wheels       MeasureSize, per component
 // The scene is read with original two-view geometries; raw matches, those of
 // the scene if there is no other source, are asked for while the stage works.
 // An error when the scene has no two images that hold together. Throws

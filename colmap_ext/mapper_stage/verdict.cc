@@ -239,12 +239,14 @@ void JudgeEachModel(const std::vector<AssessedModel>& models, int num_images,
 
 std::string MetricSource(const std::vector<AssessedModel>& models) {
   bool has_wheels = false;
+  bool has_accelerometer = false;
   bool has_rig = false;
   bool is_georeferenced = false;
   for (const AssessedModel& model : models) {
     is_georeferenced |= model.summary->is_georeferenced;
     if (!model.summary->has_metric_sensors) continue;
-    has_wheels |= HasLengths(model.data->priors);
+    has_wheels |= HasMeasuredLengths(model.data->priors);
+    has_accelerometer |= model.data->inertial_scale_sigma > 0.0;
     has_rig |= HasLengths(model.data->frame_priors);
   }
   std::string source;
@@ -252,6 +254,7 @@ std::string MetricSource(const std::vector<AssessedModel>& models) {
     if (has) source += (source.empty() ? "" : " and ") + std::string(name);
   };
   add(has_wheels, "wheels");
+  add(has_accelerometer, "the accelerometer");
   add(has_rig, "the rig");
   add(is_georeferenced, "positions");
   return source;
@@ -275,6 +278,12 @@ void CollectFigures(const std::vector<AssessedModel>& models,
   }
   verdict->is_metric = verdict->num_metric_models == verdict->num_models;
   verdict->metric_source = MetricSource(models);
+  for (const AssessedModel& model : models) {
+    const double sigma = model.data->inertial_scale_sigma;
+    if (sigma > verdict->metric_sigma.value_or(0.0)) {
+      verdict->metric_sigma = sigma;
+    }
+  }
   if (verdict->num_points > 0) {
     verdict->mean_reproj_error_px = sum_px / verdict->num_points;
   }
@@ -305,7 +314,7 @@ Verdict AssessModels(const std::vector<AssessedModel>& models,
     JudgeStage(models.size() == 1 ? "" : "model " + std::to_string(k) + ": ",
                *models[k].summary,
                static_cast<int>(models[k].model->NumRegImages()), &judge);
-    know_lengths = know_lengths || HasLengths(models[k].data->priors) ||
+    know_lengths = know_lengths || HasMeasuredLengths(models[k].data->priors) ||
                    HasLengths(models[k].data->frame_priors);
   }
   for (const std::string& warning : warnings) {

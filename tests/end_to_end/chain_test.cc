@@ -139,6 +139,33 @@ TEST_F(ChainTest, AliasedDriveWithBlackoutEndsInOneMetricModel) {
   EXPECT_FALSE(summary.empty());
 }
 
+// Without wheels: the sigma says how far the accelerometer's metres may be off.
+// A second run measures them anew.
+TEST_F(ChainTest, AnImuAloneTellsMetres) {
+  Make("--num_images 160 --seed 5");
+  ExpectSuccess("adasfm_prior_importer --database_path " + database_ +
+                " --image_times_path " + folder_.File("times.csv") +
+                " --imu_path " + folder_.File("imu.csv") + " --sensors_path " +
+                folder_.File("sensors.yaml"));
+  const auto run = [this](const std::string& output) {
+    ExpectSuccess(GlobalArguments());
+    ExpectSuccess(MapperArguments(output));
+  };
+  run("sparse");
+  run("again");
+  const auto verdict = nlohmann::json::parse(
+      ReadBytes(folder_.File("sparse/summary.json")))["verdict"];
+  EXPECT_EQ(verdict["result"], "good");
+  EXPECT_EQ(verdict["metric_source"], "the accelerometer");
+  const double sigma = verdict["metric_sigma"];
+  EXPECT_LE(sigma, 0.1);
+  const nlohmann::json evaluation = Evaluate("sparse/0");
+  EXPECT_EQ(evaluation["num_images"], 160);
+  EXPECT_NEAR(evaluation["sim3"]["scale"], 1.0, 3.0 * sigma);
+  EXPECT_NEAR(Evaluate("again/0")["sim3"]["scale"], evaluation["sim3"]["scale"],
+              1e-6);
+}
+
 // Look-alike places on one street, left in the database: the parts are folded
 // there, the priors are torn, and the coarse poses take over.
 TEST_F(ChainTest, FalseLoopsAloneDoNotSpoilTheMapper) {

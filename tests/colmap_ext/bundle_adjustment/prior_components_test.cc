@@ -40,6 +40,22 @@ TEST(PriorComponents, SharedErrorsAreToldInFull) {
   EXPECT_NEAR(LengthsOf(50, 0.5, 50).mean_square, 200.25, 1e-9);
 }
 
+// Lengths that vision found are no measurements of their noise.
+TEST(PriorComponents, LengthsOfVisionSayNothing) {
+  const MapperWorld world = BuildDrive(1);
+  const colmap::Reconstruction model = Reconstruct(world);
+  PriorBundleAdjustmentProblem problem = ProblemOf(world, model, 1.0);
+  const auto num_lengths = [&] {
+    return ComputePriorComponents(
+               kStated, problem.priors,
+               model)[static_cast<size_t>(PriorTerm::kLength)]
+        .num_residuals;
+  };
+  EXPECT_GT(num_lengths(), 0);
+  for (PosePriorEdge& edge : problem.priors) edge.is_length_measured = false;
+  EXPECT_EQ(num_lengths(), 0);
+}
+
 // Poses that nothing but the priors holds follow a single measurement of each
 // motion wholly, and two by half.
 TEST(PriorComponents, RedundancyIsWhatMeasurementsTestOfEachOther) {

@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "colmap_ext/coarse/measure_size.h"
+
+#include <cmath>
+#include <map>
+#include <optional>
+
+#include "colmap_ext/host/pose_conversion.h"
+#include "colmap_ext/scene/align_to_gravity.h"
+#include "core/sim3d.h"
+#include "global/odometry/inertial_scale.h"
+
+namespace adasfm {
+
+std::vector<InertialLength> MeasureSize(const SceneData& scene,
+                                        const Eigen::Quaterniond& camera_mount,
+                                        CoarseModel* model) {
+  if (model->metric || scene.inertial_motions.empty()) return {};
+  std::vector<InertialMotion> motions = scene.inertial_motions;
+  for (InertialMotion& motion : motions) {
+    TurnInertialMotion(camera_mount, &motion);
+  }
+  const std::optional<InertialScale> scale =
+      EstimateInertialScale(motions, CamsFromWorld(model->reconstruction));
+  if (!scale) return {};
+  model->metric = true;
+  model->inertial_scale_sigma = scale->sigma_ratio;
+  TransformReconstruction(
+      Sim3d(scale->metres_per_unit, Eigen::Quaterniond::Identity(),
+            Eigen::Vector3d::Zero()),
+      &model->reconstruction);
+
+  const std::map<image_t, Rigid3d> cams_from_world =
+      CamsFromWorld(model->reconstruction);
+  std::vector<InertialLength> lengths;
+  double sum = 0.0;
+  for (const RelativePosePrior& prior : scene.priors) {
+    const auto pose1 = cams_from_world.find(prior.image_id1);
+    const auto pose2 = cams_from_world.find(prior.image_id2);
+    if (pose1 == cams_from_world.end() || pose2 == cams_from_world.end()) {
+      continue;
+    }
+    InertialLength length;
+    length.image_id1 = prior.image_id1;
+    length.image_id2 = prior.image_id2;
+    length.length_m = (pose2->second.TargetOriginInSource() -
+                       pose1->second.TargetOriginInSource())
+                          .norm();
+    length.scale_sigma = scale->sigma_ratio;
+    sum += length.length_m * length.length_m;
+    lengths.push_back(length);
+  }
+  for (InertialLength& length : lengths) length.sigma_m = std::sqrt(sum);
+  return lengths;
+}
+
+}  // namespace adasfm
