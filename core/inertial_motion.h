@@ -40,10 +40,10 @@ struct InertialLength {
   image_t image_id1 = kInvalidImageId;  // the earlier one
   image_t image_id2 = kInvalidImageId;
   double length_m = 0.0;
-  // 1 sigma, such that all of a part together tell its size as well as they
-  // should.
+  // 1 sigma, such that all of a model together keep its unit and hardly hold
+  // its shape (colmap_ext/coarse/measure_size.h).
   double sigma_m = 0.0;
-  // 1 sigma of that size, as a ratio.
+  // 1 sigma of the unit, as a ratio.
   double scale_sigma = 0.0;
 };
 
