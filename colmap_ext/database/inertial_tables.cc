@@ -83,10 +83,12 @@ void MotionFromRow(const SqliteStatement& statement, InertialMotion* motion) {
 
 void WriteInertialMotions(const std::vector<InertialMotion>& motions,
                           SqliteConnection* database) {
-  database->Execute("DROP TABLE IF EXISTS adasfm_inertial_motions");
+  if (database->HasTable("adasfm_inertial_motions")) {
+    database->Execute("DELETE FROM adasfm_inertial_motions");
+  }
   if (motions.empty()) return;
   database->Execute(
-      "CREATE TABLE adasfm_inertial_motions ("
+      "CREATE TABLE IF NOT EXISTS adasfm_inertial_motions ("
       "image_id1 INTEGER NOT NULL, image_id2 INTEGER NOT NULL, "
       "name1 TEXT NOT NULL, name2 TEXT NOT NULL, dt_s REAL NOT NULL, "
       "delta_velocity BLOB NOT NULL, delta_position BLOB NOT NULL, "

@@ -14,9 +14,10 @@ namespace adasfm {
 // SqliteError: writers for images that the database lacks, readers for rows
 // that could not have been written.
 
-// Replaces all rows; none of them removes the table.
+// Replaces all rows; a database that has none needs no table.
 void WriteInertialMotions(const std::vector<InertialMotion>& motions,
                           SqliteConnection* database);
+// Replaces all rows; without any the table goes.
 void WriteInertialLengths(const std::vector<InertialLength>& lengths,
                           SqliteConnection* database);
 
