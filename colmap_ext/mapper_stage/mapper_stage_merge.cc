@@ -112,8 +112,9 @@ Status MapperStage::MergePartModels(const std::string& fingerprint) {
   }
   AlignSimilarityOptions align = options_.align;
   // Metres by the accelerometer may be of any size of scene, and err alike.
-  if (!summary_.is_metric || data_.inertial_scale_sigma > 0.0)
+  if (!summary_.is_metric || data_.inertial_scale_sigma > 0.0) {
     align.unit = ComputeNeighborDistance(data_, coarse_);
+  }
   summary_.aligned = AlignParts(align, coarse_, parts);
   summary_.refine.keypoint_sigma_factor =
       FindSmallestSigmaFactor(summary_.parts, summary_.aligned);

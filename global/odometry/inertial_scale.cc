@@ -41,7 +41,7 @@ struct Window {
                               kNumShared + 1 + kNumLocal>::Zero();
   // Without its own unknowns, for the present noise.
   Eigen::Matrix<double, kNumShared + 1, kNumShared + 1> reduced;
-  double chi = 0.0;  // root mean square of the residuals, m
+  double chi = 0.0;  // root mean square of the residuals
   double weight = 1.0;
 };
 
@@ -162,7 +162,7 @@ class ScaleSolver {
            kMaxGravityError;
   }
 
-  InertialScale Scale(double window_s) const {
+  InertialScale Scale() const {
     const double unit = solution_[kUnit];
     double signal = 0.0, residuals = 0.0;
     for (const Window& window : windows_) {
@@ -174,8 +174,6 @@ class ScaleSolver {
     // By as much the unit is too small where the noise is all the IMU's.
     const double bias = unit * residuals / signal;
     InertialScale scale;
-    scale.num_windows = static_cast<int>(windows_.size());
-    scale.window_s = window_s;
     scale.metres_per_unit = 1.0 / unit;
     scale.sigma_ratio =
         std::sqrt(std::max(variance_, JackknifeVariance()) + bias * bias) /
@@ -312,7 +310,7 @@ std::optional<InertialScale> EstimateInertialScale(
         BuildWindows(motions, cams_from_world, runs, window_s);
     if (windows.size() < kMinNumWindows) continue;
     ScaleSolver solver(std::move(windows));
-    if (solver.Solve()) scales.push_back(solver.Scale(window_s));
+    if (solver.Solve()) scales.push_back(solver.Scale());
   }
   if (scales.empty()) return std::nullopt;
   const InertialScale scale = CombineScales(scales);

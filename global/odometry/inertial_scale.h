@@ -17,13 +17,10 @@ struct InertialScale {
   double metres_per_unit = 1.0;
   // 1 sigma of it, as a ratio.
   double sigma_ratio = 0.0;
-  // Of the best known one of several, and how long they are.
-  int num_windows = 0;
-  double window_s = 0.0;
 };
 
 // What: metres from an accelerometer, as visual-inertial odometry finds them at
-// its start (Martinelli, IJCV 2014, section 3, the rotations known).
+// its start (Martinelli, IJCV 2014), with rotations that are known.
 // Inputs: motions of consecutive images in order of time; poses, whose centres
 // are right up to their size; motions of other images are passed over.
 // Method. Within a window vision's centres are
