@@ -2,9 +2,8 @@
 #include "colmap_ext/database/prior_tables.h"
 
 #include <cstdio>
-#include <map>
-#include <utility>
 
+#include "colmap_ext/database/image_names.h"
 #include "colmap_ext/database/inertial_tables.h"
 #include "colmap_ext/database/prior_corrections.h"
 #include "colmap_ext/database/rig_table.h"
@@ -43,28 +42,22 @@ void CreateTables(SqliteConnection* database) {
       "sigma_ratio REAL NOT NULL);");
 }
 
-using Names = std::map<image_t, std::string>;
-
-const std::string& NameOf(const Names& names, image_t image_id) {
-  const auto name = names.find(image_id);
-  if (name != names.end()) return name->second;
-  throw SqliteError("no image with the id " + std::to_string(image_id));
-}
-
-void WriteImageTimes(const Names& names, const std::vector<ImageTimeRow>& rows,
+void WriteImageTimes(const ImageNames& names,
+                     const std::vector<ImageTimeRow>& rows,
                      SqliteConnection* database) {
   SqliteStatement statement(database,
                             "INSERT INTO adasfm_image_times VALUES (?, ?, ?)");
   for (const ImageTimeRow& row : rows) {
     statement.Reset();
     statement.BindInt(1, row.image_id);
-    statement.BindText(2, NameOf(names, row.image_id));
+    statement.BindText(2, names.Name(row.image_id));
     statement.BindInt(3, row.timestamp_ns);
     statement.Step();
   }
 }
 
-void WritePriors(const Names& names, const std::vector<RelativePosePrior>& rows,
+void WritePriors(const ImageNames& names,
+                 const std::vector<RelativePosePrior>& rows,
                  SqliteConnection* database) {
   SqliteStatement statement(database,
                             "INSERT INTO adasfm_relative_pose_priors VALUES "
@@ -73,10 +66,7 @@ void WritePriors(const Names& names, const std::vector<RelativePosePrior>& rows,
     const Eigen::Quaterniond& q = row.cam2_from_cam1.rotation;
     const Eigen::Vector4d qvec(q.w(), q.x(), q.y(), q.z());
     statement.Reset();
-    statement.BindInt(1, row.image_id1);
-    statement.BindInt(2, row.image_id2);
-    statement.BindText(3, NameOf(names, row.image_id1));
-    statement.BindText(4, NameOf(names, row.image_id2));
+    names.BindPair(row.image_id1, row.image_id2, &statement);
     statement.BindInt(5, row.dt_ns);
     BindDoubles(&statement, 6, qvec.data(), 4);
     BindDoubles(&statement, 7, row.cam2_from_cam1.translation.data(), 3);
@@ -87,30 +77,28 @@ void WritePriors(const Names& names, const std::vector<RelativePosePrior>& rows,
   }
 }
 
-void WriteGravity(const Names& names, const std::vector<GravityRow>& rows,
+void WriteGravity(const ImageNames& names, const std::vector<GravityRow>& rows,
                   SqliteConnection* database) {
   SqliteStatement statement(database,
                             "INSERT INTO adasfm_gravity VALUES (?, ?, ?)");
   for (const GravityRow& row : rows) {
     statement.Reset();
     statement.BindInt(1, row.image_id);
-    statement.BindText(2, NameOf(names, row.image_id));
+    statement.BindText(2, names.Name(row.image_id));
     BindDoubles(&statement, 3, row.gravity_in_cam.data(), 3);
     statement.Step();
   }
 }
 
-void WritePositions(const Names& names, const std::vector<PositionPrior>& rows,
+void WritePositions(const ImageNames& names,
+                    const std::vector<PositionPrior>& rows,
                     SqliteConnection* database) {
   SqliteStatement statement(database,
                             "INSERT INTO adasfm_position_priors VALUES "
                             "(?, ?, ?, ?, ?, ?, ?, ?)");
   for (const PositionPrior& row : rows) {
     statement.Reset();
-    statement.BindInt(1, row.image_id1);
-    statement.BindInt(2, row.image_id2);
-    statement.BindText(3, NameOf(names, row.image_id1));
-    statement.BindText(4, NameOf(names, row.image_id2));
+    names.BindPair(row.image_id1, row.image_id2, &statement);
     statement.BindDouble(5, row.share);
     BindDoubles(&statement, 6, row.position.data(), 3);
     BindDoubles(&statement, 7, row.covariance.data(), 9);
@@ -120,26 +108,26 @@ void WritePositions(const Names& names, const std::vector<PositionPrior>& rows,
 }
 
 // Of the import that began with the first prior.
-void WriteGyroscopeBias(const Names& names, const PriorTables& tables,
+void WriteGyroscopeBias(const ImageNames& names, const PriorTables& tables,
                         SqliteConnection* database) {
   if (!tables.gyroscope_bias_covariance || tables.priors.empty()) return;
   const image_t image_id = tables.priors.front().image_id1;
   SqliteStatement statement(
       database, "INSERT INTO adasfm_gyroscope_bias VALUES (?, ?, ?)");
   statement.BindInt(1, image_id);
-  statement.BindText(2, NameOf(names, image_id));
+  statement.BindText(2, names.Name(image_id));
   BindDoubles(&statement, 3, tables.gyroscope_bias_covariance->data(), 9);
   statement.Step();
 }
 
-void WriteLengthDrift(const Names& names, const PriorTables& tables,
+void WriteLengthDrift(const ImageNames& names, const PriorTables& tables,
                       SqliteConnection* database) {
   if (!(tables.length_drift_ratio > 0.0) || tables.priors.empty()) return;
   const image_t image_id = tables.priors.front().image_id1;
   SqliteStatement statement(database,
                             "INSERT INTO adasfm_length_drift VALUES (?, ?, ?)");
   statement.BindInt(1, image_id);
-  statement.BindText(2, NameOf(names, image_id));
+  statement.BindText(2, names.Name(image_id));
   statement.BindDouble(3, tables.length_drift_ratio);
   statement.Step();
 }
@@ -185,10 +173,7 @@ Status WritePriorTables(const std::string& database_path,
   try {
     SqliteConnection database(database_path, SqliteConnection::Mode::kWrite);
     SqliteTransaction transaction(&database);
-    Names names;
-    for (DatabaseImage& image : ReadImages(&database)) {
-      names[image.image_id] = std::move(image.name);
-    }
+    const ImageNames names(&database);
     CreateTables(&database);
     database.Execute(
         "DELETE FROM adasfm_image_times;"

@@ -9,6 +9,7 @@
 #include <tuple>
 #include <utility>
 
+#include "colmap_ext/database/image_names.h"
 #include "colmap_ext/database/inertial_tables.h"
 #include "colmap_ext/database/prior_tables.h"
 #include "colmap_ext/host/database.h"
@@ -22,33 +23,14 @@ namespace {
 constexpr uint32_t kAllFlags =
     kPriorRotation | kPriorDirection | kPriorLength | kPriorWheelSlip;
 
-// The present id of the image that had this id and name; none when it is gone.
-class IdResolver {
- public:
-  explicit IdResolver(SqliteConnection* database) {
-    for (const DatabaseImage& image : ReadImages(database)) {
-      ids_[image.name] = image.image_id;
-    }
-  }
-
-  std::optional<image_t> Resolve(const std::string& name) const {
-    const auto id = ids_.find(name);
-    if (id == ids_.end()) return std::nullopt;
-    return id->second;
-  }
-
- private:
-  std::map<std::string, image_t> ids_;
-};
-
-void ReadImageTimes(const IdResolver& ids, SqliteConnection* database,
+void ReadImageTimes(const ImageNames& names, SqliteConnection* database,
                     LoadedPriorTables* loaded) {
   if (!database->HasTable("adasfm_image_times")) return;
   SqliteStatement statement(database,
                             "SELECT name, timestamp_ns FROM adasfm_image_times "
                             "ORDER BY timestamp_ns, name");
   while (statement.Step()) {
-    const std::optional<image_t> image_id = ids.Resolve(statement.Text(0));
+    const std::optional<image_t> image_id = names.Id(statement.Text(0));
     if (image_id.has_value()) {
       loaded->tables.image_times.push_back({*image_id, statement.Int(1)});
     } else {
@@ -114,16 +96,14 @@ void SortByChain(const std::map<image_t, timestamp_t>& times,
 
 // The images that a row names first; counts it when the database lacks one.
 std::optional<std::pair<image_t, image_t>> ResolvePair(
-    const IdResolver& ids, const SqliteStatement& statement,
+    const ImageNames& names, const SqliteStatement& statement,
     LoadedPriorTables* loaded) {
-  const std::optional<image_t> id1 = ids.Resolve(statement.Text(0));
-  const std::optional<image_t> id2 = ids.Resolve(statement.Text(1));
-  if (id1 && id2) return std::make_pair(*id1, *id2);
-  ++loaded->num_ignored_rows;
-  return std::nullopt;
+  const auto pair = names.Ids(statement);
+  if (!pair) ++loaded->num_ignored_rows;
+  return pair;
 }
 
-void ReadPriors(const IdResolver& ids, SqliteConnection* database,
+void ReadPriors(const ImageNames& names, SqliteConnection* database,
                 LoadedPriorTables* loaded) {
   if (!database->HasTable("adasfm_relative_pose_priors")) return;
   std::map<image_t, timestamp_t> times;
@@ -135,7 +115,7 @@ void ReadPriors(const IdResolver& ids, SqliteConnection* database,
       "SELECT name1, name2, dt_ns, qvec, tvec, covariance, flags "
       "FROM adasfm_relative_pose_priors ORDER BY image_id1, image_id2");
   while (statement.Step()) {
-    const auto pair = ResolvePair(ids, statement, loaded);
+    const auto pair = ResolvePair(names, statement, loaded);
     if (!pair) continue;
     RelativePosePrior prior = PriorFromRow(statement);
     std::tie(prior.image_id1, prior.image_id2) = *pair;
@@ -149,7 +129,7 @@ void ReadPriors(const IdResolver& ids, SqliteConnection* database,
   SortByChain(times, &loaded->tables.priors);
 }
 
-void ReadGravity(const IdResolver& ids, SqliteConnection* database,
+void ReadGravity(const ImageNames& names, SqliteConnection* database,
                  LoadedPriorTables* loaded) {
   if (!database->HasTable("adasfm_gravity")) return;
   SqliteStatement statement(
@@ -158,7 +138,7 @@ void ReadGravity(const IdResolver& ids, SqliteConnection* database,
   while (statement.Step()) {
     const std::string name = statement.Text(0);
     const std::string row = "table adasfm_gravity, image " + name;
-    const std::optional<image_t> image_id = ids.Resolve(name);
+    const std::optional<image_t> image_id = names.Id(name);
     if (!image_id.has_value()) {
       ++loaded->num_ignored_rows;
       continue;
@@ -190,7 +170,7 @@ PositionPrior PositionFromRow(const SqliteStatement& statement) {
   return prior;
 }
 
-void ReadPositions(const IdResolver& ids, SqliteConnection* database,
+void ReadPositions(const ImageNames& names, SqliteConnection* database,
                    LoadedPriorTables* loaded) {
   if (!database->HasTable("adasfm_position_priors")) return;
   SqliteStatement statement(
@@ -198,7 +178,7 @@ void ReadPositions(const IdResolver& ids, SqliteConnection* database,
       "SELECT name1, name2, share, position, covariance, antenna_in_cam "
       "FROM adasfm_position_priors ORDER BY rowid");
   while (statement.Step()) {
-    const auto pair = ResolvePair(ids, statement, loaded);
+    const auto pair = ResolvePair(names, statement, loaded);
     if (!pair) continue;
     PositionPrior prior = PositionFromRow(statement);
     std::tie(prior.image_id1, prior.image_id2) = *pair;
@@ -271,12 +251,12 @@ StatusOr<LoadedPriorTables> ReadPriorTables(const std::string& database_path) {
 
 LoadedPriorTables ReadPriorTables(SqliteConnection* database) {
   CheckMetaTable(database);
-  const IdResolver ids(database);
+  const ImageNames names(database);
   LoadedPriorTables loaded;
-  ReadImageTimes(ids, database, &loaded);
-  ReadPriors(ids, database, &loaded);
-  ReadGravity(ids, database, &loaded);
-  ReadPositions(ids, database, &loaded);
+  ReadImageTimes(names, database, &loaded);
+  ReadPriors(names, database, &loaded);
+  ReadGravity(names, database, &loaded);
+  ReadPositions(names, database, &loaded);
   ReadGyroscopeBias(database, &loaded.tables);
   ReadLengthDrift(database, &loaded.tables);
   loaded.tables.inertial_motions =

@@ -52,7 +52,6 @@ void ReadScenePriors(SqliteConnection* database,
   scene->priors = std::move(loaded.tables.priors);
   scene->gyroscope_bias_covariance = loaded.tables.gyroscope_bias_covariance;
   scene->length_drift_ratio = loaded.tables.length_drift_ratio;
-  scene->inertial_motions = std::move(loaded.tables.inertial_motions);
   scene->positions = std::move(loaded.tables.positions);
   scene->position_origin = loaded.tables.position_origin;
   scene->rigs = ReadCameraRigs(database);
@@ -61,9 +60,8 @@ void ReadScenePriors(SqliteConnection* database,
     scene->inertial_scale_sigma =
         ApplyPriorCorrections(database, &scene->priors);
     camera_mount = ReadCameraMount(database).value_or(camera_mount);
-  }
-  for (InertialMotion& motion : scene->inertial_motions) {
-    TurnInertialMotion(camera_mount, &motion);
+  } else {
+    scene->inertial_motions = std::move(loaded.tables.inertial_motions);
   }
   for (const GravityRow& row : loaded.tables.gravity) {
     scene->images.at(row.image_id).gravity_in_cam =

@@ -59,7 +59,8 @@ struct SceneData {
   // As in PriorTables; the priors share these errors.
   std::optional<Eigen::Matrix3d> gyroscope_bias_covariance;
   double length_drift_ratio = 0.0;
-  // As in PriorTables.
+  // As in PriorTables; of the original geometries only, since adasfm_global has
+  // used what they tell.
   std::vector<InertialMotion> inertial_motions;
   // The largest scale_sigma of the InertialLengths that the priors got from
   // adasfm_global; 0 without.

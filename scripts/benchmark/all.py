@@ -26,7 +26,7 @@ from benchmarking.methods import ABLATIONS  # noqa: E402
 from benchmarking.pages import write_table  # noqa: E402
 from benchmarking.peer_tables import (cleaner_table, detail_table,  # noqa: E402
                                       losses, summary_table)
-from benchmarking.sets import FULL, is_world  # noqa: E402
+from benchmarking.sets import QUICK, is_world  # noqa: E402
 
 # README's rows, and what each shows.
 README_SETS = {
@@ -168,20 +168,15 @@ class Benchmark:
     self.write('docs/results/benchmark.md', 'ablations', '\n\n'.join(
         (tables.ablation_table(self.records(entries)), describe(entries))))
 
-  def growth(self):
-    """Kinds of worlds, and sizes up to 10,000 images."""
+  def kinds(self):
+    """All methods on worlds of each kind, without recordings."""
     methods = ['mapper', 'hierarchical_mapper', 'adasfm', 'adasfm_no_sensors',
                'limit']
-    small = [n for n in FULL if int(n.split('-')[1]) <= 2000]
-    large = [n for n in FULL if n not in small]
-    self.run(small, methods)
-    self.run(large, ['adasfm'])
-    entries = self.entries(small, methods) + self.entries(large, ['adasfm'])
-    records = self.records(entries)
-    write_figures(os.path.join(self.args.figures_path, 'growth.json'), entries)
-    self.write('docs/results/benchmark.md', 'growth', '\n\n'.join(
-        (tables.growth_table(records), tables.long_table(records),
-         describe(entries))))
+    self.run(QUICK, methods)
+    entries = self.entries(QUICK, methods)
+    write_figures(os.path.join(self.args.figures_path, 'kinds.json'), entries)
+    self.write('docs/results/benchmark.md', 'kinds', '\n\n'.join(
+        (tables.long_table(self.records(entries)), describe(entries))))
 
 
 def run_script(args, step, script, *options):
@@ -214,9 +209,13 @@ STEPS = {
                                              'global_worlds.py'),
     'global_without_sensors': lambda args: run_script(
         args, 'global_without_sensors', 'global_without_sensors.py'),
-    'growth': lambda args: Benchmark(args).growth(),
+    'estimator_seeds': lambda args: run_script(args, 'estimator_seeds',
+                                               'estimator_seeds.py'),
+    'kinds': lambda args: Benchmark(args).kinds(),
+    'growth': lambda args: run_script(
+        args, 'growth', 'growth.py', '--sizes', '500,1000,4000,10000'),
 }
-QUICK = ['readme']
+QUICK_STEPS = ['readme']
 
 
 def parse_arguments(words=None):
@@ -250,7 +249,7 @@ def parse_arguments(words=None):
       parser.error('no such step: %s; there are: %s' % (step, ', '.join(STEPS)))
   if args.quick and args.steps:
     parser.error('--quick names its steps itself')
-  args.steps = QUICK if args.quick else args.steps or list(STEPS)
+  args.steps = QUICK_STEPS if args.quick else args.steps or list(STEPS)
   return args
 
 

@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#ifndef ADASFM_COLMAP_EXT_DATABASE_IMAGE_NAMES_H_
+#define ADASFM_COLMAP_EXT_DATABASE_IMAGE_NAMES_H_
+
+#include <map>
+#include <optional>
+#include <string>
+#include <utility>
+
+#include "core/types.h"
+#include "core/sqlite.h"
+
+namespace adasfm {
+
+// The images of a database as its tables of priors name them: by name, which
+// stays when the ids of a database are made anew.
+class ImageNames {
+ public:
+  // Throws SqliteError.
+  explicit ImageNames(SqliteConnection* database);
+
+  // Throws SqliteError when the database has no such image.
+  const std::string& Name(image_t image_id) const;
+
+  // None when the database has no image of this name.
+  std::optional<image_t> Id(const std::string& name) const;
+
+  // Of the names in the first two columns that were selected.
+  std::optional<std::pair<image_t, image_t>> Ids(
+      const SqliteStatement& statement) const;
+
+  // Ids and names as the first four values of a row.
+  void BindPair(image_t image_id1, image_t image_id2,
+                SqliteStatement* statement) const;
+
+ private:
+  std::map<image_t, std::string> names_;
+  std::map<std::string, image_t> ids_;
+};
+
+}  // namespace adasfm
+
+#endif  // ADASFM_COLMAP_EXT_DATABASE_IMAGE_NAMES_H_
