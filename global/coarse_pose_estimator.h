@@ -23,6 +23,7 @@ class CoarsePoseEstimator {
         correspondences_(correspondences),
         priors_(priors),
         frame_priors_(frame_priors),
+        chain_options_(options.chain),
         graph_(graph),
         step_start_(std::chrono::steady_clock::now()) {}
 
@@ -64,6 +65,7 @@ class CoarsePoseEstimator {
   const GlobalCorrespondences& correspondences_;
   std::vector<RelativePosePrior> priors_;
   const std::vector<RelativePosePrior>& frame_priors_;
+  OdometryChainOptions chain_options_;
   ViewGraph graph_;
   OdometryChain chain_;
   EdgeLengths lengths_;

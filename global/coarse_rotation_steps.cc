@@ -44,9 +44,10 @@ void CoarsePoseEstimator::RefinePairs() {
                                 DescribeCameraMount(result_.camera_mount));
 }
 
-// The chain, after vision has corrected the camera's mount.
+// The chain, with what vision tells of the camera's mount and of the direction
+// of driving.
 void CoarsePoseEstimator::BuildChain() {
-  chain_ = OdometryChain(priors_, options_.chain, frame_priors_);
+  chain_ = OdometryChain(priors_, chain_options_, frame_priors_);
   const CameraMountOptions& mount = options_.camera_mount;
   if (chain_.empty() || !options_.relative_poses.enabled || !mount.enabled) {
     return;
@@ -66,9 +67,8 @@ void CoarsePoseEstimator::BuildChain() {
   RefineRelativePoses(options_.relative_poses, correspondences_, {}, &near);
   result_.camera_mount =
       CorrectCameraMount(mount, chain_, near, correspondences_, &priors_);
-  if (result_.camera_mount.corrected) {
-    chain_ = OdometryChain(priors_, options_.chain, frame_priors_);
-  }
+  chain_options_.shared_turns = result_.camera_mount.left_in_priors;
+  chain_ = OdometryChain(priors_, chain_options_, frame_priors_);
 }
 
 std::vector<std::optional<RotationPrediction>>
@@ -133,7 +133,7 @@ TrajectoryOdometry CoarsePoseEstimator::BuildTrajectoryOdometry(
   EdgeLengths lengths = lengths_;
   VisualSteps steps = CompleteSteps();
   if (!steps.priors.empty()) {
-    OdometryChainOptions options = options_.chain;
+    OdometryChainOptions options = chain_options_;
     if (!HasLengths(priors_)) {
       options.scale_drift_ratio = options_.visual_steps.scale_drift_ratio;
     }

@@ -66,6 +66,7 @@ struct MountSolution {
   Unknowns unknowns = Unknowns::Zero();
   TurnCovariance covariance = TurnCovariance::Zero();
   double residual_variance = 0.0;
+  bool observes_directions = false;
   bool success = false;
 };
 
@@ -143,6 +144,12 @@ MountSolution Solve(const CameraMountOptions& options,
   solution.covariance = std::max(1.0, solution.residual_variance) *
                         (covariance.topLeftCorner<kNumTurns, kNumTurns>() +
                          SpreadOfSpans(observations, solution, covariance));
+  solution.observes_directions = std::any_of(
+      observations.begin(), observations.end(),
+      [](const MountObservation& observation) {
+        return !observation.jacobian.middleCols<3>(kDrivingDirectionUnknown)
+                    .isZero();
+      });
   solution.success =
       solution.unknowns.allFinite() && solution.covariance.allFinite();
   return solution;
@@ -171,6 +178,17 @@ Eigen::Vector3d KeepKnown(const CameraMountOptions& options, const Turns& turns,
     }
   }
   return (sigmas.asDiagonal() * (eigen.eigenvectors() * along)).head<3>();
+}
+
+// As the chain has them: directions of motion show the mount's turn and that of
+// the direction of driving together.
+SharedTurns ToSharedTurns(const Turns& turns,
+                          const TurnCovariance& covariance) {
+  TurnCovariance shared_from_turns = TurnCovariance::Identity();
+  shared_from_turns.bottomLeftCorner<3, 3>().setIdentity();
+  const Turns shared = shared_from_turns * turns;
+  return {shared.head<3>(), shared.tail<3>(),
+          shared_from_turns * covariance * shared_from_turns.transpose()};
 }
 
 }  // namespace
@@ -233,6 +251,9 @@ CameraMountReport CorrectCameraMount(
   report.sigma_rad =
       std::sqrt(axis.dot(covariance.topLeftCorner<3, 3>() * axis));
   const Eigen::Vector3d known = KeepKnown(options, turns, covariance);
+  if (solution.observes_directions) {
+    report.left_in_priors = ToSharedTurns(turns, covariance);
+  }
   // Where the mount's share is below what stands out of the floor, the finding
   // is the direction of driving, which the adjustments have an unknown for.
   if (report.chi2 < options.min_num_sigmas * options.min_num_sigmas ||
@@ -241,6 +262,10 @@ CameraMountReport CorrectCameraMount(
   }
   report.turn_rad = known;
   report.corrected = true;
+  if (report.left_in_priors) {
+    report.left_in_priors->mount_rad -= known;
+    report.left_in_priors->driving_direction_rad -= known;
+  }
   for (RelativePosePrior& prior : *priors) {
     TurnPrior(ExpSo3(report.turn_rad), &prior);
   }

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Geometry>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -40,6 +41,9 @@ struct CameraMountReport {
   double sigma_rad = 0.0;
   // The squared size of both turns in sigmas.
   double chi2 = 0.0;
+  // What is left in the priors, corrected or not; none where no pair has a
+  // direction.
+  std::optional<SharedTurns> left_in_priors;
   // Squared residuals of the pairs per degree of freedom; sigmas grow with what
   // is above 1, as noise that the sensors do not declare does not average out.
   double residual_variance = 0.0;

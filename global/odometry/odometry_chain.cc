@@ -16,6 +16,10 @@ namespace {
 
 using Matrix6d = Eigen::Matrix<double, 6, 6>;
 
+// Columns of OdometryChain::Systematic: the mount, the direction of driving.
+constexpr int kMount = 4;
+constexpr int kDriving = 7;
+
 // The prior's covariance with zeros for what it does not observe, which the
 // counters of the nodes exclude from use.
 Matrix6d ObservedCovariance(const RelativePosePrior& prior) {
@@ -38,29 +42,56 @@ Eigen::Matrix3d SquareRoot(const Eigen::Matrix3d& covariance) {
          eigen.eigenvectors().transpose();
 }
 
-// d(error) of a step by the errors that all steps share (columns as in
-// OdometryChain::Systematic).
-Eigen::Matrix<double, 6, 13> SharedJacobian(const RelativePosePrior& prior,
-                                            const Rigid3d& motion) {
-  Eigen::Matrix<double, 6, 13> jacobian = Eigen::Matrix<double, 6, 13>::Zero();
-  const Eigen::Matrix3d camera_from_middle =
-      ExpSo3(0.5 * LogSo3(motion.rotation)).toRotationMatrix();
-  jacobian.block<3, 1>(3, 0) = motion.translation;
-  jacobian.block<3, 3>(0, 1) = SecondsFromNs(prior.dt_ns) * camera_from_middle;
-  jacobian.block<3, 3>(0, 4) =
-      Eigen::Matrix3d::Identity() - motion.rotation.toRotationMatrix();
-  jacobian.block<3, 3>(3, 7) = -Hat(motion.translation) * camera_from_middle;
-  jacobian.block<3, 3>(3, 10) =
-      SquareRoot(ObservedCovariance(prior).bottomRightCorner<3, 3>());
-  return jacobian;
+Eigen::Matrix3d CameraFromMiddle(const Rigid3d& motion) {
+  return ExpSo3(0.5 * LogSo3(motion.rotation)).toRotationMatrix();
 }
 
 // The part of the motion that was observed.
-Rigid3d ObservedMotion(const RelativePosePrior& prior) {
+Rigid3d ObservedMotion(const OdometryChainOptions& options,
+                       const RelativePosePrior& prior) {
+  const SharedTurns turns = options.shared_turns.value_or(SharedTurns());
   Rigid3d motion;
-  if (prior.HasRotation()) motion.rotation = prior.cam2_from_cam1.rotation;
-  if (prior.HasMotion()) motion.translation = prior.cam2_from_cam1.translation;
+  if (prior.HasRotation()) {
+    const Eigen::Quaterniond mount = ExpSo3(turns.mount_rad);
+    motion.rotation = mount * prior.cam2_from_cam1.rotation * mount.conjugate();
+  }
+  if (prior.HasMotion()) {
+    motion.translation =
+        ExpSo3(CameraFromMiddle(motion) * turns.driving_direction_rad) *
+        prior.cam2_from_cam1.translation;
+  }
   return motion;
+}
+
+// A root of the translation's covariance, or of what it says of the length
+// where vision knows the direction that all steps share.
+Eigen::Matrix3d PersistentRoot(const OdometryChainOptions& options,
+                               const RelativePosePrior& prior,
+                               const Rigid3d& motion) {
+  const Eigen::Matrix3d covariance =
+      ObservedCovariance(prior).bottomRightCorner<3, 3>();
+  if (!options.shared_turns || !(motion.translation.squaredNorm() > 0.0)) {
+    return SquareRoot(covariance);
+  }
+  const Eigen::Vector3d along = motion.translation.normalized();
+  return std::sqrt(along.dot(covariance * along)) * along * along.transpose();
+}
+
+// d(error) of a step by the errors that all steps share (columns as in
+// OdometryChain::Systematic).
+Eigen::Matrix<double, 6, 13> SharedJacobian(const OdometryChainOptions& options,
+                                            const RelativePosePrior& prior,
+                                            const Rigid3d& motion) {
+  Eigen::Matrix<double, 6, 13> jacobian = Eigen::Matrix<double, 6, 13>::Zero();
+  const Eigen::Matrix3d camera_from_middle = CameraFromMiddle(motion);
+  jacobian.block<3, 1>(3, 0) = motion.translation;
+  jacobian.block<3, 3>(0, 1) = SecondsFromNs(prior.dt_ns) * camera_from_middle;
+  jacobian.block<3, 3>(0, kMount) =
+      Eigen::Matrix3d::Identity() - motion.rotation.toRotationMatrix();
+  jacobian.block<3, 3>(3, kDriving) =
+      -Hat(motion.translation) * camera_from_middle;
+  jacobian.block<3, 3>(3, 10) = PersistentRoot(options, prior, motion);
+  return jacobian;
 }
 
 }  // namespace
@@ -120,7 +151,7 @@ void OdometryChain::AppendPiece(image_t first,
   for (auto it = next.find(first); it != next.end();
        it = next.find(node.image_id)) {
     const RelativePosePrior& prior = priors[it->second];
-    const Rigid3d motion = ObservedMotion(prior);
+    const Rigid3d motion = ObservedMotion(options_, prior);
     const Eigen::Vector3d place = node.cam_from_start.TargetOriginInSource();
     node.num_places += 1.0;
     node.place_sum += place;
@@ -141,7 +172,8 @@ void OdometryChain::AppendPiece(image_t first,
     const auto gyro_sum = node.systematic.middleCols<3>(kGyro);
     node.walk.sum += dt_s * gyro_sum;
     node.walk.square_sum += dt_s * gyro_sum * gyro_sum.transpose();
-    node.systematic += start_from_error * SharedJacobian(prior, motion);
+    node.systematic +=
+        start_from_error * SharedJacobian(options_, prior, motion);
     index_[node.image_id] = nodes_.size();
     nodes_.push_back(node);
   }
@@ -243,6 +275,9 @@ ChainMotion OdometryChain::MotionOfLeaders(image_t image_id1,
   shared.block<3, 3>(kGyro, kGyro) = options_.gyro_bias_covariance.value_or(
       std::pow(options_.gyro_bias_sigma_rad_s, 2) *
       Eigen::Matrix3d::Identity());
+  if (options_.shared_turns) {
+    shared.block<6, 6>(kMount, kMount) = options_.shared_turns->covariance;
+  }
   const Systematic systematic = later.systematic - earlier.systematic;
   const Matrix6d covariance_in_start =
       later.covariance - earlier.covariance +

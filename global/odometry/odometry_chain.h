@@ -13,6 +13,16 @@
 
 namespace adasfm {
 
+// By what vision turns all priors alike (CorrectCameraMount): their rotations R
+// become Exp(mount) R Exp(-mount), their translations Exp(H driving_direction)
+// of theirs, where H leads to the later camera from the one halfway. rad.
+struct SharedTurns {
+  Eigen::Vector3d mount_rad = Eigen::Vector3d::Zero();
+  Eigen::Vector3d driving_direction_rad = Eigen::Vector3d::Zero();
+  // Of both in this order, rad^2.
+  Eigen::Matrix<double, 6, 6> covariance = Eigen::Matrix<double, 6, 6>::Zero();
+};
+
 // Errors that all steps of the chain share: they grow with the length of the
 // path, not with its root, and are what decides after kilometres.
 struct OdometryChainOptions {
@@ -29,9 +39,11 @@ struct OdometryChainOptions {
   // driving in the camera, rad.
   double extrinsic_rotation_sigma_rad = 5e-3;
   double driving_direction_sigma_rad = 0.01;
+  // What vision found of both, with its own covariance.
+  std::optional<SharedTurns> shared_turns;
   // The steps of a smoothed drive share the errors of its tilt and velocity:
   // this many sigmas of their translations persist from step to step, besides
-  // the part that changes.
+  // the part that changes; across the motion only without shared_turns.
   double persistent_translation_ratio = 1.0;
   // 1 sigma, per step, of the change of scale from there on, as a ratio. Where
   // vision alone makes the steps, nothing holds their scale.
