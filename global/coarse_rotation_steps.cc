@@ -65,8 +65,11 @@ void CoarsePoseEstimator::BuildChain() {
           }),
       near.edges.end());
   RefineRelativePoses(options_.relative_poses, correspondences_, {}, &near);
+  // What all steps share is what it looks for, and no noise.
+  const OdometryChain independent(priors_, WithoutSharedErrors(options_.chain),
+                                  frame_priors_);
   result_.camera_mount =
-      CorrectCameraMount(mount, chain_, near, correspondences_, &priors_);
+      CorrectCameraMount(mount, independent, near, correspondences_, &priors_);
   chain_options_.shared_turns = result_.camera_mount.left_in_priors;
   chain_ = OdometryChain(priors_, chain_options_, frame_priors_);
 }

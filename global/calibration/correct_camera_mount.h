@@ -59,6 +59,7 @@ struct CameraMountReport {
 // both, a constant gyroscope bias and an offset of all visual rotations
 // (kOffsetSigmaRad), Huber weights, relinearised. The covariance is that of
 // spans of the drive, whose pairs share their errors.
+// chain has the errors that differ from step to step (WithoutSharedErrors);
 // graph has rotations that do not know the priors (RefineRelativePoses without
 // predictions); pairs that are far apart or not of the chain are passed over.
 CameraMountReport CorrectCameraMount(

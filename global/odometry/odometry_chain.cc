@@ -109,6 +109,17 @@ bool OdometryChainOptions::IsValid(std::string* error) const {
       .AllHold();
 }
 
+OdometryChainOptions WithoutSharedErrors(const OdometryChainOptions& options) {
+  OdometryChainOptions independent = options;
+  independent.scale_sigma = 0.0;
+  independent.gyro_bias_covariance = Eigen::Matrix3d::Zero();
+  independent.extrinsic_rotation_sigma_rad = 0.0;
+  independent.driving_direction_sigma_rad = 0.0;
+  independent.shared_turns.reset();
+  independent.persistent_translation_ratio = 0.0;
+  return independent;
+}
+
 OdometryChain::OdometryChain(const std::vector<RelativePosePrior>& priors,
                              const OdometryChainOptions& options,
                              const std::vector<RelativePosePrior>& frame_priors)

@@ -52,6 +52,9 @@ struct OdometryChainOptions {
   bool IsValid(std::string* error) const;
 };
 
+// Only the errors that differ from step to step are left.
+OdometryChainOptions WithoutSharedErrors(const OdometryChainOptions& options);
+
 // The motion between any two images of the chain.
 struct ChainMotion {
   // All steps between the images have the part in question. Only then are the

@@ -92,9 +92,9 @@ Drive BuildDrive(const DriveOptions& options, uint64_t seed) {
 }
 
 CameraMountReport Correct(Drive* drive, const CameraMountOptions& options) {
-  return CorrectCameraMount(options, OdometryChain(drive->priors, {}),
-                            drive->graph, drive->correspondences,
-                            &drive->priors);
+  return CorrectCameraMount(
+      options, OdometryChain(drive->priors, WithoutSharedErrors({})),
+      drive->graph, drive->correspondences, &drive->priors);
 }
 
 double ErrorDeg(const CameraMountReport& report, const Eigen::Vector3d& truth) {
