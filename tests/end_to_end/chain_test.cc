@@ -139,6 +139,23 @@ TEST_F(ChainTest, AliasedDriveWithBlackoutEndsInOneMetricModel) {
   EXPECT_FALSE(summary.empty());
 }
 
+// Each floor looks like the next, 3 m above after 200 m of ramp: a climb of
+// 0.9 deg, where the direction of driving is known to 0.35 deg beforehand.
+TEST_F(ChainTest, FloorsThatLookAlikeStayApart) {
+  for (const std::string seed : {"1", "2", "3"}) {
+    Make(
+        "--num_images 160 --trajectory floors --spacing 3 --num_neighbors 6 "
+        "--alias_ratio 0.3 --seed " +
+        seed);
+    Import();
+    ExpectSuccess(GlobalArguments("global" + seed));
+    const nlohmann::json evaluation = Evaluate("global" + seed + "/0");
+    EXPECT_EQ(evaluation["num_images"], 160);
+    EXPECT_LT(evaluation["sim3_least_squares"]["translation_rmse_m"], 0.3)
+        << "seed " << seed;
+  }
+}
+
 // Without wheels: the sigma says how far the accelerometer's metres may be off.
 // A second run measures them anew.
 TEST_F(ChainTest, AnImuAloneTellsMetres) {

@@ -163,15 +163,19 @@ TEST_F(PriorTablesTest, ReadsWhatWasWrittenLast) {
     EXPECT_EQ(loaded->num_ignored_rows, 0);
     ExpectEqual(loaded->tables, tables);
   }
-  const StatusOr<SceneData> scene = ReadSceneData(path_, SceneDataOptions());
-  ASSERT_TRUE(scene.ok());
-  EXPECT_EQ(scene->priors.size(), 5);
-  EXPECT_EQ(scene->images.at(2).timestamp_ns, world_.images[1].timestamp_ns);
-  EXPECT_TRUE(scene->images.at(2).gravity_in_cam.has_value());
-  EXPECT_TRUE(scene->gyroscope_bias_covariance.has_value());
-  EXPECT_GT(scene->length_drift_ratio, 0.0);
-  EXPECT_EQ(scene->inertial_motions.size(), 5);
-  EXPECT_EQ(scene->inertial_scale_sigma, 0.0);
+  for (const bool is_before_global : {false, true}) {
+    SceneDataOptions options;
+    options.use_original_two_view_geometries = is_before_global;
+    const StatusOr<SceneData> scene = ReadSceneData(path_, options);
+    ASSERT_TRUE(scene.ok());
+    EXPECT_EQ(scene->priors.size(), 5);
+    EXPECT_EQ(scene->images.at(2).timestamp_ns, world_.images[1].timestamp_ns);
+    EXPECT_TRUE(scene->images.at(2).gravity_in_cam.has_value());
+    EXPECT_TRUE(scene->gyroscope_bias_covariance.has_value());
+    EXPECT_GT(scene->length_drift_ratio, 0.0);
+    EXPECT_EQ(scene->inertial_motions.size(), is_before_global ? 5 : 0);
+    EXPECT_EQ(scene->inertial_scale_sigma, 0.0);
+  }
 }
 
 // As written before imports stated it, and again by one without a gyroscope.
