@@ -7,7 +7,7 @@
 #
 #   scripts/benchmark/all.sh --quick    README's table and COLMAP 4 beside it: some
 #                                       25 minutes on two idle cores
-#   scripts/benchmark/all.sh            everything: a night
+#   scripts/benchmark/all.sh            everything: some three hours
 #   scripts/benchmark/all.sh -h         all options
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/../.."
