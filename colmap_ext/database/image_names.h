@@ -1,14 +1,13 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#ifndef ADASFM_COLMAP_EXT_DATABASE_IMAGE_NAMES_H_
-#define ADASFM_COLMAP_EXT_DATABASE_IMAGE_NAMES_H_
+#pragma once
 
 #include <map>
 #include <optional>
 #include <string>
 #include <utility>
 
-#include "core/types.h"
 #include "core/sqlite.h"
+#include "core/types.h"
 
 namespace adasfm {
 
@@ -39,5 +38,3 @@ class ImageNames {
 };
 
 }  // namespace adasfm
-
-#endif  // ADASFM_COLMAP_EXT_DATABASE_IMAGE_NAMES_H_
