@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSD-3-Clause
-"""Makes every table of README.md and docs/results that a script can make.
+"""Makes the tables of README.md and docs that compare, one version for all.
 
 scripts/benchmark/all.sh calls it on a build of these sources. Each table is a
 step; its rows are kept in OUTPUT/STEP/rows.jsonl with the version of the
@@ -41,8 +41,9 @@ README_SETS = {
 }
 CLEANER_SETS = ['world-alias-300', 'world-hard-400', 'world-clean-300',
                 'kitti06-51', 'kitti07-160']
-# Look-alikes, nothing hard, and two real motions.
-ABLATION_SETS = ['alias-300', 'clean-500', 'kitti07-160', 'world-kitti10-592']
+# Look-alikes, nothing hard, few good matches, and two real motions.
+ABLATION_SETS = ['alias-300', 'clean-500', 'noisy-500', 'outliers-500',
+                 'world-hard-400', 'kitti07-160', 'world-kitti10-592']
 # The commands of COLMAP 4, and the names of the benchmark's methods for them.
 PEER_COMMANDS = {'mapper': 'colmap4_mapper',
                  'global_mapper': 'colmap4_global_mapper'}
@@ -212,8 +213,6 @@ STEPS = {
     'estimator_seeds': lambda args: run_script(args, 'estimator_seeds',
                                                'estimator_seeds.py'),
     'kinds': lambda args: Benchmark(args).kinds(),
-    'growth': lambda args: run_script(
-        args, 'growth', 'growth.py', '--sizes', '500,1000,4000,10000'),
 }
 QUICK_STEPS = ['readme']
 

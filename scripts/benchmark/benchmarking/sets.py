@@ -20,6 +20,8 @@ KINDS = {
     'sparse': ['--num_keypoints', '100', '--num_neighbors', '4',
                '--spacing', '2'],
     'fisheye': ['--camera_model', 'OPENCV_FISHEYE'],
+    'noisy': ['--pixel_noise', '3', '--num_keypoints', '200'],
+    'outliers': ['--outlier_ratio', '0.8', '--num_keypoints', '400'],
 }
 
 # Real sequences (or worlds of other generators) in the folder --data_path.
