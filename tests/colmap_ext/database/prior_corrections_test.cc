@@ -116,23 +116,6 @@ TEST_F(PriorCorrectionsTest, TurnGravityToo) {
   EXPECT_EQ(gravity(false), Eigen::Vector3d::UnitY());
 }
 
-TEST_F(PriorCorrectionsTest, TurnWhatTheImuIntegrates) {
-  InertialMotion motion;
-  motion.image_id1 = tables_.priors[0].image_id1;
-  motion.image_id2 = tables_.priors[0].image_id2;
-  motion.dt_s = 0.1;
-  motion.delta_velocity = Eigen::Vector3d::UnitY();
-  tables_.inertial_motions = {motion};
-  ASSERT_TRUE(WritePriorTables(path_, tables_).ok());
-  ASSERT_TRUE(RewriteTwoViewGeometries(path_, {}, {}, mount_).ok());
-  const StatusOr<SceneData> scene = ReadSceneData(path_, SceneDataOptions());
-  ASSERT_TRUE(scene.ok()) << scene.status().message();
-  EXPECT_LT((scene->inertial_motions.at(0).delta_velocity -
-             mount_ * motion.delta_velocity)
-                .norm(),
-            1e-9);
-}
-
 // The priors of an IMU without wheels, but for the last one.
 class InertialLengthsTest : public PriorCorrectionsTest {
  protected:
