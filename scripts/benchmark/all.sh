@@ -2,12 +2,13 @@
 # SPDX-License-Identifier: BSD-3-Clause
 # Makes every table of README.md and docs from nothing but those of growth,
 # matching, faults and verdicts: sets up, builds, runs what is not done yet with
-# this version on this machine, and writes the tables into the pages. Interrupted, it goes on where it was. What is missing
-# (the recordings, another COLMAP) is left out with one line.
+# this version on this machine, and writes the tables into the pages.
+# Interrupted, it goes on where it was. What is missing (the recordings, another
+# COLMAP) is left out with one line.
 #
 #   scripts/benchmark/all.sh --quick    README's table and COLMAP 4 beside it: some
-#                                       25 minutes on two idle cores
-#   scripts/benchmark/all.sh            everything: some three hours
+#                                       36 minutes on two idle cores
+#   scripts/benchmark/all.sh            everything: several hours
 #   scripts/benchmark/all.sh -h         all options
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/../.."

@@ -178,7 +178,8 @@ class PagesTest(Folder):
         ('README.md', ['summary']), ('docs/guide/cleaner.md', ['cleaner']),
         ('docs/results/benchmark.md', ['peers', 'ablations', 'kinds']),
         *(('docs/results/%s.md' % step, [step]) for step in
-          all_tables.STEPS if step not in ('readme', 'cleaner', 'ablations', 'kinds'))):
+          all_tables.STEPS if step not in ('readme', 'cleaner', 'ablations',
+                                           'kinds'))):
       text = read(os.path.join(root, page))
       for table in tables:
         write(self.path('copy.md'), text)

@@ -91,6 +91,14 @@ Drive BuildDrive(const DriveOptions& options, uint64_t seed) {
   return drive;
 }
 
+// The direction of driving is wrong by this rotation vector.
+void TurnDirections(const Eigen::Vector3d& turn, Drive* drive) {
+  for (RelativePosePrior& prior : drive->priors) {
+    Rigid3d& motion = prior.cam2_from_cam1;
+    motion.translation = ExpSo3(turn) * motion.translation;
+  }
+}
+
 CameraMountReport Correct(Drive* drive, const CameraMountOptions& options) {
   return CorrectCameraMount(
       options, OdometryChain(drive->priors, WithoutSharedErrors({})),
@@ -209,10 +217,7 @@ TEST(CorrectCameraMount, SharesTheBlameWithTheDirectionOfDriving) {
       Drive drive = BuildDrive(options, seed);
       // 1 sigma of what the odometry chain grants the direction.
       const Eigen::Vector3d turn = random.GaussianVector(0.01);
-      for (RelativePosePrior& prior : drive.priors) {
-        Rigid3d& motion = prior.cam2_from_cam1;
-        motion.translation = ExpSo3(turn) * motion.translation;
-      }
+      TurnDirections(turn, &drive);
       const CameraMountReport report = Correct(&drive, CameraMountOptions());
       // Of the angle: along its axis.
       const double error = report.turn_rad.normalized().dot(
@@ -257,10 +262,7 @@ TEST(CorrectCameraMount, TellsWhatIsLeftInThePriors) {
       options.mount_deg = random.GaussianVector(mount_sigma_deg);
       Drive drive = BuildDrive(options, seed);
       const Eigen::Vector3d driving = random.GaussianVector(kDrivingSigmaRad);
-      for (RelativePosePrior& prior : drive.priors) {
-        Rigid3d& motion = prior.cam2_from_cam1;
-        motion.translation = ExpSo3(driving) * motion.translation;
-      }
+      TurnDirections(driving, &drive);
       const CameraMountReport report = Correct(&drive, CameraMountOptions());
       ASSERT_TRUE(report.left_in_priors.has_value());
       const SharedTurns& found = *report.left_in_priors;

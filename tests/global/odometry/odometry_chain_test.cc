@@ -20,6 +20,24 @@ Rigid3d TrueStep(int k) {
                  Eigen::Vector3d(0.02, 0.01, -1.0));
 }
 
+Eigen::Matrix<double, 6, 1> ErrorOf(const Rigid3d& motion,
+                                    const Rigid3d& expected) {
+  Eigen::Matrix<double, 6, 1> error;
+  error << LogSo3(motion.rotation * expected.rotation.conjugate()),
+      motion.translation - expected.translation;
+  return error;
+}
+
+// Of 1,500 draws: in the frame in which the stated covariance is the identity,
+// sampled variances have a standard error of sqrt(2 / n) = 3.7 %.
+void ExpectSpread(const Matrix6d& stated, const Matrix6d& sampled) {
+  const Matrix6d whitener = Matrix6d(stated.llt().matrixL()).inverse();
+  const Eigen::SelfAdjointEigenSolver<Matrix6d> eigen(whitener * sampled *
+                                                      whitener.transpose());
+  EXPECT_GT(eigen.eigenvalues().minCoeff(), 0.8);
+  EXPECT_LT(eigen.eigenvalues().maxCoeff(), 1.2);
+}
+
 TEST(OdometryChain, ComposesBothWays) {
   Random random(1);
   std::vector<RelativePosePrior> priors;
@@ -146,20 +164,11 @@ TEST(OdometryChain, CovarianceAgreesWithMonteCarlo) {
     for (int k = 0; k < kNumDraws; ++k) {
       const Rigid3d drawn =
           draw(1.0, std::min(from, to)).Motion(from, to).cam2_from_cam1;
-      Eigen::Matrix<double, 6, 1> error;
-      error << LogSo3(drawn.rotation *
-                      expected.cam2_from_cam1.rotation.conjugate()),
-          drawn.translation - expected.cam2_from_cam1.translation;
+      const Eigen::Matrix<double, 6, 1> error =
+          ErrorOf(drawn, expected.cam2_from_cam1);
       sampled += error * error.transpose() / kNumDraws;
     }
-    // In the frame in which the stated covariance is the identity, sampled
-    // variances have a standard error of sqrt(2 / n) = 3.7 %.
-    const Matrix6d whitener =
-        Matrix6d(expected.covariance.llt().matrixL()).inverse();
-    const Eigen::SelfAdjointEigenSolver<Matrix6d> eigen(whitener * sampled *
-                                                        whitener.transpose());
-    EXPECT_GT(eigen.eigenvalues().minCoeff(), 0.8);
-    EXPECT_LT(eigen.eigenvalues().maxCoeff(), 1.2);
+    ExpectSpread(expected.covariance, sampled);
   }
 }
 
@@ -226,19 +235,11 @@ TEST(OdometryChain, SharedTurnsAgreeWithMonteCarlo) {
     }
     const Rigid3d motion =
         OdometryChain(priors, options).Motion(11, 111).cam2_from_cam1;
-    Eigen::Matrix<double, 6, 1> error;
-    error << LogSo3(motion.rotation *
-                    expected.cam2_from_cam1.rotation.conjugate()),
-        motion.translation - expected.cam2_from_cam1.translation;
+    const Eigen::Matrix<double, 6, 1> error =
+        ErrorOf(motion, expected.cam2_from_cam1);
     sampled += error * error.transpose() / kNumDraws;
   }
-  // Sampled variances have a standard error of 3.7 %.
-  const Matrix6d whitener =
-      Matrix6d(stated.covariance.llt().matrixL()).inverse();
-  const Eigen::SelfAdjointEigenSolver<Matrix6d> eigen(whitener * sampled *
-                                                      whitener.transpose());
-  EXPECT_GT(eigen.eigenvalues().minCoeff(), 0.8);
-  EXPECT_LT(eigen.eigenvalues().maxCoeff(), 1.2);
+  ExpectSpread(stated.covariance, sampled);
 }
 
 // An axis that the import knows badly is the one that errs, by its rate times
