@@ -43,7 +43,7 @@ class ModelRefiner {
   void JoinParts() {
     if (!options_.join_parts) return;
     ReleaseMatches();
-    AdjustTentatively(10);
+    AdjustTentatively();
     Filter(LoosePx());
   }
 
@@ -51,16 +51,16 @@ class ModelRefiner {
     if (options_.join_parts) scene_.mapper.CompleteAndMergeTracks(LoosePx());
     TriangulateWeakImages();
     ReleaseMatches();
-    AdjustTentatively(15);
+    AdjustTentatively();
     Filter(local_.filter_max_reproj_error_px);
-    if (PutBackContradictedImages()) AdjustTentatively(10);
+    if (PutBackContradictedImages()) AdjustTentatively();
   }
 
   void AdjustFinely() {
     scene_.mapper.CompleteAndMergeTracks(local_.filter_max_reproj_error_px);
     ReleaseMatches();
     summary_.keypoint_sigma_factor = 1.0;
-    Adjust(25, 1e-6, FindPriors(), &summary_.keypoint_sigma_factor);
+    Adjust(1e-6, FindPriors(), &summary_.keypoint_sigma_factor);
     Filter(local_.filter_max_reproj_error_px);
     LeaveOutUnsupportedImages();
   }
@@ -149,17 +149,18 @@ class ModelRefiner {
   // Until parts and gaps are in place, priors are off for other reasons than
   // keypoints or shared errors; the balance found then serves this adjustment
   // only, and what all priors share is left to the last round.
-  void AdjustTentatively(int max_num_iterations) {
+  void AdjustTentatively() {
     std::vector<PosePriorEdge> priors = FindPriors();
     MarkPriorsInGaps(&priors);
     double keypoint_sigma_factor = summary_.keypoint_sigma_factor;
-    Adjust(max_num_iterations, 1e-3, std::move(priors), &keypoint_sigma_factor,
+    Adjust(1e-3, std::move(priors), &keypoint_sigma_factor,
            /*is_tentative=*/true);
   }
 
-  void Adjust(int max_num_iterations, double function_tolerance,
-              std::vector<PosePriorEdge> priors, double* keypoint_sigma_factor,
-              bool is_tentative = false) {
+  // To its tolerance: an adjustment cut short leaves priors off that it would
+  // have met, which the balance would take for keypoints that weigh too much.
+  void Adjust(double function_tolerance, std::vector<PosePriorEdge> priors,
+              double* keypoint_sigma_factor, bool is_tentative = false) {
     PriorBundleAdjustmentProblem problem;
     problem.images = RegisteredImages(reconstruction_);
     problem.priors = std::move(priors);
@@ -180,7 +181,6 @@ class ModelRefiner {
     options.refine_focal_length = options_.refine_focal_length;
     options.refine_principal_point = options_.refine_principal_point;
     options.refine_extra_params = options_.refine_extra_params;
-    options.max_num_iterations = max_num_iterations;
     options.function_tolerance = function_tolerance;
     options.num_threads = options_.num_threads;
     VarianceComponentOptions balance = local_.balance;

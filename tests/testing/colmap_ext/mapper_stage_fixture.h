@@ -59,6 +59,28 @@ class MapperStageTest : public testing::Test {
     EXPECT_LT(errors.rmse_m, 0.5 * CoarseRmseM(world));
   }
 
+  // Sums in another order end an adjustment elsewhere within its tolerance: far
+  // below what 0.5 px leave open.
+  static void ExpectSamePoses(const std::map<image_t, Rigid3d>& expected,
+                              const std::map<image_t, Rigid3d>& poses) {
+    ASSERT_EQ(poses.size(), expected.size());
+    for (const auto& [image_id, pose] : expected) {
+      EXPECT_TRUE(PosesNear(pose, poses.at(image_id), 1e-3, 1e-2));
+    }
+  }
+
+  // Two gaps that only priors bridge, of a good gyroscope and good wheels.
+  static MapperWorldOptions WorldWithGaps(uint64_t seed) {
+    MapperWorldOptions options;
+    options.world.num_images = 100;
+    options.world.seed = seed;
+    options.world.num_blackouts = 2;
+    options.world.blackout_num_images = 16;
+    options.priors.rotation_sigma_rad = 0.0005;
+    options.priors.translation_sigma_m = 0.005;
+    return options;
+  }
+
   static double CoarseRmseM(const MapperWorld& world) {
     return ComputeAlignedErrors(world.coarse_poses, world.true_poses, {})
         .rmse_m;
