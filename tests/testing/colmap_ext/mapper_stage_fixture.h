@@ -3,13 +3,13 @@
 
 #include <gtest/gtest.h>
 
-#include <filesystem>
 #include <map>
 #include <string>
 
 #include "colmap_ext/host/pose_conversion.h"
 #include "colmap_ext/mapper_stage/mapper_stage.h"
 #include "tests/testing/colmap_ext/mapper_world.h"
+#include "tests/testing/colmap_ext/temporary_folder.h"
 #include "tests/testing/matchers.h"
 
 namespace adasfm {
@@ -18,17 +18,11 @@ namespace adasfm {
 class MapperStageTest : public testing::Test {
  protected:
   void SetUp() override {
-    const auto* info = testing::UnitTest::GetInstance()->current_test_info();
-    folder_ = (std::filesystem::temp_directory_path() /
-               (std::string("adasfm_mapper_") + info->name()))
-                  .string();
-    std::filesystem::remove_all(folder_);
     // Small parts, so that small worlds have several.
     options_.partition.max_num_images_undivided = 40;
     options_.partition.cut.max_part_size = 40;
     options_.num_threads = 2;
   }
-  void TearDown() override { std::filesystem::remove_all(folder_); }
 
   // Plan, parts and merge in the test's folder.
   std::map<image_t, Rigid3d> Run(const MapperWorld& world) {
@@ -88,7 +82,9 @@ class MapperStageTest : public testing::Test {
 
   MapperStageOptions options_;
   MapperStageSummary summary_;
-  std::string folder_;
+  const TemporaryFolder temporary_;
+  // What a test may remove and make again.
+  const std::string folder_ = temporary_.File("mapper");
 };
 
 }  // namespace adasfm
