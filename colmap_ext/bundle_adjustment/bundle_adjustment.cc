@@ -32,9 +32,9 @@ constexpr double kMinLengthM = 1e-9;
 // Problems with fewer residuals are solved faster by one thread.
 constexpr int kMinNumResidualsForThreads = 20000;
 
-bool HasLengths(const std::vector<PosePriorEdge>& priors) {
+bool HasMeasuredLengths(const std::vector<PosePriorEdge>& priors) {
   return std::any_of(priors.begin(), priors.end(), [](const auto& edge) {
-    return std::isfinite(edge.length_sigma_m);
+    return edge.is_length_measured && std::isfinite(edge.length_sigma_m);
   });
 }
 
@@ -212,9 +212,11 @@ PosePriorEdge PosePriorEdgeFromPrior(const RelativePosePrior& prior) {
   const Eigen::Vector3d direction = translation / length;
   const double variance_along = direction.dot(covariance * direction);
   const double variance_across = (covariance.trace() - variance_along) / 2.0;
-  if (prior.HasLength())
+  // What the accelerometer tells of the unit is given back to the adjusted
+  // model as a whole (KeepInertialUnit).
+  if (prior.HasLength() && !(prior.flags & kPriorInertialLength)) {
     edge.length_sigma_m = sigma_or_infinity(variance_along);
-  edge.is_length_measured = !(prior.flags & kPriorInertialLength);
+  }
   if (prior.HasDirection()) {
     edge.direction_sigma_rad = sigma_or_infinity(variance_across) / length;
   }
@@ -282,7 +284,7 @@ PriorBundleAdjustmentSummary AdjustBundle(
   }
   if (AddPositionPriors(options.position_loss_scale, problem, &bundle) <
       kMinNumPositionsForGauge) {
-    FixGauge(HasLengths(problem.priors), &bundle);
+    FixGauge(HasMeasuredLengths(problem.priors), &bundle);
   }
 
   const auto start = std::chrono::steady_clock::now();

@@ -47,8 +47,8 @@ struct PosePriorEdge {
   // itself keeps its full weight, as dropping it would open the gap, and says
   // nothing of the balance between keypoints and priors.
   bool is_held_by_points = true;
-  // Whether a sensor measured the length of this motion alone: it says nothing
-  // of its noise otherwise.
+  // Whether a sensor measured the length: otherwise it ties images to others
+  // and says nothing of the unit, nor of its own noise.
   bool is_length_measured = true;
   // Duration of a motion that sensors measured: it has part in the errors that
   // their whole log shares (shared_errors.h). Negative: it has none of them.

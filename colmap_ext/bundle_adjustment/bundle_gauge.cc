@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // How BundleProblem holds the degrees of freedom that the data leave open.
 #include <utility>
+#include <vector>
 
 #include "colmap_ext/bundle_adjustment/bundle_problem.h"
+#include "core/median.h"
 
 namespace adasfm {
 
@@ -26,6 +28,14 @@ void BundleProblem::FixFirstPose() {
   problem_->SetParameterBlockConstant(first->SolvedPose()->parameters);
 }
 
+double BundleProblem::MedianNumObservations() const {
+  std::vector<double> counts;
+  for (const auto& [image_id, block] : images_) {
+    if (block.IsUsed()) counts.push_back(block.num_observations);
+  }
+  return UpperMedian(&counts);
+}
+
 void BundleProblem::FixDistanceToFarthestPose(double sigma_ratio) {
   std::pair<image_t, ImageBlock*> first(kInvalidImageId, nullptr);
   for (auto& [image_id, block] : images_) {
@@ -35,10 +45,15 @@ void BundleProblem::FixDistanceToFarthestPose(double sigma_ratio) {
     }
   }
   if (first.second == nullptr) return;
+  // A pose on few points may be wrong by more than the model is large, and
+  // would take the model along where it goes.
+  const double min_num_observations = 0.5 * MedianNumObservations();
   std::pair<image_t, ImageBlock*> farthest(kInvalidImageId, nullptr);
   double max_distance = 0.0;
   for (auto& [image_id, block] : images_) {
-    if (!block.IsUsed()) continue;
+    if (!block.IsUsed() || block.num_observations < min_num_observations) {
+      continue;
+    }
     const double distance =
         (block.pose->center - first.second->pose->center).norm();
     if (distance <= max_distance) continue;

@@ -45,7 +45,8 @@ class BundleProblem final : private ceres::EvaluationCallback {
   // image) constant.
   void FixFirstPose();
   // Holds the distance from the first constant pose to the pose farthest from
-  // it, to this share of the distance.
+  // it that sees at least half as many points as the median image, to this
+  // share of the distance.
   void FixDistanceToFarthestPose(double sigma_ratio);
 
   // The pose of an image that has part in a residual already; null for others.
@@ -139,6 +140,8 @@ class BundleProblem final : private ceres::EvaluationCallback {
                                  const std::vector<double*>& others = {});
   void AddPoints(const colmap::Reconstruction& reconstruction);
   double KeypointSigmaPx(camera_t camera_id) const;
+  // Of the images in use.
+  double MedianNumObservations() const;
   // The usable observations of a point, in order of image ids.
   std::vector<Observation> FindObservations(
       const colmap::Reconstruction& reconstruction,

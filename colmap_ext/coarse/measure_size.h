@@ -13,9 +13,9 @@ namespace adasfm {
 // Scales an adjusted model without metres to those of the accelerometer, where
 // it tells them (EstimateInertialScale); else the model stays as it is.
 // camera_mount: the true camera frame from that of the scene's motions. Returns
-// the lengths of the scene's priors in the model, which are to keep the unit in
-// later adjustments and not to hold the shape, which vision knows better: all
-// of them together tell the size to 100 %.
+// the lengths of the scene's priors in the model, by which the mapper gives its
+// own model the unit (KeepInertialUnit). They are not to hold the shape, which
+// vision knows better: all of them together tell the size to 100 %.
 std::vector<InertialLength> MeasureSize(const SceneData& scene,
                                         const Eigen::Quaterniond& camera_mount,
                                         CoarseModel* model);

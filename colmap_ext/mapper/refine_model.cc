@@ -123,6 +123,7 @@ class ModelRefiner {
         if (std::isfinite(edge->direction_sigma_rad)) {
           edge->length_sigma_m =
               kCoarseLengthSigmaRatio * edge->cam2_from_cam1.translation.norm();
+          edge->is_length_measured = false;
         }
         edges->push_back(*edge);
         if (++num_edges == kMaxNumCoarseEdges) break;

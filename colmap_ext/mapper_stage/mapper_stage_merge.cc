@@ -11,6 +11,7 @@
 #include "colmap_ext/mapper_stage/mapper_steps.h"
 #include "colmap_ext/mapper_stage/merge_checkpoint.h"
 #include "colmap_ext/scene/align_to_gravity.h"
+#include "colmap_ext/scene/keep_inertial_unit.h"
 #include "core/median.h"
 #include "core/release_memory.h"
 
@@ -209,6 +210,7 @@ StatusOr<colmap::Reconstruction> MapperStage::Merge(bool require_all_parts) {
   const StepTimer refine_timer;
   status = RefineMerged(fingerprint, &*merged);
   if (!status.ok()) return status;
+  KeepInertialUnit(data_.priors, &model);
   summary_.is_level =
       summary_.is_georeferenced || AlignToGravity(data_, &model);
   summary_.refine_seconds = refine_timer.Seconds();

@@ -6,7 +6,11 @@
 #include <cmath>
 #include <filesystem>
 #include <iostream>
+#include <map>
+#include <vector>
 
+#include "core/inertial_motion.h"
+#include "core/random.h"
 #include "tests/testing/colmap_ext/mapper_stage_fixture.h"
 
 namespace adasfm {
@@ -20,6 +24,25 @@ double PriorDriftM(const MapperWorldOptions& options) {
   return options.priors.translation_sigma_m * std::sqrt(1.0 * n) +
          options.priors.rotation_sigma_rad * std::sqrt(1.0 * n) * length_m /
              std::sqrt(3.0);
+}
+
+// Of the priors' motions in a model, as the coarse stage states them
+// (colmap_ext/coarse/measure_size.h).
+std::vector<InertialLength> LengthsOf(
+    const std::map<image_t, Rigid3d>& cams_from_world,
+    const std::vector<RelativePosePrior>& priors) {
+  std::vector<InertialLength> lengths;
+  double sum = 0.0;
+  for (const RelativePosePrior& prior : priors) {
+    const double length_m =
+        ComputeCam2FromCam1(cams_from_world.at(prior.image_id1),
+                            cams_from_world.at(prior.image_id2))
+            .translation.norm();
+    lengths.push_back({prior.image_id1, prior.image_id2, length_m, 0.0, 0.01});
+    sum += length_m * length_m;
+  }
+  for (InertialLength& length : lengths) length.sigma_m = std::sqrt(sum);
+  return lengths;
 }
 
 TEST_F(MapperStageTest, IsFarBetterThanTheCoarseModelInMetres) {
@@ -218,6 +241,37 @@ TEST_F(MapperStageTest, UnknownFocalLengthIsRefined) {
   EXPECT_NEAR(run(true), 1.0, 0.005);
   options_.refine.constant_cameras = {1};
   EXPECT_EQ(run(true), 1.02);
+}
+
+// An IMU without wheels: images on few points whose coarse places are wrong do
+// not take the metres of the accelerometer along.
+TEST_F(MapperStageTest, WrongPlacesLeaveTheUnitOfTheAccelerometer) {
+  for (const uint64_t seed : {1, 2, 3}) {
+    MapperWorldOptions options;
+    options.world.num_images = 100;
+    options.world.seed = seed;
+    options.world.num_blackouts = 1;
+    options.world.blackout_num_images = 6;
+    options.world.blackout_num_keypoints = 14;
+    options.center_sigma_m = 0.02;
+    MapperWorld world = BuildMapperWorld(options);
+    Random random(seed);
+    for (auto& [image_id, pose] : world.coarse_poses) {
+      if (world.data.images.at(image_id).keypoints.size() > 20) continue;
+      pose.translation += random.GaussianVector(10.0);
+    }
+    world.data.inertial_scale_sigma = 0.01;
+    for (RelativePosePrior& prior : world.data.priors) {
+      prior.flags = kPriorRotation;
+    }
+    AddInertialLengths(LengthsOf(world.coarse_poses, world.data.priors),
+                       &world.data.priors);
+    std::filesystem::remove_all(folder_);
+    const AlignedErrors errors =
+        ComputeAlignedErrors(Run(world), world.true_poses, {});
+    EXPECT_GE(errors.num_images, 94);
+    EXPECT_NEAR(errors.scale, 1.0, 0.01);
+  }
 }
 
 // The ablations of the paper.
