@@ -283,7 +283,7 @@ TEST(RunGlobalStageTest, ReportsEveryStep) {
   }
   for (const char* figure :
        {"pairs_agree", "pair_agreement", "least_pair_agreement",
-        "rotation_optimality", "max_track_bytes"}) {
+        "rotation_optimality", "max_track_bytes", "focal_length_camera"}) {
     EXPECT_NE(json.find("\"" + std::string(figure) + "\""), std::string::npos)
         << figure;
   }
