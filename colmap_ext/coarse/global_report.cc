@@ -258,7 +258,7 @@ std::string FormatGlobalReportJson(const SceneData& scene,
                        {"pairs_removed", result.removed_pairs.size()},
                        {"pairs_skipped", result.refinement.num_skipped_pairs}};
   report["warnings"] = ListGlobalWarnings(scene, result);
-  for (const StepReport& step : result.steps) {
+  for (const CoarseStep& step : result.steps) {
     report["steps"].push_back({{"name", step.name},
                                {"seconds", step.seconds},
                                {"summary", step.summary}});
@@ -270,7 +270,7 @@ std::string FormatGlobalReportText(const GlobalStageResult& result,
                                    double total_seconds) {
   std::ostringstream text;
   text << std::fixed << std::setprecision(2);
-  for (const StepReport& step : result.steps) {
+  for (const CoarseStep& step : result.steps) {
     text << std::setw(8) << step.seconds << " s  " << step.name << ": "
          << step.summary << "\n";
   }

@@ -40,13 +40,6 @@ struct GlobalStageOptions {
   bool IsValid(std::string* error) const;
 };
 
-struct StepReport {
-  std::string name;
-  double seconds = 0.0;
-  // What it did, in one line.
-  std::string summary;
-};
-
 struct GlobalStageResult {
   // Those that were changed in the scene.
   std::vector<CalibratedFocalLength> focal_lengths;
@@ -63,7 +56,7 @@ struct GlobalStageResult {
   std::vector<ImagePair> removed_pairs;
   // Of priors that know none, in models that have metres by the accelerometer.
   std::vector<InertialLength> inertial_lengths;
-  std::vector<StepReport> steps;
+  std::vector<CoarseStep> steps;
 };
 
 // Called when a step begins, with its name and the share of steps that are

@@ -278,7 +278,7 @@ TEST(RunGlobalStageTest, ReportsEveryStep) {
   GlobalStageResult result = RunStage(scene);
   EXPECT_TRUE(ListGlobalWarnings(scene, result).empty());
   const std::string json = FormatGlobalReportJson(scene, result, 1.0);
-  for (const StepReport& step : result.steps) {
+  for (const CoarseStep& step : result.steps) {
     EXPECT_NE(json.find("\"" + step.name + "\""), std::string::npos);
   }
   for (const char* figure :
