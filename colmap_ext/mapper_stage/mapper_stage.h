@@ -143,11 +143,4 @@ class MapperStage {
   MapperStageSummary summary_;
 };
 
-struct Verdict;
-
-// As JSON, with the verdict unless it is null, and as the lines for the screen.
-std::string FormatMapperSummaryJson(const MapperStageSummary& summary,
-                                    const Verdict* verdict = nullptr);
-std::string FormatMapperSummaryText(const MapperStageSummary& summary);
-
 }  // namespace adasfm

@@ -6,7 +6,9 @@
 #include <cmath>
 #include <filesystem>
 #include <iostream>
+#include <nlohmann/json.hpp>
 
+#include "colmap_ext/mapper_stage/mapping_summary.h"
 #include "tests/testing/colmap_ext/mapper_stage_fixture.h"
 
 namespace adasfm {
@@ -248,8 +250,8 @@ TEST_F(MapperStageTest, SummaryIsJsonWithEveryPart) {
   MapperWorldOptions options;
   options.world.num_images = 60;
   Run(BuildMapperWorld(options));
-  const std::string json = FormatMapperSummaryJson(summary_);
-  EXPECT_NE(json.find("\"part_index\": 1"), std::string::npos);
+  const std::string json = MapperSummaryToJson(summary_).dump();
+  EXPECT_NE(json.find("\"part_index\":1"), std::string::npos);
   EXPECT_NE(json.find("separator_rmse_after"), std::string::npos);
   EXPECT_NE(FormatMapperSummaryText(summary_).find("60 images"),
             std::string::npos);
