@@ -18,7 +18,7 @@
 
 namespace adasfm {
 
-// Nested by step, in order of their use (design 7.2).
+// Nested by step, in order of their use.
 struct GlobalStageOptions {
   FocalLengthCalibrationOptions focal_lengths;
   TwoViewPoseOptions two_view;
@@ -63,7 +63,7 @@ struct GlobalStageResult {
 // done.
 using StageProgress = std::function<void(const std::string&, double)>;
 
-// The coarse global stage in memory (design 7.2):
+// The coarse global stage in memory (adasfm_pipeline.h):
 //   2.0      unknown focal lengths       CalibrateFocalLengths, in the scene
 //   2.1      view graph                  BuildInitialViewGraph
 //   2.1-2.6  coarse poses                EstimateCoarsePoses
