@@ -6,9 +6,10 @@
 #include <filesystem>
 #include <functional>
 #include <optional>
+#include <utility>
 
-#include "colmap_ext/host/camera_models.h"
 #include "colmap_ext/host/binary_file_reader.h"
+#include "colmap_ext/host/camera_models.h"
 
 namespace adasfm {
 namespace {
@@ -129,6 +130,20 @@ StatusOr<colmap::Reconstruction> ReadModel(const std::string& path) {
   }
   ReleaseVisibility(&reconstruction);
   return reconstruction;
+}
+
+StatusOr<LargestModel> ReadLargestModel(
+    const std::vector<std::string>& folders) {
+  std::optional<LargestModel> largest;
+  for (const std::string& folder : folders) {
+    StatusOr<colmap::Reconstruction> model = ReadModel(folder);
+    if (!model.ok()) return model.status();
+    if (!largest ||
+        model->NumRegImages() > largest->reconstruction.NumRegImages()) {
+      largest = LargestModel{std::move(model).value(), folder};
+    }
+  }
+  return *std::move(largest);
 }
 
 }  // namespace adasfm
