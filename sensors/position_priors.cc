@@ -2,7 +2,6 @@
 #include "sensors/position_priors.h"
 
 #include <algorithm>
-#include <cmath>
 #include <set>
 #include <sstream>
 
