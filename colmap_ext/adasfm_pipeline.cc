@@ -4,7 +4,6 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <chrono>
 #include <filesystem>
 #include <sstream>
 #include <utility>
@@ -24,6 +23,7 @@
 #include "core/check_options.h"
 #include "core/so3.h"
 #include "core/sqlite.h"
+#include "core/stopwatch.h"
 
 namespace adasfm {
 namespace {
@@ -91,10 +91,8 @@ Status CheckDatabaseIsFree(const std::string& database_path) {
 std::vector<NewPosePrior> CollectPosePriors(const GlobalStageOptions& options,
                                             const SceneData& scene,
                                             const GlobalStageResult& result) {
-  const CoarsePoses& poses = result.poses;
   const Eigen::Quaterniond camera_mount =
-      poses.camera_mount.corrected ? ExpSo3(poses.camera_mount.turn_rad)
-                                   : Eigen::Quaterniond::Identity();
+      FindCameraMount(result.poses).value_or(Eigen::Quaterniond::Identity());
   const double variance = options.pose_prior_sigma * options.pose_prior_sigma;
   std::vector<NewPosePrior> priors;
   for (size_t i = 0; i < result.models.size(); ++i) {
@@ -219,12 +217,7 @@ StatusOr<PriorImport> ImportPriors(const PriorImportOptions& options,
 StatusOr<CoarseModelReport> EstimateCoarseModel(
     const GlobalStageOptions& options, const std::string& database_path,
     const std::string& output_path, const ProgressCallback& progress) {
-  const auto start = std::chrono::steady_clock::now();
-  const auto seconds = [start] {
-    return std::chrono::duration<double>(std::chrono::steady_clock::now() -
-                                         start)
-        .count();
-  };
+  const Stopwatch watch;
   Status status = CheckOptions(options);
   if (status.ok()) {
     status = CheckGlobalPaths(options, database_path, output_path);
@@ -253,7 +246,7 @@ StatusOr<CoarseModelReport> EstimateCoarseModel(
        << " verified pairs, " << scene->priors.size() << " priors";
   status = CheckHasMatches(database_path, *scene);
   if (!status.ok()) return status;
-  const StepReport reading = {"reading", seconds(), text.str()};
+  const CoarseStep reading = {"reading", watch.Seconds(), text.str()};
 
   report.warnings.insert(report.warnings.end(), scene->warnings.begin(),
                          scene->warnings.end());
@@ -281,13 +274,13 @@ StatusOr<CoarseModelReport> EstimateCoarseModel(
   for (std::string& warning : ListGlobalWarnings(*scene, report.result)) {
     report.warnings.push_back(std::move(warning));
   }
-  report.seconds = seconds();
+  report.seconds = watch.Seconds();
   status = WriteGlobalResult(options, database_path, output_path, *scene,
                              *frames, report);
   if (!status.ok()) return status;
   report.result.steps.push_back(
-      {"writing", seconds() - report.seconds, "models and matches"});
-  report.seconds = seconds();
+      {"writing", watch.Seconds() - report.seconds, "models and matches"});
+  report.seconds = watch.Seconds();
   status = WriteTextFile(
       output_path + "/summary.json",
       FormatGlobalReportJson(*scene, report.result, report.seconds));

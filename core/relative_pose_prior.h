@@ -20,7 +20,7 @@ enum PriorFlags : uint32_t {
   kPriorInertialLength = 1u << 4,
 };
 
-// The motion between two images as the sensors saw it (design, section 6).
+// The motion between two images as the sensors saw it.
 // image_id1 is the earlier one.
 struct RelativePosePrior {
   image_t image_id1 = kInvalidImageId;

@@ -18,7 +18,7 @@ struct ImuSample {
   Eigen::Vector3d specific_force = Eigen::Vector3d::Zero();
 };
 
-// What the two columns of a wheel log mean (design, section 5).
+// What the two columns of a wheel log mean (docs/reference/formats.md).
 enum class WheelType {
   kDifferential,  // left speed, right speed [m/s]
   kVelocity,      // forward speed [m/s], yaw rate [rad/s]

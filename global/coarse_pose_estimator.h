@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <chrono>
 #include <map>
 #include <optional>
 #include <string>
 #include <vector>
 
+#include "core/stopwatch.h"
 #include "global/estimate_coarse_poses.h"
 
 namespace adasfm {
@@ -24,8 +24,7 @@ class CoarsePoseEstimator {
         priors_(priors),
         frame_priors_(frame_priors),
         chain_options_(options.chain),
-        graph_(graph),
-        step_start_(std::chrono::steady_clock::now()) {}
+        graph_(graph) {}
 
   CoarsePoses Run();
 
@@ -73,7 +72,7 @@ class CoarsePoseEstimator {
   std::map<image_t, bool> rotation_converged_;
   std::map<image_t, double> sdp_optimality_;
   CoarsePoses result_;
-  std::chrono::steady_clock::time_point step_start_;
+  Stopwatch step_watch_;
 };
 
 }  // namespace adasfm

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <algorithm>
-#include <cmath>
 #include <utility>
 
 #include "global/coarse_pose_estimator.h"
@@ -38,7 +37,7 @@ void CoarsePoseEstimator::EstimatePositions() {
     num_images += component.cams_from_world.size();
   }
   const int num_removed = RemoveEdgesOffPositions();
-  const int num_joins = ReportUnconfirmedClosures();
+  const int num_closures = ReportUnconfirmedClosures();
   EndStep(
       "translation averaging",
       std::to_string(num_images) + " images in " +
@@ -47,7 +46,7 @@ void CoarsePoseEstimator::EstimatePositions() {
           std::to_string(num_iterations) + " iterations, " +
           std::to_string(num_removed) + " edges removed, " +
           std::to_string(num_hinges) + " between parts of unknown size, " +
-          std::to_string(num_joins) + " joins at one place only");
+          std::to_string(num_closures) + " joins at one place only");
 }
 
 // Of the edges that have a direction; at least two images each.
@@ -118,20 +117,20 @@ int CoarsePoseEstimator::SplitWhereSizeIsUnknown() {
 int CoarsePoseEstimator::ReportUnconfirmedClosures() {
   // Fewer images are no part of a drive.
   constexpr int kMinNumImages = 10;
-  int num_joins = 0;
-  if (result_.loop_closures.segments_were_split) return num_joins;
-  for (const UnconfirmedClosure& join :
+  int num_closures = 0;
+  if (result_.loop_closures.segments_were_split) return num_closures;
+  for (const UnconfirmedClosure& closure :
        result_.loop_closures.unconfirmed_closures) {
-    if (join.num_images < kMinNumImages) continue;
+    if (closure.num_images < kMinNumImages) continue;
     for (CoarseComponent& component : result_.components) {
-      if (component.cams_from_world.count(join.image_id1) &&
-          component.cams_from_world.count(join.image_id2)) {
-        component.unconfirmed_closures.push_back(join);
-        ++num_joins;
+      if (component.cams_from_world.count(closure.image_id1) &&
+          component.cams_from_world.count(closure.image_id2)) {
+        component.unconfirmed_closures.push_back(closure);
+        ++num_closures;
       }
     }
   }
-  return num_joins;
+  return num_closures;
 }
 
 // Returns the number of iterations.

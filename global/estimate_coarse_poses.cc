@@ -24,11 +24,8 @@ CoarsePoses CoarsePoseEstimator::Run() {
 
 void CoarsePoseEstimator::EndStep(const std::string& name,
                                   const std::string& summary) {
-  const auto now = std::chrono::steady_clock::now();
-  result_.steps.push_back(
-      {name, std::chrono::duration<double>(now - step_start_).count(),
-       summary});
-  step_start_ = now;
+  result_.steps.push_back({name, step_watch_.Seconds(), summary});
+  step_watch_ = Stopwatch();
 }
 
 bool CoarsePoseOptions::IsValid(std::string* error) const {

@@ -92,20 +92,20 @@ struct CoarsePoses {
   std::vector<CoarseStep> steps;
 };
 
-// Steps 2.1 to 2.6 of the coarse stage (design 7.2), from an initial view
-// graph (relative poses of verified pairs) to camera poses. Priors may be
+// Steps 2.1 to 2.6 of the coarse stage (adasfm_pipeline.h), from an initial
+// view graph (relative poses of verified pairs) to camera poses. Priors may be
 // empty. frame_priors are those between the cameras of a rig
 // (ComputeFramePriors); they take part wherever priors do, and the odometry of
 // a frame's leader is that of its other images. Throws std::invalid_argument
 // for invalid options or an inconsistent graph. Numbered steps:
-//   1 least-squares relative poses            RefineRelativePoses
-//     the camera's mount                      CorrectCameraMount
-//   2 odometry chain, lengths, loop closures  AddVisualSteps
-//                                             FilterLoopClosures
-//   3 sensor edges, rotation averaging        EstimateGlobalRotations
-//   4 edges off the rotations                 FilterEdgesByRotation
-//   5 directions, sensor translations         EstimateRelativeTranslations
-//   6 positions, edges off the positions      EstimateGlobalPositions
+//   2.1 least-squares relative poses            RefineRelativePoses
+//       the camera's mount                      CorrectCameraMount
+//   2.2 odometry chain, lengths, loop closures  AddVisualSteps
+//                                               FilterLoopClosures
+//   2.3 sensor edges, rotation averaging        EstimateGlobalRotations
+//   2.4 edges off the rotations                 FilterEdgesByRotation
+//   2.5 directions, sensor translations         EstimateRelativeTranslations
+//   2.6 positions, edges off the positions      EstimateGlobalPositions
 CoarsePoses EstimateCoarsePoses(
     const CoarsePoseOptions& options, const ViewGraph& initial_graph,
     const GlobalCorrespondences& correspondences,

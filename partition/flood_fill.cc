@@ -51,7 +51,7 @@ class Layer {
  public:
   Layer(const std::vector<WeightedEdge>& edges, double min_overlap_ratio,
         std::vector<Part>* parts)
-      : parts_(*parts), added_(parts->size()) {
+      : parts_(*parts) {
     const std::vector<double> ratios = OverlapRatios(*parts);
     for (size_t k = 0; k < parts->size(); ++k) {
       wants_more_.push_back(ratios[k] < min_overlap_ratio);
@@ -62,7 +62,8 @@ class Layer {
     for (const WeightedEdge& edge : edges) GiveEdge(edge.pair);
   }
 
-  const std::vector<Part>& Added() const { return added_; }
+  // Whether any part took an image.
+  bool Grew() const { return !served_separators_.empty(); }
 
  private:
   struct Offer {
@@ -78,7 +79,6 @@ class Layer {
     if (best.part < 0) return;
     served_separators_.emplace(best.part, best.separator);
     parts_[best.part].insert(best.image);
-    added_[best.part].insert(best.image);
   }
 
   void FindOffer(image_t separator, image_t image, Offer* best) const {
@@ -98,7 +98,6 @@ class Layer {
   }
 
   std::vector<Part>& parts_;
-  std::vector<Part> added_;
   std::vector<bool> wants_more_;
   // As the layer begins: images taken in it are separators of the next.
   std::map<image_t, std::vector<int>> parts_of_image_;
@@ -126,24 +125,16 @@ bool FloodFillOptions::IsValid(std::string* error) const {
       .AllHold();
 }
 
-FloodFillResult ExpandByFloodFill(
+std::vector<std::vector<image_t>> ExpandByFloodFill(
     const FloodFillOptions& options, const ImageGraph& graph,
     const std::vector<std::vector<image_t>>& parts) {
   std::string error;
   if (!options.IsValid(&error)) throw std::invalid_argument(error);
   const std::vector<WeightedEdge> edges = SortEdges(graph);
   std::vector<Part> expanded = AsSets(parts);
-  FloodFillResult result;
-  while (true) {
-    const Layer layer(edges, options.min_overlap_ratio, &expanded);
-    const bool grew =
-        std::any_of(layer.Added().begin(), layer.Added().end(),
-                    [](const Part& added) { return !added.empty(); });
-    if (!grew) break;
-    result.layers.push_back(AsVectors(layer.Added()));
+  while (Layer(edges, options.min_overlap_ratio, &expanded).Grew()) {
   }
-  result.parts = AsVectors(expanded);
-  return result;
+  return AsVectors(expanded);
 }
 
 std::vector<double> ComputeOverlapRatios(

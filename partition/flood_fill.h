@@ -17,13 +17,6 @@ struct FloodFillOptions {
   bool IsValid(std::string* error) const;
 };
 
-struct FloodFillResult {
-  // The parts with their overlap, in the order given, images sorted by id.
-  std::vector<std::vector<image_t>> parts;
-  // layers[l][k]: the images that part k took in layer l, sorted by id.
-  std::vector<std::vector<std::vector<image_t>>> layers;
-};
-
 // Adaptive flood fill (paper, section on graph partition and Alg. 1). Layer by
 // layer, the separators of a part (its images with an edge to an image outside)
 // each take the strongest such image, until tau_ot of the part is shared. A
@@ -35,7 +28,9 @@ struct FloodFillResult {
 // rules, and so does this function: edges go by falling weight (ties by ids),
 // each one to the smallest part (ties by index) with exactly one end inside
 // whose separator has taken nothing in this layer; an edge serves once a layer.
-FloodFillResult ExpandByFloodFill(
+// Returns the parts with their overlap, in the order given, images sorted by
+// id.
+std::vector<std::vector<image_t>> ExpandByFloodFill(
     const FloodFillOptions& options, const ImageGraph& graph,
     const std::vector<std::vector<image_t>>& parts);
 

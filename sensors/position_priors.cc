@@ -2,7 +2,6 @@
 #include "sensors/position_priors.h"
 
 #include <algorithm>
-#include <cmath>
 #include <set>
 #include <sstream>
 
@@ -92,7 +91,6 @@ class PriorBuilder {
     const int after = std::min(before + 1, last);
     const double gap = times_.images[after] - times_.images[before];
     if (gap > options_.max_image_gap_s) {
-      ++result_.num_fixes_between_far_images;
       far_images->insert(before);
       far_images->insert(after);
       return;

@@ -32,9 +32,6 @@ struct PositionPriors {
   int num_fixes = 0;
   // Fixes before the first and after the last image.
   int num_fixes_outside = 0;
-  // Fixes between images that are too far apart, and so used by interpolation
-  // between fixes, or not at all.
-  int num_fixes_between_far_images = 0;
 };
 
 // Gives fixes to images (ordered by time, on the camera's clock). A fix between

@@ -2,9 +2,9 @@
 #include "sensors/trajectory_priors.h"
 
 #include <algorithm>
-#include <cmath>
+#include <optional>
 
-#include "core/first_not_before.h"
+#include "core/interpolate_pose.h"
 #include "core/option_checker.h"
 #include "core/so3.h"
 
@@ -15,16 +15,6 @@ namespace {
 constexpr double kMinSigmaM = 1e-3;
 constexpr double kMinSigmaRad = DegToRad(0.02);
 constexpr double kRotationSigmaRatio = 0.01;
-
-Rigid3d Interpolate(const OdometryPose& before, const OdometryPose& after,
-                    timestamp_t timestamp_ns) {
-  const double dt_s = SecondsFromNs(after.timestamp_ns - before.timestamp_ns);
-  const double share = SecondsFromNs(timestamp_ns - before.timestamp_ns) / dt_s;
-  return Rigid3d(before.world_from_body.rotation.slerp(
-                     share, after.world_from_body.rotation),
-                 (1.0 - share) * before.world_from_body.translation +
-                     share * after.world_from_body.translation);
-}
 
 }  // namespace
 
@@ -42,20 +32,10 @@ std::map<image_t, Rigid3d> InterpolateTrajectory(
     double max_gap_s) {
   std::map<image_t, Rigid3d> poses;
   for (const ImageStamp& image : images) {
-    const timestamp_t time_ns = image.timestamp_ns + timeshift_ns;
-    const auto after = FirstNotBefore(trajectory, time_ns);
-    if (after == trajectory.end()) continue;
-    if (after->timestamp_ns == time_ns) {
-      poses[image.image_id] = cam_from_body * after->world_from_body.Inverse();
-      continue;
-    }
-    if (after == trajectory.begin()) continue;
-    const OdometryPose& before = *(after - 1);
-    if (SecondsFromNs(after->timestamp_ns - before.timestamp_ns) > max_gap_s) {
-      continue;
-    }
-    poses[image.image_id] =
-        cam_from_body * Interpolate(before, *after, time_ns).Inverse();
+    const std::optional<Rigid3d> world_from_body = InterpolatePose(
+        trajectory, image.timestamp_ns + timeshift_ns, max_gap_s);
+    if (!world_from_body) continue;
+    poses[image.image_id] = cam_from_body * world_from_body->Inverse();
   }
   return poses;
 }

@@ -2,7 +2,6 @@
 #include "colmap_ext/bundle_adjustment/bundle_adjustment.h"
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <stdexcept>
 #include <unordered_map>
@@ -15,6 +14,7 @@
 #include "core/median.h"
 #include "core/option_checker.h"
 #include "core/parallel.h"
+#include "core/stopwatch.h"
 
 namespace adasfm {
 namespace {
@@ -287,15 +287,13 @@ PriorBundleAdjustmentSummary AdjustBundle(
     FixGauge(HasMeasuredLengths(problem.priors), &bundle);
   }
 
-  const auto start = std::chrono::steady_clock::now();
+  const Stopwatch watch;
   if (bundle.NumPointsApart() > 0) {
     SolveByPoints(options, &bundle, &summary);
   } else {
     SolveWithCeres(options, has_small_factor, &bundle, &summary);
   }
-  summary.seconds =
-      std::chrono::duration<double>(std::chrono::steady_clock::now() - start)
-          .count();
+  summary.seconds = watch.Seconds();
   summary.success =
       summary.success && std::isfinite(summary.final_cost) && bundle.IsFinite();
   if (summary.success) {

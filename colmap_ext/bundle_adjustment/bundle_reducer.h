@@ -4,7 +4,6 @@
 #include <ceres/ceres.h>
 
 #include <Eigen/Core>
-#include <Eigen/SparseCore>
 #include <mutex>
 #include <unordered_map>
 #include <vector>

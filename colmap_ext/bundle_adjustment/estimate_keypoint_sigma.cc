@@ -72,48 +72,41 @@ std::optional<double> EstimateVariance(
 
 }  // namespace
 
-std::optional<double> EstimateKeypointSigma(
+KeypointSigmas EstimateKeypointSigmas(
     const colmap::Reconstruction& reconstruction) {
   const std::map<image_t, Rigid3d> poses = CamsFromWorld(reconstruction);
-  Residuals residuals;
-  residuals.num_images = reconstruction.NumRegImages();
-  for (const auto& [point_id, point] : reconstruction.Points3D()) {
-    const size_t length = TrackOf(point).Length();
-    if (length >= 2) residuals.num_dof_of_observations += 2.0 * length - 3.0;
-    const auto variance = EstimateVariance(reconstruction, poses, point);
-    if (variance) residuals.variances.push_back(*variance);
-  }
-  return residuals.Sigma();
-}
-
-std::map<camera_t, double> EstimateKeypointSigmas(
-    const colmap::Reconstruction& reconstruction) {
-  if (reconstruction.NumCameras() < 2) return {};
-  const std::map<image_t, Rigid3d> poses = CamsFromWorld(reconstruction);
-  std::map<camera_t, Residuals> residuals;
+  Residuals of_all;
+  std::map<camera_t, Residuals> of_cameras;
   for (const auto& [image_id, pose] : poses) {
-    ++residuals[reconstruction.Image(image_id).CameraId()].num_images;
+    ++of_all.num_images;
+    ++of_cameras[reconstruction.Image(image_id).CameraId()].num_images;
   }
   for (const auto& [point_id, point] : reconstruction.Points3D()) {
     const size_t length = TrackOf(point).Length();
     if (length < 2) continue;
+    of_all.num_dof_of_observations += 2.0 * length - 3.0;
     std::set<camera_t> cameras;
     for (const colmap::TrackElement& element : TrackOf(point).Elements()) {
       const camera_t camera_id =
           reconstruction.Image(element.image_id).CameraId();
       cameras.insert(camera_id);
-      residuals.at(camera_id).num_dof_of_observations += 2.0 - 3.0 / length;
+      of_cameras.at(camera_id).num_dof_of_observations += 2.0 - 3.0 / length;
     }
-    if (cameras.size() > 1) continue;
     const auto variance = EstimateVariance(reconstruction, poses, point);
-    if (variance) residuals.at(*cameras.begin()).variances.push_back(*variance);
+    if (!variance) continue;
+    of_all.variances.push_back(*variance);
+    if (cameras.size() == 1) {
+      of_cameras.at(*cameras.begin()).variances.push_back(*variance);
+    }
   }
-  std::map<camera_t, double> sigmas_px;
-  for (auto& [camera_id, of_camera] : residuals) {
+  KeypointSigmas sigmas;
+  sigmas.of_all_px = of_all.Sigma();
+  if (reconstruction.NumCameras() < 2) return sigmas;
+  for (auto& [camera_id, of_camera] : of_cameras) {
     const std::optional<double> sigma_px = of_camera.Sigma();
-    if (sigma_px) sigmas_px[camera_id] = *sigma_px;
+    if (sigma_px) sigmas.of_cameras_px[camera_id] = *sigma_px;
   }
-  return sigmas_px;
+  return sigmas;
 }
 
 }  // namespace adasfm

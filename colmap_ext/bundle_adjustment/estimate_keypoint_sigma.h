@@ -4,7 +4,8 @@
 #include <map>
 #include <optional>
 
-#include "colmap_ext/bundle_adjustment/bundle_adjustment.h"
+#include "colmap_ext/host/colmap.h"
+#include "core/types.h"
 
 namespace adasfm {
 
@@ -15,15 +16,17 @@ namespace adasfm {
 // every k, does not feel wrong matches. The poses, which were adjusted to the
 // same residuals, are allowed for by the share of the degrees of freedom that
 // they took. Errors that keypoints have in common (calibration, forward motion)
-// leave no residuals: variance_components.h looks for those. None with less
-// than a hundred points of three images or more.
-std::optional<double> EstimateKeypointSigma(
-    const colmap::Reconstruction& reconstruction);
+// leave no residuals: variance_components.h looks for those.
+struct KeypointSigmas {
+  // None with less than a hundred points of three images or more.
+  std::optional<double> of_all_px;
+  // Of each camera of several, from the points that no other camera observes: a
+  // blurred lens has no part in the residuals of a sharp one. Cameras with less
+  // than a hundred such points are missing.
+  std::map<camera_t, double> of_cameras_px;
+};
 
-// The same for each camera of several, from the points that no other camera
-// observes: a blurred lens has no part in the residuals of a sharp one.
-// Cameras with less than a hundred such points are missing.
-std::map<camera_t, double> EstimateKeypointSigmas(
+KeypointSigmas EstimateKeypointSigmas(
     const colmap::Reconstruction& reconstruction);
 
 }  // namespace adasfm

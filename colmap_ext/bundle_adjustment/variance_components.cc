@@ -84,14 +84,14 @@ class VarianceComponentAdjustment {
         factor_(*keypoint_sigma_factor),
         reconstruction_(*reconstruction) {
     if (!balance.estimate_keypoint_sigma) return;
+    const KeypointSigmas sigmas = EstimateKeypointSigmas(reconstruction_);
     given_.keypoint_sigma_px =
-        std::max(kMinKeypointSigmaPx, EstimateKeypointSigma(reconstruction_)
-                                          .value_or(options.keypoint_sigma_px));
+        std::max(kMinKeypointSigmaPx,
+                 sigmas.of_all_px.value_or(options.keypoint_sigma_px));
     // Follows the noise, not what keypoints have in common.
     options_.reproj_loss_scale_px *=
         given_.keypoint_sigma_px / options.keypoint_sigma_px;
-    for (const auto& [camera_id, sigma_px] :
-         EstimateKeypointSigmas(reconstruction_)) {
+    for (const auto& [camera_id, sigma_px] : sigmas.of_cameras_px) {
       options_.keypoint_sigma_ratios[camera_id] =
           std::max(kMinKeypointSigmaPx, sigma_px) / given_.keypoint_sigma_px;
     }

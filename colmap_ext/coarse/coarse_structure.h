@@ -115,12 +115,11 @@ struct CoarseModel {
   std::vector<PriorBundleAdjustmentSummary> rounds;
 };
 
-// Step 7 of the coarse global stage (design 7.2): tracks, points with an angle,
-// and rounds of bundle adjustment with priors and tightening thresholds. Points
-// start afresh from the adjusted poses in every round. With enough positions of
-// GNSS, which then take part in the adjustments, the world is their frame.
-// Otherwise the unit of the poses is kept, and the world is turned z-up when
-// images know where the ground is.
+// Step 2.7: tracks, points with an angle, and rounds of bundle adjustment with
+// priors and tightening thresholds. Points start afresh from the adjusted poses
+// in every round. With enough positions of GNSS, which then take part in the
+// adjustments, the world is their frame. Otherwise the unit of the poses is
+// kept, and the world is turned z-up when images know where the ground is.
 CoarseModel BuildCoarseModel(
     const CoarseStructureOptions& options, const SceneData& scene,
     const std::map<image_t, std::vector<Bearing>>& bearings,

@@ -17,14 +17,14 @@ using Json = nlohmann::ordered_json;
 // Fewer pairs between two parts are no news.
 constexpr int kMinNumReportedPairs = 3;
 
-Json JoinsJson(const SceneData& scene,
-               const std::vector<UnconfirmedClosure>& joins) {
+Json ClosuresJson(const SceneData& scene,
+                  const std::vector<UnconfirmedClosure>& closures) {
   Json json = Json::array();
-  for (const UnconfirmedClosure& join : joins) {
-    json.push_back({{"name1", scene.images.at(join.image_id1).name},
-                    {"name2", scene.images.at(join.image_id2).name},
-                    {"pairs", join.num_pairs},
-                    {"images", join.num_images}});
+  for (const UnconfirmedClosure& closure : closures) {
+    json.push_back({{"name1", scene.images.at(closure.image_id1).name},
+                    {"name2", scene.images.at(closure.image_id2).name},
+                    {"pairs", closure.num_pairs},
+                    {"images", closure.num_images}});
   }
   return json;
 }
@@ -37,12 +37,13 @@ Json LoopClosuresJson(const LoopClosureReport& report) {
           {"pairs_of_false_loops", report.num_pairs_of_false_clusters}};
 }
 
-Json PartJoinsJson(const SceneData& scene, const LoopClosureReport& report) {
+Json SegmentClosuresJson(const SceneData& scene,
+                         const LoopClosureReport& report) {
   return {{"parts", report.num_segments},
           {"confirmed", report.num_confirmed_closures},
           {"pairs_removed", report.num_pairs_of_unconfirmed_closures},
           {"not_made", report.segments_were_split
-                           ? JoinsJson(scene, report.unconfirmed_closures)
+                           ? ClosuresJson(scene, report.unconfirmed_closures)
                            : Json::array()}};
 }
 
@@ -60,13 +61,13 @@ Json WeakPlacesJson(const SceneData& scene, const CoarsePoses& poses) {
   return json;
 }
 
-std::string DescribeSplitJoin(const SceneData& scene,
-                              const UnconfirmedClosure& join) {
+std::string DescribeUnconfirmedClosure(const SceneData& scene,
+                                       const UnconfirmedClosure& closure) {
   std::ostringstream text;
-  text << "a part of " << join.num_images << " images may join another where "
-       << join.num_pairs << " pairs like "
-       << scene.images.at(join.image_id1).name << " and "
-       << scene.images.at(join.image_id2).name
+  text << "a part of " << closure.num_images
+       << " images may join another where " << closure.num_pairs
+       << " pairs like " << scene.images.at(closure.image_id1).name << " and "
+       << scene.images.at(closure.image_id2).name
        << " agree, but neither sensors nor a second place confirm it, and "
           "look-alike places do the same: both stay apart "
           "(--AdaSfmGlobal.split_unconfirmed_closures 0 joins them)";
@@ -113,6 +114,8 @@ Json ModelJson(const SceneData& scene, const CoarseComponent& component,
       {"prior_chi2_per_dof", model.prior_chi2_per_dof},
       {"priors_agree", model.priors_agree},
       {"focal_length_ratio", focal.ratio},
+      {"focal_length_camera",
+       model.focal_length_error ? Json(focal.camera_id) : Json()},
       {"focal_length_ratio_sigma", focal.sigma},
       {"cameras_refined", model.cameras_refined},
       {"metric", model.metric},
@@ -124,7 +127,7 @@ Json ModelJson(const SceneData& scene, const CoarseComponent& component,
       {"pair_agreement", model.pair_agreement.share},
       {"least_pair_agreement", model.pair_agreement.least_image_share},
       {"rotation_optimality", component.sdp_optimality},
-      {"unverified_joins", JoinsJson(scene, component.unconfirmed_closures)},
+      {"unverified_joins", ClosuresJson(scene, component.unconfirmed_closures)},
       {"mapper_start", MapperStartJson(model.mapper_start)},
       {"adjustments", rounds}};
 }
@@ -244,7 +247,7 @@ std::string FormatGlobalReportJson(const SceneData& scene,
   report["edges"] = removals;
   report["camera_mount"] = MountJson(result.poses.camera_mount);
   report["loop_closures"] = LoopClosuresJson(result.poses.loop_closures);
-  report["joins"] = PartJoinsJson(scene, result.poses.loop_closures);
+  report["joins"] = SegmentClosuresJson(scene, result.poses.loop_closures);
   report["weak_places"] = WeakPlacesJson(scene, result.poses);
   for (size_t i = 0; i < result.models.size(); ++i) {
     report["models"].push_back(
@@ -256,7 +259,7 @@ std::string FormatGlobalReportJson(const SceneData& scene,
                        {"pairs_removed", result.removed_pairs.size()},
                        {"pairs_skipped", result.refinement.num_skipped_pairs}};
   report["warnings"] = ListGlobalWarnings(scene, result);
-  for (const StepReport& step : result.steps) {
+  for (const CoarseStep& step : result.steps) {
     report["steps"].push_back({{"name", step.name},
                                {"seconds", step.seconds},
                                {"summary", step.summary}});
@@ -268,7 +271,7 @@ std::string FormatGlobalReportText(const GlobalStageResult& result,
                                    double total_seconds) {
   std::ostringstream text;
   text << std::fixed << std::setprecision(2);
-  for (const StepReport& step : result.steps) {
+  for (const CoarseStep& step : result.steps) {
     text << std::setw(8) << step.seconds << " s  " << step.name << ": "
          << step.summary << "\n";
   }
@@ -324,19 +327,20 @@ std::vector<std::string> ListGlobalWarnings(const SceneData& scene,
     warnings.push_back(text.str());
   }
   const LoopClosureReport& loops = result.poses.loop_closures;
-  for (const UnconfirmedClosure& join : loops.unconfirmed_closures) {
-    if (loops.segments_were_split && join.num_pairs >= kMinNumReportedPairs) {
-      warnings.push_back(DescribeSplitJoin(scene, join));
+  for (const UnconfirmedClosure& closure : loops.unconfirmed_closures) {
+    if (loops.segments_were_split &&
+        closure.num_pairs >= kMinNumReportedPairs) {
+      warnings.push_back(DescribeUnconfirmedClosure(scene, closure));
     }
   }
   for (const CoarseComponent& component : result.poses.components) {
-    for (const UnconfirmedClosure& join : component.unconfirmed_closures) {
+    for (const UnconfirmedClosure& closure : component.unconfirmed_closures) {
       std::ostringstream text;
-      text << "a part of " << join.num_images
+      text << "a part of " << closure.num_images
            << " images is joined to the rest at one place only ("
-           << join.num_pairs << " pairs like "
-           << scene.images.at(join.image_id1).name << " and "
-           << scene.images.at(join.image_id2).name
+           << closure.num_pairs << " pairs like "
+           << scene.images.at(closure.image_id1).name << " and "
+           << scene.images.at(closure.image_id2).name
            << "); if the two places merely look alike the model is folded: "
               "sensors (adasfm_prior_importer) or more overlap would tell";
       warnings.push_back(text.str());

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "colmap_ext/coarse/global_stage.h"
 
-#include <chrono>
 #include <set>
 #include <sstream>
 #include <stdexcept>
@@ -12,20 +11,10 @@
 #include "core/option_checker.h"
 #include "core/release_memory.h"
 #include "core/so3.h"
+#include "core/stopwatch.h"
 
 namespace adasfm {
 namespace {
-
-class Stopwatch {
- public:
-  double Seconds() const {
-    return std::chrono::duration<double>(Clock::now() - start_).count();
-  }
-
- private:
-  using Clock = std::chrono::steady_clock;
-  Clock::time_point start_ = Clock::now();
-};
 
 // One number of threads for all steps but the adjustment, whose own option says
 // why.
@@ -57,13 +46,6 @@ std::string DescribeViewGraph(const InitialViewGraph& initial) {
        << initial.num_reestimated << " estimated anew, "
        << initial.num_without_pose << " without";
   return text.str();
-}
-
-void AppendSteps(const std::vector<CoarseStep>& coarse,
-                 std::vector<StepReport>* steps) {
-  for (const CoarseStep& step : coarse) {
-    steps->push_back({step.name, step.seconds, step.summary});
-  }
 }
 
 Status NothingHoldsTogether() {
@@ -238,7 +220,8 @@ StatusOr<GlobalStageResult> RunGlobalStage(
   result.poses =
       EstimateCoarsePoses(pose_options, initial.graph, correspondences,
                           scene.priors, scene.frame_priors);
-  AppendSteps(result.poses.steps, &result.steps);
+  result.steps.insert(result.steps.end(), result.poses.steps.begin(),
+                      result.poses.steps.end());
   if (result.poses.components.empty()) return NothingHoldsTogether();
   ReleaseFreedMemory();
 

@@ -18,7 +18,7 @@
 
 namespace adasfm {
 
-// Nested by step, in order of their use (design 7.2).
+// Nested by step, in order of their use.
 struct GlobalStageOptions {
   FocalLengthCalibrationOptions focal_lengths;
   TwoViewPoseOptions two_view;
@@ -40,13 +40,6 @@ struct GlobalStageOptions {
   bool IsValid(std::string* error) const;
 };
 
-struct StepReport {
-  std::string name;
-  double seconds = 0.0;
-  // What it did, in one line.
-  std::string summary;
-};
-
 struct GlobalStageResult {
   // Those that were changed in the scene.
   std::vector<CalibratedFocalLength> focal_lengths;
@@ -63,14 +56,14 @@ struct GlobalStageResult {
   std::vector<ImagePair> removed_pairs;
   // Of priors that know none, in models that have metres by the accelerometer.
   std::vector<InertialLength> inertial_lengths;
-  std::vector<StepReport> steps;
+  std::vector<CoarseStep> steps;
 };
 
 // Called when a step begins, with its name and the share of steps that are
 // done.
 using StageProgress = std::function<void(const std::string&, double)>;
 
-// The coarse global stage in memory (design 7.2):
+// The coarse global stage in memory (adasfm_pipeline.h):
 //   2.0      unknown focal lengths       CalibrateFocalLengths, in the scene
 //   2.1      view graph                  BuildInitialViewGraph
 //   2.1-2.6  coarse poses                EstimateCoarsePoses

@@ -25,7 +25,8 @@ constexpr double kMaxErrorPerSigma = 2.0 * 3.0 * 1.4142;
 // matches lie beyond 4 px.
 MatchRefinementOptions FitToNoise(MatchRefinementOptions options,
                                   const colmap::Reconstruction& model) {
-  const std::optional<double> sigma_px = EstimateKeypointSigma(model);
+  const std::optional<double> sigma_px =
+      EstimateKeypointSigmas(model).of_all_px;
   if (sigma_px) {
     options.max_epipolar_error_px =
         std::max(options.max_epipolar_error_px, kMaxErrorPerSigma * *sigma_px);

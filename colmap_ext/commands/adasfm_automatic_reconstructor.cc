@@ -142,10 +142,7 @@ Status RunAdasfmAutomaticReconstructor(int argc, char** argv) {
   ProgressDisplay display;
   const StatusOr<AutomaticReconstructionResult> result =
       ReconstructAutomatically(
-          options, paths,
-          [&display](const std::string& what, double share_done) {
-            display.Update(what, share_done);
-          },
+          options, paths, display.Callback(),
           [&display](const std::string& text) { display.Print(text); });
   display.Finish();
   if (!result.ok()) return result.status();

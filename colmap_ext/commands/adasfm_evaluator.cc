@@ -1,9 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include <fstream>
 #include <iostream>
-#include <optional>
 #include <string>
-#include <utility>
 #include <vector>
 
 #include "colmap_ext/commands/registry.h"
@@ -15,30 +12,6 @@
 
 namespace adasfm {
 namespace {
-
-struct LargestModel {
-  colmap::Reconstruction reconstruction;
-  int num_models = 0;
-};
-
-StatusOr<LargestModel> ReadLargestModel(const std::string& path) {
-  const std::vector<std::string> folders = FindModels(path);
-  if (folders.empty()) {
-    return Status::Error("there is no COLMAP model in " + path +
-                         "; check --input_path");
-  }
-  std::optional<LargestModel> largest;
-  for (const std::string& folder : folders) {
-    StatusOr<colmap::Reconstruction> model = ReadModel(folder);
-    if (!model.ok()) return model.status();
-    if (!largest.has_value() ||
-        model->NumRegImages() > largest->reconstruction.NumRegImages()) {
-      largest = LargestModel{std::move(model).value(), 0};
-    }
-  }
-  largest->num_models = folders.size();
-  return *std::move(largest);
-}
 
 struct PairOptions {
   std::string database_path;
@@ -107,7 +80,12 @@ Status RunAdasfmEvaluator(int argc, char** argv) {
   }
   if (!valid.ok()) return valid;
 
-  StatusOr<LargestModel> model = ReadLargestModel(input_path);
+  const std::vector<std::string> folders = FindModels(input_path);
+  if (folders.empty()) {
+    return Status::Error("there is no COLMAP model in " + input_path +
+                         "; check --input_path");
+  }
+  const StatusOr<LargestModel> model = ReadLargestModel(folders);
   if (!model.ok()) return model.status();
   std::vector<std::string> image_names;
   for (const auto& [name, pose] : PosesOfModel(model->reconstruction)) {
@@ -119,7 +97,7 @@ Status RunAdasfmEvaluator(int argc, char** argv) {
   StatusOr<Evaluation> evaluation =
       EvaluateModel(model->reconstruction, *truth);
   if (!evaluation.ok()) return evaluation.status();
-  evaluation->num_models = model->num_models;
+  evaluation->num_models = folders.size();
   std::cout << FormatEvaluation(*evaluation) << std::flush;
   if (!json_path.empty()) {
     const Status written =

@@ -42,11 +42,9 @@ Status RunAdasfmGlobal(int argc, char** argv) {
   if (!status.ok()) return status;
 
   ProgressDisplay display;
-  const StatusOr<CoarseModelReport> report = EstimateCoarseModel(
-      options.stage, options.database_path, options.output_path,
-      [&display](const std::string& what, double share_done) {
-        display.Update(what, share_done);
-      });
+  const StatusOr<CoarseModelReport> report =
+      EstimateCoarseModel(options.stage, options.database_path,
+                          options.output_path, display.Callback());
   display.Finish();
   if (!report.ok()) return report.status();
   for (const std::string& warning : report->warnings) {

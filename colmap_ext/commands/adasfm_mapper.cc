@@ -62,10 +62,7 @@ Status RunAdasfmMapper(int argc, char** argv) {
 
   ProgressDisplay display;
   const StatusOr<MapReport> report =
-      MapParts(options.map, options.request,
-               [&display](const std::string& what, double share_done) {
-                 display.Update(what, share_done);
-               });
+      MapParts(options.map, options.request, display.Callback());
   display.Finish();
   if (!report.ok()) return report.status();
   for (const std::string& warning : report->warnings) {

@@ -48,10 +48,7 @@ Status RunAdasfmPairGenerator(int argc, char** argv) {
 
   ProgressDisplay display;
   const StatusOr<PairSelection> selection =
-      SelectPairs(options, database_path,
-                  [&display](const std::string& what, double share_done) {
-                    display.Update(what, share_done);
-                  });
+      SelectPairs(options, database_path, display.Callback());
   display.Finish();
   if (!selection.ok()) return selection.status();
   const StatusOr<std::string> text =

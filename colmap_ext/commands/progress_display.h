@@ -6,6 +6,8 @@
 #include <ostream>
 #include <string>
 
+#include "core/progress.h"
+
 namespace adasfm {
 
 // Shows the progress of a command on standard output: a bar with the time left
@@ -20,8 +22,13 @@ class ProgressDisplay {
   ProgressDisplay(const ProgressDisplay&) = delete;
   ProgressDisplay& operator=(const ProgressDisplay&) = delete;
 
-  // A ProgressCallback. Throws Interruption when the user wants to stop.
+  // Throws Interruption when the user wants to stop.
   void Update(const std::string& what, double share_done);
+  ProgressCallback Callback() {
+    return [this](const std::string& what, double share_done) {
+      Update(what, share_done);
+    };
+  }
   // A text between the steps, as its own lines.
   void Print(const std::string& text);
   // Ends the bar's line, so that other text can follow.

@@ -5,7 +5,6 @@
 #include <string>
 #include <tuple>
 
-#include "colmap_ext/database/image_names.h"
 #include "colmap_ext/io/double_blob.h"
 
 namespace adasfm {
@@ -42,7 +41,8 @@ InertialMotion MotionFromRow(const SqliteStatement& statement) {
 
 }  // namespace
 
-void WriteInertialMotions(const std::vector<InertialMotion>& motions,
+void WriteInertialMotions(const ImageNames& names,
+                          const std::vector<InertialMotion>& motions,
                           SqliteConnection* database) {
   if (database->HasTable("adasfm_inertial_motions")) {
     database->Execute("DELETE FROM adasfm_inertial_motions");
@@ -56,7 +56,6 @@ void WriteInertialMotions(const std::vector<InertialMotion>& motions,
       "velocity_by_bias BLOB NOT NULL, position_by_bias BLOB NOT NULL, "
       "camera_from_imu_origin BLOB NOT NULL, "
       "PRIMARY KEY (image_id1, image_id2))");
-  const ImageNames images(database);
   SqliteStatement statement(database,
                             "INSERT INTO adasfm_inertial_motions VALUES "
                             "(?, ?, ?, ?, ?, ?, ?, ?, ?, ?)");
@@ -65,7 +64,7 @@ void WriteInertialMotions(const std::vector<InertialMotion>& motions,
     const Eigen::Matrix3d velocity_rows = motion.velocity_by_bias.transpose();
     const Eigen::Matrix3d position_rows = motion.position_by_bias.transpose();
     statement.Reset();
-    images.BindPair(motion.image_id1, motion.image_id2, &statement);
+    names.BindPair(motion.image_id1, motion.image_id2, &statement);
     statement.BindDouble(5, motion.dt_s);
     BindDoubles(&statement, 6, motion.delta_velocity.data(), 3);
     BindDoubles(&statement, 7, motion.delta_position.data(), 3);
@@ -100,18 +99,18 @@ void WriteInertialLengths(const std::vector<InertialLength>& lengths,
   }
 }
 
-std::vector<InertialMotion> ReadInertialMotions(SqliteConnection* database,
+std::vector<InertialMotion> ReadInertialMotions(const ImageNames& names,
+                                                SqliteConnection* database,
                                                 int* num_ignored_rows) {
   std::vector<InertialMotion> motions;
   if (!database->HasTable("adasfm_inertial_motions")) return motions;
-  const ImageNames images(database);
   SqliteStatement statement(
       database,
       "SELECT name1, name2, dt_s, delta_velocity, delta_position, "
       "velocity_by_bias, position_by_bias, camera_from_imu_origin "
       "FROM adasfm_inertial_motions ORDER BY rowid");
   while (statement.Step()) {
-    const auto pair = images.Ids(statement);
+    const auto pair = names.Ids(statement);
     if (!pair) {
       ++*num_ignored_rows;
       continue;

@@ -3,6 +3,7 @@
 
 #include <vector>
 
+#include "colmap_ext/database/image_names.h"
 #include "core/inertial_motion.h"
 #include "core/sqlite.h"
 
@@ -15,7 +16,8 @@ namespace adasfm {
 // that could not have been written.
 
 // Replaces all rows; a database that has none needs no table.
-void WriteInertialMotions(const std::vector<InertialMotion>& motions,
+void WriteInertialMotions(const ImageNames& names,
+                          const std::vector<InertialMotion>& motions,
                           SqliteConnection* database);
 // Replaces all rows; without any the table goes.
 void WriteInertialLengths(const std::vector<InertialLength>& lengths,
@@ -23,7 +25,8 @@ void WriteInertialLengths(const std::vector<InertialLength>& lengths,
 
 // In the order in which they were written; empty without the table. Rows of
 // images that are gone are left out, and counted in num_ignored_rows.
-std::vector<InertialMotion> ReadInertialMotions(SqliteConnection* database,
+std::vector<InertialMotion> ReadInertialMotions(const ImageNames& names,
+                                                SqliteConnection* database,
                                                 int* num_ignored_rows);
 // As above, uncounted: their priors are gone too.
 std::vector<InertialLength> ReadInertialLengths(SqliteConnection* database);

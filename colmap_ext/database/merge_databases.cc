@@ -4,8 +4,6 @@
 #include <algorithm>
 #include <cstdio>
 #include <filesystem>
-#include <memory>
-#include <set>
 
 #include "colmap_ext/database/merge_rows.h"
 #include "colmap_ext/database/prior_corrections.h"

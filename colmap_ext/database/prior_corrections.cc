@@ -3,13 +3,11 @@
 
 #include <array>
 #include <cmath>
-#include <map>
 #include <string>
 #include <utility>
 
 #include "colmap_ext/database/inertial_tables.h"
 #include "colmap_ext/database/prior_tables.h"
-#include "colmap_ext/host/database.h"
 #include "colmap_ext/io/double_blob.h"
 #include "global/calibration/correct_camera_mount.h"
 

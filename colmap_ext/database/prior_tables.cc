@@ -188,7 +188,7 @@ Status WritePriorTables(const std::string& database_path,
     WritePositions(names, tables.positions, &database);
     WriteGyroscopeBias(names, tables, &database);
     WriteLengthDrift(names, tables, &database);
-    WriteInertialMotions(tables.inertial_motions, &database);
+    WriteInertialMotions(names, tables.inertial_motions, &database);
     WritePositionOrigin(tables.position_origin, &database);
     WriteRigCameras(tables.rig_cameras, &database);
     RemovePriorCorrections(&database);

@@ -260,7 +260,7 @@ LoadedPriorTables ReadPriorTables(SqliteConnection* database) {
   ReadGyroscopeBias(database, &loaded.tables);
   ReadLengthDrift(database, &loaded.tables);
   loaded.tables.inertial_motions =
-      ReadInertialMotions(database, &loaded.num_ignored_rows);
+      ReadInertialMotions(names, database, &loaded.num_ignored_rows);
   ReadPositionOrigin(database, &loaded.tables);
   return loaded;
 }

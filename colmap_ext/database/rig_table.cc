@@ -5,7 +5,6 @@
 #include <string>
 #include <utility>
 
-#include "colmap_ext/host/database.h"
 #include "colmap_ext/host/frames.h"
 #include "colmap_ext/io/double_blob.h"
 

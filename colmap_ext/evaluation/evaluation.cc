@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <utility>
 
 #include "colmap_ext/host/reprojection.h"
 #include "core/median.h"

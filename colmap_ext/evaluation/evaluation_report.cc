@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <cstdarg>
-#include <cstdio>
 #include <nlohmann/json.hpp>
 
 #include "colmap_ext/evaluation/evaluation.h"

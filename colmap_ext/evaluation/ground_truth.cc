@@ -1,12 +1,13 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include <algorithm>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
+#include <optional>
 #include <sstream>
 
 #include "colmap_ext/evaluation/evaluation.h"
 #include "colmap_ext/host/model.h"
+#include "core/interpolate_pose.h"
 #include "core/option_checker.h"
 #include "core/sensor_log.h"
 #include "sensors/io/log_file.h"
@@ -95,39 +96,14 @@ StatusOr<std::vector<ImageTime>> TimesOfImages(
   return times;
 }
 
-Rigid3d Interpolate(const OdometryPose& before, const OdometryPose& after,
-                    timestamp_t timestamp_ns) {
-  const double dt_s = SecondsFromNs(after.timestamp_ns - before.timestamp_ns);
-  const double share =
-      dt_s > 0.0 ? SecondsFromNs(timestamp_ns - before.timestamp_ns) / dt_s
-                 : 0.0;
-  return Rigid3d(before.world_from_body.rotation.slerp(
-                     share, after.world_from_body.rotation),
-                 (1.0 - share) * before.world_from_body.translation +
-                     share * after.world_from_body.translation);
-}
-
 NamedPoses InterpolatePoses(const std::vector<OdometryPose>& trajectory,
                             const std::vector<ImageTime>& times,
                             double max_time_gap_s) {
   NamedPoses poses;
   for (const ImageTime& time : times) {
-    const auto after = std::lower_bound(
-        trajectory.begin(), trajectory.end(), time.timestamp_ns,
-        [](const OdometryPose& pose, timestamp_t timestamp_ns) {
-          return pose.timestamp_ns < timestamp_ns;
-        });
-    if (after == trajectory.end()) continue;
-    const auto before = after->timestamp_ns == time.timestamp_ns ? after
-                        : after == trajectory.begin() ? trajectory.end()
-                                                      : after - 1;
-    if (before == trajectory.end() ||
-        SecondsFromNs(after->timestamp_ns - before->timestamp_ns) >
-            max_time_gap_s) {
-      continue;
-    }
-    poses[time.name] =
-        Interpolate(*before, *after, time.timestamp_ns).Inverse();
+    const std::optional<Rigid3d> world_from_body =
+        InterpolatePose(trajectory, time.timestamp_ns, max_time_gap_s);
+    if (world_from_body) poses[time.name] = world_from_body->Inverse();
   }
   return poses;
 }

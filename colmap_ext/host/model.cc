@@ -4,9 +4,11 @@
 #include <algorithm>
 #include <cstdint>
 #include <filesystem>
-#include <fstream>
+#include <functional>
 #include <optional>
+#include <utility>
 
+#include "colmap_ext/host/binary_file_reader.h"
 #include "colmap_ext/host/camera_models.h"
 
 namespace adasfm {
@@ -14,71 +16,27 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// Walks through a binary file without believing its counts.
-class BinaryWalker {
- public:
-  explicit BinaryWalker(const std::string& path)
-      : file_(path, std::ios::binary) {
-    std::error_code error;
-    const uintmax_t size = fs::file_size(path, error);
-    if (!error) num_bytes_left_ = size;
-  }
-
-  // False at the end of the file, and from then on.
-  bool Skip(uint64_t num_bytes) {
-    if (!Take(num_bytes)) return false;
-    file_.ignore(num_bytes);
-    return static_cast<bool>(file_);
-  }
-
-  bool SkipArray(uint64_t count, uint64_t element_num_bytes) {
-    return count <= num_bytes_left_ / element_num_bytes &&
-           Skip(count * element_num_bytes);
-  }
-
-  template <typename T>
-  bool Read(T* value) {
-    return Take(sizeof(T)) &&
-           file_.read(reinterpret_cast<char*>(value), sizeof(T));
-  }
-
-  bool SkipName() {
-    char c = 1;
-    while (c != '\0') {
-      if (!Read(&c)) return false;
-    }
-    return true;
-  }
-
-  bool AtEnd() const { return num_bytes_left_ == 0; }
-
- private:
-  bool Take(uint64_t num_bytes) {
-    if (num_bytes > num_bytes_left_) return false;
-    num_bytes_left_ -= num_bytes;
-    return true;
-  }
-
-  std::ifstream file_;
-  uint64_t num_bytes_left_ = 0;
-};
+// Whether the file has as many records as it says, and nothing else.
+bool WalkRecords(const std::string& path,
+                 const std::function<void(BinaryFileReader*)>& read_record) {
+  BinaryFileReader file(path);
+  const auto count = file.Read<uint64_t>();
+  for (uint64_t i = 0; i < count && file.ok(); ++i) read_record(&file);
+  return file.AtEnd();
+}
 
 // newer_model becomes the name of the first camera model that the linked
 // library lacks and a newer COLMAP has.
 bool WalkCameras(const std::string& path, std::string* newer_model) {
-  BinaryWalker walker(path);
-  uint64_t count = 0;
-  if (!walker.Read(&count)) return false;
-  for (uint64_t i = 0; i < count; ++i) {
-    int32_t model_id = 0;
-    if (!walker.Skip(4) || !walker.Read(&model_id)) return false;
+  return WalkRecords(path, [newer_model](BinaryFileReader* file) {
+    file->Skip(4);  // Id.
+    const auto model_id = file->Read<int32_t>();
     if (IsNewerCameraModel(model_id)) *newer_model = CameraModelName(model_id);
     const std::optional<int> num_params = CameraModelNumParams(model_id);
-    if (!num_params || !walker.Skip(16) || !walker.SkipArray(*num_params, 8)) {
-      return false;
-    }
-  }
-  return walker.AtEnd();
+    if (!num_params) return file->Fail();
+    file->Skip(16);  // Width and height.
+    file->SkipArray(*num_params, 8);
+  });
 }
 
 bool IsCamerasFile(const std::string& path) {
@@ -87,33 +45,18 @@ bool IsCamerasFile(const std::string& path) {
 }
 
 bool IsImagesFile(const std::string& path) {
-  BinaryWalker walker(path);
-  uint64_t count = 0;
-  if (!walker.Read(&count)) return false;
-  for (uint64_t i = 0; i < count; ++i) {
-    uint64_t num_points = 0;
-    // Id, pose, camera id; name; points.
-    if (!walker.Skip(4 + 7 * 8 + 4) || !walker.SkipName() ||
-        !walker.Read(&num_points) || !walker.SkipArray(num_points, 24)) {
-      return false;
-    }
-  }
-  return walker.AtEnd();
+  return WalkRecords(path, [](BinaryFileReader* file) {
+    file->Skip(4 + 7 * 8 + 4);  // Id, pose, camera id.
+    file->SkipName();
+    file->SkipArray(file->Read<uint64_t>(), 24);  // Points.
+  });
 }
 
 bool IsPointsFile(const std::string& path) {
-  BinaryWalker walker(path);
-  uint64_t count = 0;
-  if (!walker.Read(&count)) return false;
-  for (uint64_t i = 0; i < count; ++i) {
-    uint64_t track_length = 0;
-    // Id, position, colour, error; track.
-    if (!walker.Skip(8 + 3 * 8 + 3 + 8) || !walker.Read(&track_length) ||
-        !walker.SkipArray(track_length, 8)) {
-      return false;
-    }
-  }
-  return walker.AtEnd();
+  return WalkRecords(path, [](BinaryFileReader* file) {
+    file->Skip(8 + 3 * 8 + 3 + 8);               // Id, position, colour, error.
+    file->SkipArray(file->Read<uint64_t>(), 8);  // Track.
+  });
 }
 
 bool HasFiles(const std::string& path, const std::string& extension) {
@@ -187,6 +130,20 @@ StatusOr<colmap::Reconstruction> ReadModel(const std::string& path) {
   }
   ReleaseVisibility(&reconstruction);
   return reconstruction;
+}
+
+StatusOr<LargestModel> ReadLargestModel(
+    const std::vector<std::string>& folders) {
+  std::optional<LargestModel> largest;
+  for (const std::string& folder : folders) {
+    StatusOr<colmap::Reconstruction> model = ReadModel(folder);
+    if (!model.ok()) return model.status();
+    if (!largest ||
+        model->NumRegImages() > largest->reconstruction.NumRegImages()) {
+      largest = LargestModel{std::move(model).value(), folder};
+    }
+  }
+  return *std::move(largest);
 }
 
 }  // namespace adasfm

@@ -22,4 +22,13 @@ Status CheckBinaryModelFile(const std::string& path);
 // return.
 StatusOr<colmap::Reconstruction> ReadModel(const std::string& path);
 
+struct LargestModel {
+  colmap::Reconstruction reconstruction;
+  std::string folder;
+};
+
+// The one of most images, the first of several; there is a folder.
+StatusOr<LargestModel> ReadLargestModel(
+    const std::vector<std::string>& folders);
+
 }  // namespace adasfm

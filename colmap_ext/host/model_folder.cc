@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <filesystem>
 #include <fstream>
-#include <stdexcept>
 
 #include "colmap_ext/host/model.h"
 #include "colmap_ext/io/output_files.h"

@@ -2,13 +2,13 @@
 #include "colmap_ext/io/step_journal.h"
 
 #include <algorithm>
-#include <chrono>
 #include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <stdexcept>
 
 #include "colmap_ext/io/output_files.h"
+#include "core/stopwatch.h"
 
 namespace adasfm {
 
@@ -112,7 +112,7 @@ StatusOr<double> StepJournal::Run(const std::string& name,
     message(name + ": " + DescribeChange(name, inputs) +
             "; doing this and all that follows anew");
   }
-  const auto start = std::chrono::steady_clock::now();
+  const Stopwatch watch;
   Status status;
   if (state != State::kBegun) {
     // After a crash in here no inputs are those of the step.
@@ -123,11 +123,10 @@ StatusOr<double> StepJournal::Run(const std::string& name,
   if (status.ok()) status = actions.work();
   if (status.ok()) status = actions.check();
   if (!status.ok()) return status;
-  const std::chrono::duration<double> elapsed =
-      std::chrono::steady_clock::now() - start;
-  status = Finish(name, elapsed.count());
+  const double seconds = watch.Seconds();
+  status = Finish(name, seconds);
   if (!status.ok()) return status;
-  return elapsed.count();
+  return seconds;
 }
 
 Status StepJournal::Write() const {

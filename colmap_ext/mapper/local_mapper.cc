@@ -2,11 +2,9 @@
 #include "colmap_ext/mapper/local_mapper.h"
 
 #include <algorithm>
-#include <cmath>
 #include <map>
 #include <stdexcept>
 #include <utility>
-#include <vector>
 
 #include "colmap_ext/host/pose_conversion.h"
 #include "colmap_ext/mapper/part_adjuster.h"

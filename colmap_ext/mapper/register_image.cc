@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <cmath>
 #include <set>
-#include <utility>
 
 #include "colmap_ext/host/pose_conversion.h"
 #include "core/median.h"

@@ -13,13 +13,13 @@
 #include "colmap_ext/io/capture_output.h"
 #include "colmap_ext/io/output_files.h"
 #include "colmap_ext/mapper_stage/mapper_fingerprint.h"
-#include "colmap_ext/mapper_stage/mapper_steps.h"
 #include "colmap_ext/mapper_stage/model_checkpoint.h"
 #include "colmap_ext/mapper_stage/part_memory.h"
 #include "colmap_ext/scene/georeference.h"
 #include "core/option_checker.h"
 #include "core/parallel.h"
 #include "core/release_memory.h"
+#include "core/stopwatch.h"
 
 namespace adasfm {
 namespace {
@@ -53,11 +53,6 @@ std::string InMegabytes(double bytes) {
 }
 
 }  // namespace
-
-std::string PartCheckpointPath(const std::string& checkpoint_path,
-                               int part_index) {
-  return checkpoint_path + "/part_" + std::to_string(part_index);
-}
 
 bool MapperStageOptions::IsValid(std::string* error) const {
   return OptionChecker("AdaSfmMapper", error)
@@ -98,7 +93,7 @@ void MapperStage::Report(const std::string& line, double share_done) const {
 }
 
 Status MapperStage::Plan() {
-  const StepTimer timer;
+  const Stopwatch watch;
   const std::string path = checkpoint_path_ + "/plan.json";
   CheckpointCondition condition;
   const Status found = ReadPlan(&condition);
@@ -121,7 +116,7 @@ Status MapperStage::Plan() {
   if (!status.ok()) return status;
   summary_.plan = BuildPartitionPlan(options_.partition, data_, coarse_);
   status = WritePartitionPlan(path, fingerprint_, summary_.plan);
-  summary_.plan_seconds = timer.Seconds();
+  summary_.plan_seconds = watch.Seconds();
   return status;
 }
 
@@ -158,7 +153,7 @@ PartReport MapperStage::MapPart(int part_index, int num_threads,
                                 LocalMapResult* result) const {
   const std::vector<image_t>& part = summary_.plan.parts[part_index];
   const std::set<image_t> images(part.begin(), part.end());
-  const StepTimer timer;
+  const Stopwatch watch;
   PartReport report;
   report.part_index = part_index;
   report.num_images = static_cast<int>(part.size());
@@ -184,7 +179,7 @@ PartReport MapperStage::MapPart(int part_index, int num_threads,
       options = StricterOptions(options);
     }
   }
-  report.seconds = timer.Seconds();
+  report.seconds = watch.Seconds();
   if (!report.failure.empty()) return report;
   report.num_registered = result->reconstruction.NumRegImages();
   report.num_points = result->reconstruction.NumPoints3D();
@@ -245,7 +240,7 @@ int MapperStage::FindNumParallelParts() {
 }
 
 Status MapperStage::RunAllParts() {
-  const StepTimer timer;
+  const Stopwatch watch;
   const std::vector<std::vector<image_t>>& parts = summary_.plan.parts;
   std::vector<int> order(parts.size());
   size_t num_images = 0;
@@ -273,13 +268,13 @@ Status MapperStage::RunAllParts() {
       std::ostringstream line;
       line << ++num_parts_done << " of " << parts.size()
            << " parts done, about "
-           << static_cast<int>(timer.Seconds() * (1.0 / share - 1.0))
+           << static_cast<int>(watch.Seconds() * (1.0 / share - 1.0))
            << " s left for the parts";
       Report(line.str(), 0.02 + 0.6 * share);
     }
   });
   ReleaseFreedMemory();
-  summary_.parts_seconds = timer.Seconds();
+  summary_.parts_seconds = watch.Seconds();
   for (const Status& status : statuses) {
     if (!status.ok()) return status;
   }

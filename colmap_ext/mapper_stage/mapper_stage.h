@@ -21,7 +21,7 @@ namespace adasfm {
 
 enum class MapperSteps { kAll, kPlan, kPart, kMerge };
 
-// Nested by step, in order of their use (design 7.3 to 7.5).
+// Nested by step, in order of their use.
 struct MapperStageOptions {
   PartitionPlanOptions partition;
   LocalMapperOptions local;
@@ -78,7 +78,7 @@ using PartMapper = std::function<LocalMapResult(
 
 struct MergeCheckpoint;
 
-// The mapper stage on a folder (design 7.3 to 7.5, 10). Every step leaves its
+// The mapper stage on a folder (adasfm_pipeline.h). Every step leaves its
 // result in output_path/checkpoints, complete or not at all, with a fingerprint
 // of what it was made from; a step whose result is there is not done again.
 //   3.1  plan     partition of the view graph      checkpoints/plan.json
@@ -142,12 +142,5 @@ class MapperStage {
   mutable std::atomic<double> share_done_{0.0};
   MapperStageSummary summary_;
 };
-
-struct Verdict;
-
-// As JSON, with the verdict unless it is null, and as the lines for the screen.
-std::string FormatMapperSummaryJson(const MapperStageSummary& summary,
-                                    const Verdict* verdict = nullptr);
-std::string FormatMapperSummaryText(const MapperStageSummary& summary);
 
 }  // namespace adasfm

@@ -8,12 +8,12 @@
 #include "colmap_ext/mapper/prior_support.h"
 #include "colmap_ext/mapper_stage/mapper_fingerprint.h"
 #include "colmap_ext/mapper_stage/mapper_stage.h"
-#include "colmap_ext/mapper_stage/mapper_steps.h"
 #include "colmap_ext/mapper_stage/merge_checkpoint.h"
 #include "colmap_ext/scene/align_to_gravity.h"
 #include "colmap_ext/scene/keep_inertial_unit.h"
 #include "core/median.h"
 #include "core/release_memory.h"
+#include "core/stopwatch.h"
 
 namespace adasfm {
 namespace {
@@ -185,7 +185,7 @@ Status MapperStage::RefineMerged(const std::string& fingerprint,
 }
 
 StatusOr<colmap::Reconstruction> MapperStage::Merge(bool require_all_parts) {
-  const StepTimer timer;
+  const Stopwatch watch;
   if (summary_.plan.parts.empty()) {
     const Status status = ReadPlan();
     if (!status.ok()) return status;
@@ -204,16 +204,16 @@ StatusOr<colmap::Reconstruction> MapperStage::Merge(bool require_all_parts) {
     merged = ReadMergeCheckpoint(checkpoint_path_, fingerprint, &summary_);
     if (!merged.ok()) return merged.status();
   }
-  summary_.merge_seconds = timer.Seconds();
+  summary_.merge_seconds = watch.Seconds();
   colmap::Reconstruction& model = merged->model;
   if (model.NumRegImages() < 2) return colmap::Reconstruction();
-  const StepTimer refine_timer;
+  const Stopwatch refine_watch;
   status = RefineMerged(fingerprint, &*merged);
   if (!status.ok()) return status;
   KeepInertialUnit(data_.priors, &model);
   summary_.is_level =
       summary_.is_georeferenced || AlignToGravity(data_, &model);
-  summary_.refine_seconds = refine_timer.Seconds();
+  summary_.refine_seconds = refine_watch.Seconds();
   summary_.num_images = model.NumRegImages();
   summary_.num_points = model.NumPoints3D();
   summary_.mean_reproj_error_px = model.ComputeMeanReprojectionError();

@@ -4,7 +4,6 @@
 #include <sstream>
 
 #include "colmap_ext/mapper_stage/mapping_summary.h"
-#include "colmap_ext/mapper_stage/verdict_report.h"
 
 namespace adasfm {
 namespace {
@@ -74,13 +73,6 @@ nlohmann::json MapperSummaryToJson(const MapperStageSummary& summary) {
     json["parts"].push_back(PartAsJson(summary, k));
   }
   return json;
-}
-
-std::string FormatMapperSummaryJson(const MapperStageSummary& summary,
-                                    const Verdict* verdict) {
-  nlohmann::json json = MapperSummaryToJson(summary);
-  if (verdict != nullptr) json["verdict"] = VerdictToJson(*verdict);
-  return json.dump(1) + "\n";
 }
 
 std::string FormatMapperSummaryText(const MapperStageSummary& summary) {

@@ -19,7 +19,9 @@ struct ModelSummary {
   Verdict verdict;
 };
 
+// The figures of one model, and the lines for the screen.
 nlohmann::json MapperSummaryToJson(const MapperStageSummary& summary);
+std::string FormatMapperSummaryText(const MapperStageSummary& summary);
 
 // The run's summary.json (docs/reference/formats.md): the first model's
 // figures, the parts of all, a short entry for each model, the images of none,

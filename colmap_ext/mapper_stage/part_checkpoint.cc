@@ -14,6 +14,11 @@ NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(PartReport, part_index, failure, num_images,
                                    keypoint_sigma_factor, seconds, retry_reason,
                                    prior_only_images)
 
+std::string PartCheckpointPath(const std::string& checkpoint_path,
+                               int part_index) {
+  return checkpoint_path + "/part_" + std::to_string(part_index);
+}
+
 Status WritePartCheckpoint(const std::string& path,
                            const std::string& fingerprint,
                            const PartReport& report,

@@ -28,6 +28,9 @@ struct PartReport {
   std::set<image_t> prior_only_images;
 };
 
+std::string PartCheckpointPath(const std::string& checkpoint_path,
+                               int part_index);
+
 // A part's checkpoint (model_checkpoint.h); without a model when it failed.
 Status WritePartCheckpoint(const std::string& path,
                            const std::string& fingerprint,

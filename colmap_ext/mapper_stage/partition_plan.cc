@@ -56,8 +56,7 @@ PartitionPlan BuildPartitionPlan(const PartitionPlanOptions& options,
     plan.parts.emplace_back(graph.images.begin(), graph.images.end());
   } else {
     plan.parts = ExpandByFloodFill(options.flood_fill, graph,
-                                   ComputeNormalizedCut(options.cut, graph))
-                     .parts;
+                                   ComputeNormalizedCut(options.cut, graph));
   }
   plan.overlap_ratios = ComputeOverlapRatios(plan.parts);
   return plan;

@@ -2,7 +2,6 @@
 #include "colmap_ext/priors/prior_importer.h"
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <filesystem>
 #include <map>
@@ -22,6 +21,7 @@
 #include "colmap_ext/scene/scene_data.h"
 #include "colmap_ext/scene/two_view_poses.h"
 #include "core/option_checker.h"
+#include "core/stopwatch.h"
 #include "global/two_view/refine_relative_poses.h"
 #include "sensors/bags/bag_reader.h"
 #include "sensors/io/read_wheel.h"
@@ -257,7 +257,7 @@ StatusOr<SensorCalibration> ReadCalibrationIfGiven(const std::string& path) {
 // Positions or a rig, without logs of motions.
 StatusOr<PriorImport> ImportWithoutMotion(const PriorImportPaths& paths,
                                           const PriorImportOptions& options) {
-  const auto start = std::chrono::steady_clock::now();
+  const Stopwatch watch;
   StatusOr<SensorCalibration> calibration =
       ReadCalibrationIfGiven(paths.sensors_path);
   if (!calibration.ok()) return calibration.status();
@@ -277,9 +277,7 @@ StatusOr<PriorImport> ImportWithoutMotion(const PriorImportPaths& paths,
                            *stamps, &import);
   if (!status.ok()) return status;
   import.summary.num_images = stamps->size();
-  import.seconds =
-      std::chrono::duration<double>(std::chrono::steady_clock::now() - start)
-          .count();
+  import.seconds = watch.Seconds();
   return import;
 }
 
@@ -291,7 +289,7 @@ StatusOr<PriorImport> ImportTrajectory(const PriorImportPaths& paths,
         "--trajectory_path stands for all logs; to smooth a trajectory "
         "with an IMU give it as --wheel_path of type odometry");
   }
-  const auto start = std::chrono::steady_clock::now();
+  const Stopwatch watch;
   const StatusOr<SceneData> scene = ReadScene(paths.database_path);
   if (!scene.ok()) return scene.status();
   StatusOr<SensorCalibration> calibration =
@@ -320,9 +318,7 @@ StatusOr<PriorImport> ImportTrajectory(const PriorImportPaths& paths,
   for (const RelativePosePrior& prior : import.tables.priors) {
     summary.distance_m += prior.cam2_from_cam1.translation.norm();
   }
-  import.seconds =
-      std::chrono::duration<double>(std::chrono::steady_clock::now() - start)
-          .count();
+  import.seconds = watch.Seconds();
   return import;
 }
 
@@ -363,7 +359,7 @@ StatusOr<PriorImport> ComputePriorImport(const PriorImportPaths& given_paths,
   StatusOr<SensorCalibration> calibration =
       ReadSensorCalibration(paths.sensors_path);
   if (!calibration.ok()) return calibration.status();
-  const auto start = std::chrono::steady_clock::now();
+  const Stopwatch watch;
   if (!paths.bag_path.empty()) status = UseBag(*calibration, &paths);
   if (!status.ok()) return status;
   if (!HasMotionLogs(paths)) return ImportWithoutMotion(paths, options);
@@ -409,9 +405,7 @@ StatusOr<PriorImport> ComputePriorImport(const PriorImportPaths& given_paths,
   import.summary = std::move(estimate->summary);
   import.warnings.insert(import.warnings.end(), import.summary.warnings.begin(),
                          import.summary.warnings.end());
-  import.seconds =
-      std::chrono::duration<double>(std::chrono::steady_clock::now() - start)
-          .count();
+  import.seconds = watch.Seconds();
   return import;
 }
 

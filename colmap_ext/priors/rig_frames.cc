@@ -2,7 +2,6 @@
 #include "colmap_ext/priors/rig_frames.h"
 
 #include <algorithm>
-#include <optional>
 #include <set>
 
 #include "colmap_ext/priors/stamp_images.h"

@@ -23,17 +23,12 @@ StatusOr<colmap::Reconstruction> ReadLargest(const std::string& path,
     return Status::Error("there is no COLMAP model in " + path +
                          "; check the path");
   }
-  std::optional<colmap::Reconstruction> largest;
-  for (const std::string& folder : folders) {
-    StatusOr<colmap::Reconstruction> model = ReadModel(folder);
-    if (!model.ok()) return model.status();
-    if (largest && model->NumRegImages() <= largest->NumRegImages()) continue;
-    largest = std::move(model).value();
-    fs::path absolute = fs::absolute(folder).lexically_normal();
-    if (!absolute.has_filename()) absolute = absolute.parent_path();
-    *parent = absolute.parent_path().string();
-  }
-  return *std::move(largest);
+  StatusOr<LargestModel> largest = ReadLargestModel(folders);
+  if (!largest.ok()) return largest.status();
+  fs::path absolute = fs::absolute(largest->folder).lexically_normal();
+  if (!absolute.has_filename()) absolute = absolute.parent_path();
+  *parent = absolute.parent_path().string();
+  return std::move(largest->reconstruction);
 }
 
 Status ReadDatabase(const std::string& path, ReportInput* input) {

@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <limits>
-#include <tuple>
 
 #include "colmap_ext/host/pose_conversion.h"
 #include "colmap_ext/report/report_html.h"

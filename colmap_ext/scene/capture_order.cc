@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cctype>
-#include <tuple>
 
 namespace adasfm {
 namespace {

@@ -26,15 +26,7 @@ RawMatches ReadPairs(const std::string& database_path, const SceneData& scene,
     const SceneImage& image2 = scene.images.at(pair.image_id2);
     std::vector<FeatureMatch> matches =
         ReadMatchesOfPair(&database, "matches", pair);
-    for (const FeatureMatch& match : matches) {
-      if (match.point2D_idx1 < image1.keypoints.size() &&
-          match.point2D_idx2 < image2.keypoints.size()) {
-        continue;
-      }
-      throw SqliteError("the matches of " + image1.name + " and " +
-                        image2.name +
-                        " name keypoints that these images do not have");
-    }
+    CheckIndices(scene, pair, matches);
     matches.erase(
         std::remove_if(matches.begin(), matches.end(),
                        [&](const FeatureMatch& match) {
@@ -48,6 +40,20 @@ RawMatches ReadPairs(const std::string& database_path, const SceneData& scene,
 }
 
 }  // namespace
+
+void CheckIndices(const SceneData& scene, const ImagePair& pair,
+                  const std::vector<FeatureMatch>& matches) {
+  const SceneImage& image1 = scene.images.at(pair.image_id1);
+  const SceneImage& image2 = scene.images.at(pair.image_id2);
+  for (const FeatureMatch& match : matches) {
+    if (match.point2D_idx1 < image1.keypoints.size() &&
+        match.point2D_idx2 < image2.keypoints.size()) {
+      continue;
+    }
+    throw SqliteError("the matches of " + image1.name + " and " + image2.name +
+                      " name keypoints that these images do not have");
+  }
+}
 
 RawMatchSource RawMatchesOfScene(const SceneData& scene) {
   return [&scene](const std::vector<ImagePair>& pairs) {

@@ -21,6 +21,11 @@ using RawMatchSource = std::function<RawMatches(const std::vector<ImagePair>&)>;
 // A block whose matches may be in memory together.
 inline constexpr size_t kNumPairsAtATime = 1000;
 
+// Throws SqliteError for matches that name keypoints which the images of their
+// pair do not have.
+void CheckIndices(const SceneData& scene, const ImagePair& pair,
+                  const std::vector<FeatureMatch>& matches);
+
 // From the scene, which must outlive the source.
 RawMatchSource RawMatchesOfScene(const SceneData& scene);
 

@@ -11,6 +11,7 @@
 #include "colmap_ext/host/camera.h"
 #include "colmap_ext/host/camera_models.h"
 #include "colmap_ext/host/database.h"
+#include "colmap_ext/scene/raw_matches.h"
 #include "core/sqlite.h"
 
 namespace adasfm {
@@ -72,20 +73,6 @@ void ReadScenePriors(SqliteConnection* database,
         std::to_string(loaded.num_ignored_rows) +
         " sensor rows belong to images that the database does not have any "
         "more; run adasfm_prior_importer again");
-  }
-}
-
-void CheckIndices(const SceneData& scene, const ImagePair& pair,
-                  const std::vector<FeatureMatch>& matches) {
-  const SceneImage& image1 = scene.images.at(pair.image_id1);
-  const SceneImage& image2 = scene.images.at(pair.image_id2);
-  for (const FeatureMatch& match : matches) {
-    if (match.point2D_idx1 < image1.keypoints.size() &&
-        match.point2D_idx2 < image2.keypoints.size()) {
-      continue;
-    }
-    throw SqliteError("the matches of " + image1.name + " and " + image2.name +
-                      " name keypoints that these images do not have");
   }
 }
 

@@ -2,7 +2,6 @@
 #pragma once
 
 #include <map>
-#include <optional>
 #include <vector>
 
 #include "colmap_ext/scene/scene_data.h"
@@ -33,12 +32,11 @@ struct InitialViewGraph {
   int num_without_pose = 0;
 };
 
-// Step 1 of the coarse global stage (design 7.2): the view graph of the
-// verified pairs. A pair's pose is the stored one; else the decomposed
-// essential matrix; else (planar, uncalibrated and multiple configurations
-// without one) the five-point solution of its inlier matches. Pairs are
-// independent and draw their samples from a seed of their own, so threads
-// change nothing.
+// Step 2.1: the view graph of the verified pairs. A pair's pose is the stored
+// one; else the decomposed essential matrix; else (planar, uncalibrated and
+// multiple configurations without one) the five-point solution of its inlier
+// matches. Pairs are independent and draw their samples from a seed of their
+// own, so threads change nothing.
 InitialViewGraph BuildInitialViewGraph(
     const TwoViewPoseOptions& options, const SceneData& scene,
     const std::map<image_t, std::vector<Bearing>>& bearings);

@@ -24,7 +24,7 @@ struct AutomaticReconstructionOptions {
   FeatureOptions features;
   PairSelectionOptions pairs;
   // Where priors predict the motion between two images, compares only keypoints
-  // near their epipolar lines (host/match_sift_pairs.h).
+  // near their epipolar lines (host/v3/match_sift_pairs.h).
   bool guided_matching = false;
   PriorImportOptions priors;
   GlobalStageOptions global;

@@ -3,7 +3,6 @@
 
 #include <set>
 #include <string>
-#include <vector>
 
 #include "core/sqlite.h"
 #include "core/status.h"

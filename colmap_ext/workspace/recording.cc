@@ -5,7 +5,6 @@
 #include <vector>
 
 #include "colmap_ext/io/digest.h"
-#include "colmap_ext/io/output_files.h"
 
 namespace adasfm {
 

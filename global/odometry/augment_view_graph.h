@@ -36,7 +36,7 @@ int AddSensorEdges(const AugmentationOptions& options,
                    ViewGraph* graph);
 
 // Before translation averaging: translations of consecutive images come from
-// the priors (design 7.2, step 5), rotations stay. Returns how many edges.
+// the priors (step 2.5), rotations stay. Returns how many edges.
 int AugmentTranslations(const AugmentationOptions& options,
                         const std::vector<RelativePosePrior>& priors,
                         ViewGraph* graph);

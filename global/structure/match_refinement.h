@@ -44,8 +44,8 @@ struct MatchRefinementReport {
 // Of each pair's candidate matches (raw ones where there are, else its inliers)
 // those that agree with the global poses: the distances to the epipolar lines,
 // measured in the image through the bearings' Jacobians (any camera model), sum
-// to at most eps_M, and the point lies in front of both cameras (design 7.2,
-// step 8). A keypoint that is matched twice keeps its best match.
+// to at most eps_M, and the point lies in front of both cameras (step
+// 2.8). A keypoint that is matched twice keeps its best match.
 MatchRefinementReport RefineMatches(
     const MatchRefinementOptions& options,
     const std::map<image_t, Rigid3d>& cams_from_world,

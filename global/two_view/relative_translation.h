@@ -35,12 +35,12 @@ struct RelativeTranslationReport {
 };
 
 // min_t sum rho(x'^T [t]x R x), |t| = 1, with R = R_j R_i^T of the global
-// rotations, for every kept visual edge (design 7.2, step 4). The residuals are
-// divided by their image Jacobian, so they are px on any camera. The sign puts
-// points in front of both cameras. Sets the edge's rotation to the global one,
-// its direction, and direction_sigma_rad (the larger axis) from the normal
-// matrix; an edge with (nearly) no baseline says nothing about direction and
-// loses has_translation.
+// rotations, for every kept visual edge (step 2.5). The residuals are divided
+// by their image Jacobian, so they are px on any camera. The sign puts points
+// in front of both cameras. Sets the edge's rotation to the global one, its
+// direction, and direction_sigma_rad (the larger axis) from the normal matrix;
+// an edge with (nearly) no baseline says nothing about direction and loses
+// has_translation.
 RelativeTranslationReport EstimateRelativeTranslations(
     const RelativeTranslationOptions& options,
     const std::map<image_t, Eigen::Quaterniond>& cams_from_world,

@@ -129,8 +129,6 @@ bool VisionComparer::NameMistake(VisionCheck* check) const {
       search_.Compare(best->shift_s), best->mistake.map, nullptr);
   if (best != &calibrated() &&
       check->shifted_correlation >= options_.min_correlation) {
-    check->best_axes = best->mistake.axes;
-    check->is_inverted = best->mistake.kind == CalibrationMistake::kInverted;
     check->contradiction = DescribeMistake(best->mistake) + Figures(*check);
     return true;
   }

@@ -80,10 +80,6 @@ struct VisionCheck {
   // To be added to timeshift_cam_imu_s; sub-frame.
   double time_shift_correction_s = 0.0;
   double shifted_correlation = 0.0;
-  // The axes that fit best: cam_from_imu as a signed permutation of the
-  // calibrated one; identity when the calibration is right.
-  Eigen::Matrix3d best_axes = Eigen::Matrix3d::Identity();
-  bool is_inverted = false;  // imu_from_cam in place of cam_from_imu
   // rad/s, IMU frame, with its mean 1 sigma of an axis (visual_bias.h).
   Eigen::Vector3d gyroscope_bias = Eigen::Vector3d::Zero();
   double gyroscope_bias_sigma = 0.0;

@@ -180,6 +180,14 @@ Status CheckNumFields(const LogFile& file, const LogLine& line,
                         "); was the file cut off or is it another format?");
 }
 
+Status ParseTime(const LogFile& file, const LogLine& line,
+                 timestamp_t* timestamp_ns) {
+  if (ParseNanoseconds(line.fields[0], timestamp_ns)) return Status::Ok();
+  return file.Error(line.number, "column 1 is '" +
+                                     std::string(line.fields[0].substr(0, 40)) +
+                                     "', not a time in whole nanoseconds");
+}
+
 Status ParseNumbers(const LogFile& file, const LogLine& line, size_t first,
                     size_t count, double* values) {
   for (size_t i = 0; i < count; ++i) {

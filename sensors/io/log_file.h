@@ -69,6 +69,10 @@ bool ParseSeconds(std::string_view field, timestamp_t* timestamp_ns);
 Status CheckNumFields(const LogFile& file, const LogLine& line,
                       size_t num_fields, const std::string& meaning);
 
+// The first field as whole nanoseconds.
+Status ParseTime(const LogFile& file, const LogLine& line,
+                 timestamp_t* timestamp_ns);
+
 // All fields from first on as numbers; an error names the field.
 Status ParseNumbers(const LogFile& file, const LogLine& line, size_t first,
                     size_t count, double* values);

@@ -15,13 +15,9 @@ std::string WithoutFolder(std::string_view path) {
 
 // EuRoC: "ns,filename", the name possibly with spaces inside.
 Status ParseEuroc(const LogFile& file, const LogLine& line, ImageTime* time) {
-  const Status status = CheckNumFields(file, line, 2, "ns, filename");
+  Status status = CheckNumFields(file, line, 2, "ns, filename");
+  if (status.ok()) status = ParseTime(file, line, &time->timestamp_ns);
   if (!status.ok()) return status;
-  if (!ParseNanoseconds(line.fields[0], &time->timestamp_ns)) {
-    return file.Error(line.number, "column 1 is '" +
-                                       std::string(line.fields[0]) +
-                                       "', not a time in whole nanoseconds");
-  }
   time->name = line.fields[1];
   return Status::Ok();
 }

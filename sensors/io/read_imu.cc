@@ -38,12 +38,8 @@ StatusOr<std::vector<ImuSample>> ReadImuSamples(
           CheckNumFields(*file, line, 7, "ns, wx, wy, wz, ax, ay, az");
       if (!status.ok()) return status;
       ImuSample sample;
-      if (!ParseNanoseconds(line.fields[0], &sample.timestamp_ns)) {
-        return file->Error(line.number,
-                           "column 1 is '" +
-                               std::string(line.fields[0].substr(0, 40)) +
-                               "', not a time in whole nanoseconds");
-      }
+      status = ParseTime(*file, line, &sample.timestamp_ns);
+      if (!status.ok()) return status;
       double values[6];
       status = ParseNumbers(*file, line, 1, 6, values);
       if (!status.ok()) return status;

@@ -215,12 +215,8 @@ StatusOr<std::vector<WheelSample>> ReadWheel(const std::string& path,
                                    "as its header says");
     if (!status.ok()) return status;
     WheelSample sample;
-    if (!ParseNanoseconds(line.fields[0], &sample.timestamp_ns)) {
-      return file->Error(line.number,
-                         "column 1 is '" +
-                             std::string(line.fields[0].substr(0, 40)) +
-                             "', not a time in whole nanoseconds");
-    }
+    status = ParseTime(*file, line, &sample.timestamp_ns);
+    if (!status.ok()) return status;
     double values[2] = {0.0, 0.0};
     status = ParseNumbers(*file, line, 1, has_one_column ? 1 : 2, values);
     if (!status.ok()) return status;

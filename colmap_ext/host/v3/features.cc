@@ -9,9 +9,7 @@
 #include <cstdlib>
 #include <functional>
 #include <thread>
-#include <utility>
 
-#include "colmap_ext/host/database.h"
 #include "colmap_ext/host/database_schema.h"
 #include "colmap_ext/host/host_features.h"
 #include "colmap_ext/io/capture_output.h"

@@ -7,7 +7,6 @@
 #include <optim/loransac.h>
 
 #include <algorithm>
-#include <cmath>
 
 #include "colmap_ext/host/camera.h"
 #include "core/so3.h"

@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include "colmap_ext/bundle_adjustment/bundle_adjustment.h"
 #include "core/random.h"
 #include "tests/testing/colmap_ext/bundle_world_problem.h"
 
@@ -23,7 +24,7 @@ TEST(EstimateKeypointSigmaTest, FindsTheNoiseOfTheWorld) {
       options.seed = seed;
       options.pixel_noise_px = noise_px;
       const std::optional<double> sigma_px =
-          EstimateKeypointSigma(AdjustedWorld(options));
+          EstimateKeypointSigmas(AdjustedWorld(options)).of_all_px;
       ASSERT_TRUE(sigma_px.has_value());
       // The median of some hundred points is good to 4 %.
       EXPECT_NEAR(*sigma_px / noise_px, 1.0, 0.1) << "seed " << seed;
@@ -40,13 +41,13 @@ TEST(EstimateKeypointSigmaTest, FindsTheNoiseOfEachCamera) {
     options.pixel_noise_px = 0.3;
     options.second_camera_noise_px = 1.2;
     const std::map<camera_t, double> sigmas_px =
-        EstimateKeypointSigmas(AdjustedWorld(options));
+        EstimateKeypointSigmas(AdjustedWorld(options)).of_cameras_px;
     ASSERT_EQ(sigmas_px.size(), 2);
     // More than three times what ten seeds scatter by.
     EXPECT_NEAR(sigmas_px.at(1) / 0.3, 1.0, 0.1) << "seed " << seed;
     EXPECT_NEAR(sigmas_px.at(2) / 1.2, 1.0, 0.1) << "seed " << seed;
   }
-  EXPECT_TRUE(EstimateKeypointSigmas(AdjustedWorld({})).empty());
+  EXPECT_TRUE(EstimateKeypointSigmas(AdjustedWorld({})).of_cameras_px.empty());
 }
 
 TEST(EstimateKeypointSigmaTest, WrongMatchesDoNotCount) {
@@ -62,14 +63,16 @@ TEST(EstimateKeypointSigmaTest, WrongMatchesDoNotCount) {
                              Eigen::Vector2d(20.0, -10.0));
     }
   }
-  const std::optional<double> sigma_px = EstimateKeypointSigma(reconstruction);
+  const std::optional<double> sigma_px =
+      EstimateKeypointSigmas(reconstruction).of_all_px;
   ASSERT_TRUE(sigma_px.has_value());
   // A tenth of the points has a wrong observation, which moves the median.
   EXPECT_NEAR(*sigma_px, 0.5, 0.1);
 }
 
 TEST(EstimateKeypointSigmaTest, NothingToTellFrom) {
-  EXPECT_FALSE(EstimateKeypointSigma(colmap::Reconstruction()).has_value());
+  EXPECT_FALSE(
+      EstimateKeypointSigmas(colmap::Reconstruction()).of_all_px.has_value());
 }
 
 }  // namespace

@@ -278,12 +278,12 @@ TEST(RunGlobalStageTest, ReportsEveryStep) {
   GlobalStageResult result = RunStage(scene);
   EXPECT_TRUE(ListGlobalWarnings(scene, result).empty());
   const std::string json = FormatGlobalReportJson(scene, result, 1.0);
-  for (const StepReport& step : result.steps) {
+  for (const CoarseStep& step : result.steps) {
     EXPECT_NE(json.find("\"" + step.name + "\""), std::string::npos);
   }
   for (const char* figure :
        {"pairs_agree", "pair_agreement", "least_pair_agreement",
-        "rotation_optimality", "max_track_bytes"}) {
+        "rotation_optimality", "max_track_bytes", "focal_length_camera"}) {
     EXPECT_NE(json.find("\"" + std::string(figure) + "\""), std::string::npos)
         << figure;
   }

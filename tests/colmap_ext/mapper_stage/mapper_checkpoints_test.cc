@@ -12,6 +12,7 @@
 #include <stdexcept>
 
 #include "colmap_ext/mapper_stage/mapper_stage.h"
+#include "colmap_ext/mapper_stage/mapping_summary.h"
 #include "colmap_ext/mapper_stage/part_memory.h"
 #include "tests/testing/colmap_ext/file_size_limit.h"
 #include "tests/testing/colmap_ext/mapper_stage_fixture.h"
@@ -25,8 +26,7 @@ class MapperCheckpointsTest : public MapperStageTest {
  protected:
   // The summary without what a clock says.
   static nlohmann::json Figures(const MapperStageSummary& summary) {
-    nlohmann::json json =
-        nlohmann::json::parse(FormatMapperSummaryJson(summary));
+    nlohmann::json json = MapperSummaryToJson(summary);
     for (const char* name : {"plan", "parts", "merge", "refine"}) {
       json.erase(std::string(name) + "_seconds");
     }

@@ -7,8 +7,10 @@
 #include <filesystem>
 #include <iostream>
 #include <map>
+#include <nlohmann/json.hpp>
 #include <vector>
 
+#include "colmap_ext/mapper_stage/mapping_summary.h"
 #include "core/inertial_motion.h"
 #include "core/random.h"
 #include "tests/testing/colmap_ext/mapper_stage_fixture.h"
@@ -302,8 +304,8 @@ TEST_F(MapperStageTest, SummaryIsJsonWithEveryPart) {
   MapperWorldOptions options;
   options.world.num_images = 60;
   Run(BuildMapperWorld(options));
-  const std::string json = FormatMapperSummaryJson(summary_);
-  EXPECT_NE(json.find("\"part_index\": 1"), std::string::npos);
+  const std::string json = MapperSummaryToJson(summary_).dump();
+  EXPECT_NE(json.find("\"part_index\":1"), std::string::npos);
   EXPECT_NE(json.find("separator_rmse_after"), std::string::npos);
   EXPECT_NE(FormatMapperSummaryText(summary_).find("60 images"),
             std::string::npos);

@@ -65,8 +65,7 @@ TEST_F(VerdictTest, HonestModelIsGood) {
     EXPECT_LT(priors.chi2_ratio, 1.5);
     EXPECT_LT(priors.share_contradicting, 0.05);
   }
-  const nlohmann::json json = nlohmann::json::parse(
-      FormatMapperSummaryJson(summary_, &verdict))["verdict"];
+  const nlohmann::json json = VerdictToJson(verdict);
   EXPECT_EQ(json["result"], "good");
   EXPECT_EQ(json["num_images"], 40);
   EXPECT_EQ(json["priors"][0]["kind"], "rotation");
