@@ -157,6 +157,10 @@ Status PriorEstimator::CheckMotion() {
 
 void PriorEstimator::Fuse() {
   const std::vector<timestamp_t> times_ns = ImageTimesOfImu();
+  for (auto& [start_ns, end_ns] : logs_.seen_moving_ns) {
+    start_ns += vision_.timeshift_ns;
+    end_ns += vision_.timeshift_ns;
+  }
   SensorSummary& summary = estimate_.summary;
   double wheel_persistence = 1.0;
   for (int i = 0; i <= kMaxNumCorrections; ++i) {
@@ -270,6 +274,7 @@ StatusOr<PriorEstimate> PriorEstimator::Run(
     times_ns[image.image_id] = image.timestamp_ns;
   }
   vision_.rotations = ComputeTimedRotations(rotations, times_ns);
+  logs_.seen_moving_ns = FindSeenMotion(rotations, times_ns);
   status =
       UseVision(calibration_, options_, &logs_, &vision_, &estimate_.summary);
   if (!status.ok()) return status;

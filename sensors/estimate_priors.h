@@ -37,6 +37,9 @@ struct VisualRotation {
   image_t image_id2 = kInvalidImageId;
   Eigen::Quaterniond cam2_from_cam1 = Eigen::Quaterniond::Identity();
   int num_inliers = 0;
+  // The median angle between the rays of the inliers in both cameras' frames,
+  // rad; 0 when it is not known.
+  double median_motion_rad = 0.0;
 };
 
 struct PriorEstimationOptions {

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <set>
 
 #include "core/median.h"
 #include "core/so3.h"
@@ -19,6 +20,8 @@ constexpr double kMaxSigma = 0.0035;  // rad
 // Two-view geometries are never more exact than this.
 constexpr double kMinSigma = 3e-4;  // rad
 constexpr double kSigmaFactor = 1.5;
+// Five times what a keypoint errs by.
+constexpr double kMinSeenMotionRad = 5e-3;
 // Of the turn: a slightly turned T_cam_imu moves whole bends.
 constexpr double kTurnShare = 0.05;
 // The median of a three-dimensional normal vector's length.
@@ -67,6 +70,29 @@ std::vector<TimedRotation> ComputeTimedRotations(
     timed.push_back(entry);
   }
   return timed;
+}
+
+std::vector<std::pair<timestamp_t, timestamp_t>> FindSeenMotion(
+    const std::vector<VisualRotation>& rotations,
+    const std::map<image_t, timestamp_t>& image_times_ns) {
+  std::set<timestamp_t> times;
+  for (const auto& [image_id, time_ns] : image_times_ns) times.insert(time_ns);
+  std::vector<std::pair<timestamp_t, timestamp_t>> intervals;
+  for (const VisualRotation& rotation : rotations) {
+    const auto first = image_times_ns.find(rotation.image_id1);
+    const auto second = image_times_ns.find(rotation.image_id2);
+    if (first == image_times_ns.end() || second == image_times_ns.end() ||
+        rotation.median_motion_rad < kMinSeenMotionRad) {
+      continue;
+    }
+    const auto [start_ns, end_ns] = std::minmax(first->second, second->second);
+    const auto next = times.upper_bound(start_ns);
+    if (next != times.end() && *next == end_ns) {
+      intervals.emplace_back(start_ns, end_ns);
+    }
+  }
+  std::sort(intervals.begin(), intervals.end());
+  return intervals;
 }
 
 VisualLinks AddVisualRotations(const std::vector<TimedRotation>& rotations,

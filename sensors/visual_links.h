@@ -2,6 +2,7 @@
 #pragma once
 
 #include <map>
+#include <utility>
 #include <vector>
 
 #include "sensors/calibration_check/check_against_vision.h"
@@ -13,6 +14,12 @@ namespace adasfm {
 
 // The rotations between images with a time (camera clock), forwards in time.
 std::vector<TimedRotation> ComputeTimedRotations(
+    const std::vector<VisualRotation>& rotations,
+    const std::map<image_t, timestamp_t>& image_times_ns);
+
+// From and to when the images in a row saw the machine move (camera clock), one
+// after the other: half of the matches moved by more than keypoints err.
+std::vector<std::pair<timestamp_t, timestamp_t>> FindSeenMotion(
     const std::vector<VisualRotation>& rotations,
     const std::map<image_t, timestamp_t>& image_times_ns);
 

@@ -20,6 +20,7 @@
 #include "colmap_ext/priors/stamp_images.h"
 #include "colmap_ext/scene/scene_data.h"
 #include "colmap_ext/scene/two_view_poses.h"
+#include "core/median.h"
 #include "core/option_checker.h"
 #include "core/stopwatch.h"
 #include "global/two_view/refine_relative_poses.h"
@@ -107,6 +108,22 @@ void KeepNearPairs(const std::vector<ImageStamp>& stamps, int max_gap,
                pairs->end());
 }
 
+// The median angle between the rays of a pair's matches, rad.
+double MedianMotion(const GlobalCorrespondences& correspondences,
+                    const ImagePair& pair) {
+  const std::vector<Bearing>& first =
+      correspondences.bearings.at(pair.image_id1);
+  const std::vector<Bearing>& second =
+      correspondences.bearings.at(pair.image_id2);
+  std::vector<double> angles;
+  for (const FeatureMatch& match : correspondences.matches.at(pair)) {
+    const Eigen::Vector3d& ray1 = first[match.point2D_idx1].direction;
+    const Eigen::Vector3d& ray2 = second[match.point2D_idx2].direction;
+    angles.push_back(std::atan2(ray1.cross(ray2).norm(), ray1.dot(ray2)));
+  }
+  return UpperMedian(&angles);
+}
+
 // The relative rotations of the scene's pairs.
 std::vector<VisualRotation> ComputeVisualRotations(SceneData scene) {
   GlobalCorrespondences correspondences;
@@ -135,7 +152,8 @@ std::vector<VisualRotation> ComputeVisualRotations(SceneData scene) {
   for (const ViewGraphEdge& edge : graph.edges) {
     if (!edge.IsKept() || !edge.has_rotation) continue;
     rotations.push_back({edge.image_id1, edge.image_id2,
-                         edge.cam2_from_cam1.rotation, edge.num_inliers});
+                         edge.cam2_from_cam1.rotation, edge.num_inliers,
+                         MedianMotion(correspondences, edge.Pair())});
   }
   return rotations;
 }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <utility>
 #include <vector>
 
 #include "core/sensor_log.h"
@@ -13,6 +14,9 @@ struct MotionLogs {
   std::vector<ImuSample> imu;
   std::vector<WheelSpeed> wheel;
   std::vector<OdometryPose> odometry;
+  // From and to when cameras saw that the machine did not stand still, one
+  // after the other.
+  std::vector<std::pair<timestamp_t, timestamp_t>> seen_moving_ns;
 
   bool IsEmpty() const {
     return imu.empty() && wheel.empty() && odometry.empty();

@@ -69,6 +69,15 @@ bool WheelsStandStill(const std::vector<WheelSpeed>& speeds,
   return any;
 }
 
+bool IsSeenMoving(const MotionLogs& logs, timestamp_t start_ns,
+                  timestamp_t end_ns) {
+  const auto& intervals = logs.seen_moving_ns;
+  const auto first = std::partition_point(
+      intervals.begin(), intervals.end(),
+      [start_ns](const auto& interval) { return interval.second <= start_ns; });
+  return first != intervals.end() && first->first < end_ns;
+}
+
 // Whether the machine stands still in the second around a time.
 StandstillKind FindCandidate(const MotionLogs& logs, timestamp_t time_ns,
                              const ImuNoise& noise, double imu_rate_hz) {
@@ -273,7 +282,9 @@ void MarkStandstills(const std::vector<timestamp_t>& times_ns,
   };
   for (size_t k = 0; k < links->size(); ++k) {
     OdometryLink& link = (*links)[k];
-    if (link.has_imu && link.dt_s > 0.0) {
+    const bool may_stand = !logs.wheel.empty() ||
+                           !IsSeenMoving(logs, times_ns[k], times_ns[k + 1]);
+    if (link.has_imu && link.dt_s > 0.0 && may_stand) {
       link.standstill =
           FindCandidate(logs, times_ns[k] + (times_ns[k + 1] - times_ns[k]) / 2,
                         noise, imu_rate_hz);

@@ -15,7 +15,9 @@ namespace adasfm {
 // IMU's white noise densities (rad/s/sqrt(Hz), m/s^2/sqrt(Hz)).
 //
 // Method. (1) A link is a candidate when, in the second around it, the wheels
-// (if any) do not turn and the IMU shows noise only. (2) Links in a row are a
+// (if any) do not turn and the IMU shows noise only, as it does on a machine
+// that glides straight ahead, too: without wheels no camera may have seen it
+// move. (2) Links in a row are a
 // run. In a run the mean rate is the same for all links, but for noise and what
 // they scatter by (medians): the link that is furthest from the mean of the
 // others is taken out for as long as it is further than kMaxDeviation sigmas.

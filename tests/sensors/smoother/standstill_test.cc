@@ -5,9 +5,13 @@
 
 #include <cmath>
 #include <functional>
+#include <map>
+#include <utility>
+#include <vector>
 
 #include "core/random.h"
 #include "core/so3.h"
+#include "sensors/visual_links.h"
 
 namespace adasfm {
 namespace {
@@ -18,7 +22,9 @@ constexpr double kLinkS = 0.5;
 // A machine at rest with a yaw rate of its own, in links of half a second.
 struct Rest {
   Rest(double duration_s, uint64_t seed,
-       const std::function<double(double)>& yaw_rate) {
+       const std::function<double(double)>& yaw_rate,
+       const MotionLogs& other_logs = {})
+      : logs(other_logs) {
     Random random(seed);
     for (int i = 0; i <= std::lround(duration_s * kRateHz); ++i) {
       const double time_s = i / kRateHz;
@@ -124,6 +130,46 @@ TEST(Standstill, SlowMotionWidensTheMean) {
   EXPECT_LT(chi2, 1.5 * 1.42);
   EXPECT_GT(chi2, 0.58 / 1.5);
   EXPECT_GT(chi2_white, 5.0 * 0.58);
+}
+
+// A machine that glides shows the IMU no more than one at rest.
+TEST(Standstill, CamerasThatSeeMotionOutvoteAQuietImu) {
+  MotionLogs logs;
+  logs.seen_moving_ns = {{2'000'000'000, 4'000'000'000},
+                         {4'000'000'000, 5'900'000'000}};
+  const auto still = [](double) { return 0.0; };
+  const Rest moving(10.0, 1, still, logs);
+  for (size_t k = 0; k < moving.links.size(); ++k) {
+    const bool is_seen = k >= 4 && k < 12;
+    EXPECT_EQ(moving.links[k].standstill == StandstillKind::kNone, is_seen)
+        << k;
+  }
+  // Wheels know better what the machine does than cars in the pictures.
+  for (timestamp_t time_ns = 0; time_ns <= 10'000'000'000;
+       time_ns += 20'000'000) {
+    logs.wheel.push_back({time_ns, 0.0, 0.0});
+  }
+  const Rest standing(10.0, 1, still, logs);
+  for (const OdometryLink& link : standing.links) {
+    EXPECT_EQ(link.standstill, StandstillKind::kAtRest);
+  }
+}
+
+TEST(FindSeenMotion, IsThatOfImagesInARow) {
+  const std::map<image_t, timestamp_t> times_ns = {
+      {7, 100}, {3, 200}, {5, 300}, {4, 400}};
+  const auto pair = [](image_t first, image_t second, double motion_rad) {
+    return VisualRotation{first, second, Eigen::Quaterniond::Identity(), 50,
+                          motion_rad};
+  };
+  using Intervals = std::vector<std::pair<timestamp_t, timestamp_t>>;
+  // Noise of the keypoints, and images that are not in a row or have no time.
+  EXPECT_EQ(FindSeenMotion({pair(7, 3, 0.002), pair(7, 5, 0.1), pair(4, 9, 0.1),
+                            pair(5, 4, 0.0)},
+                           times_ns),
+            Intervals());
+  EXPECT_EQ(FindSeenMotion({pair(4, 5, 0.02), pair(7, 3, 0.02)}, times_ns),
+            (Intervals{{100, 200}, {300, 400}}));
 }
 
 }  // namespace
