@@ -39,6 +39,13 @@ double UndistortAngle(const Eigen::Vector4d& k, double theta_d) {
 
 }  // namespace
 
+SyntheticCamera CameraOfImage(const SyntheticCamera& camera,
+                              const SyntheticImage& image) {
+  SyntheticCamera its_camera = camera;
+  its_camera.focal_px *= image.focal_factor;
+  return its_camera;
+}
+
 Bearing ComputeBearing(const SyntheticCamera& camera,
                        const Eigen::Vector2d& pixel) {
   const Eigen::Vector2d m =

@@ -177,8 +177,9 @@ class Observer {
            const SyntheticWorld& world)
       : grid_(grid), map_(map), world_(world) {}
 
-  void Observe(int max_num_keypoints, const ExposurePoses* exposure,
+  void Observe(int max_num_keypoints, const ExposurePoses* rows,
                SyntheticImage* image) const {
+    const SyntheticCamera camera = CameraOfImage(world_.camera, *image);
     Random random = MakeRandom(world_.options.seed, 5, image->image_id);
     struct Seen {
       int landmark;
@@ -191,7 +192,7 @@ class Observer {
       for (int i = map_.street_begin[street]; i < map_.street_begin[street + 1];
            ++i) {
         Eigen::Vector2d pixel;
-        if (!IsVisible(map_.landmarks[i], image->cam_from_world, center,
+        if (!IsVisible(map_.landmarks[i], camera, image->cam_from_world, center,
                        &pixel)) {
           continue;
         }
@@ -211,7 +212,7 @@ class Observer {
     random.Shuffle(&seen);
     const double sigma = world_.options.pixel_noise_px;
     for (Seen& s : seen) {
-      if (exposure != nullptr) RollShutter(*exposure, s.landmark, &s.pixel);
+      if (rows != nullptr) RollShutter(*rows, camera, s.landmark, &s.pixel);
       const double noise_x = random.Gaussian(sigma);
       image->keypoints.emplace_back(s.pixel.x() + noise_x,
                                     s.pixel.y() + random.Gaussian(sigma));
@@ -235,8 +236,9 @@ class Observer {
   }
 
   // Cheap tests first: most landmarks fail the distance.
-  bool IsVisible(const Landmark& landmark, const Rigid3d& cam_from_world,
-                 const Eigen::Vector3d& center, Eigen::Vector2d* pixel) const {
+  bool IsVisible(const Landmark& landmark, const SyntheticCamera& camera,
+                 const Rigid3d& cam_from_world, const Eigen::Vector3d& center,
+                 Eigen::Vector2d* pixel) const {
     const Eigen::Vector3d ray = landmark.position_in_world - center;
     const double distance = ray.norm();
     if (distance > landmark.max_distance ||
@@ -247,7 +249,6 @@ class Observer {
         -landmark.normal.dot(ray.head<2>()) < kMinIncidenceCosine * distance) {
       return false;
     }
-    const SyntheticCamera& camera = world_.camera;
     if (!ProjectPoint(camera, cam_from_world * landmark.position_in_world,
                       pixel) ||
         pixel->x() < kImageBorder || pixel->y() < kImageBorder ||
@@ -261,18 +262,13 @@ class Observer {
   }
 
   // Moves the pixel to where it is when its row is read.
-  void RollShutter(const ExposurePoses& exposure, int landmark,
-                   Eigen::Vector2d* pixel) const {
-    const Rigid3d& first = exposure.first_cam_from_world;
-    const Rigid3d& last = exposure.last_cam_from_world;
+  void RollShutter(const ExposurePoses& rows, const SyntheticCamera& camera,
+                   int landmark, Eigen::Vector2d* pixel) const {
     // Converges by the motion over one image height per round.
     for (int round = 0; round < 4; ++round) {
-      const double share = pixel->y() / world_.camera.height;
       const Rigid3d cam_from_world =
-          CamFromWorldWithCenter(first.rotation.slerp(share, last.rotation),
-                                 (1.0 - share) * first.TargetOriginInSource() +
-                                     share * last.TargetOriginInSource());
-      ProjectPoint(world_.camera,
+          rows.CamFromWorldAt(pixel->y() / camera.height);
+      ProjectPoint(camera,
                    cam_from_world * map_.landmarks[landmark].position_in_world,
                    pixel);
     }
@@ -312,13 +308,12 @@ int LandmarkMap::StreetOf(int landmark) const {
 
 void ObserveLandmarks(const StreetGrid& grid, const LandmarkMap& map,
                       const std::vector<int>& max_num_keypoints,
-                      const std::vector<ExposurePoses>& exposures,
+                      const std::vector<ExposurePoses>& rows,
                       SyntheticWorld* world) {
   const Observer observer(grid, map, *world);
   ParallelFor(-1, world->images.size(), [&](size_t i) {
     observer.Observe(max_num_keypoints[i % max_num_keypoints.size()],
-                     exposures.empty() ? nullptr : &exposures[i],
-                     &world->images[i]);
+                     rows.empty() ? nullptr : &rows[i], &world->images[i]);
   });
 }
 

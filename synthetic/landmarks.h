@@ -39,19 +39,13 @@ struct LandmarkMap {
 LandmarkMap BuildLandmarks(const SyntheticWorldOptions& options,
                            const StreetGrid& grid);
 
-// Where the camera is while an image's rows are read, from the first to the
-// last one.
-struct ExposurePoses {
-  Rigid3d first_cam_from_world;
-  Rigid3d last_cam_from_world;
-};
-
 // Fills the keypoints of all images: what the camera sees, neither hidden nor
 // too far, the strongest first, with noise; at most max_num_keypoints[i] of
-// image i. exposures: of all images, or none for a global shutter.
+// image i. rows: the poses of the first and the last row of all images, or none
+// for a global shutter.
 void ObserveLandmarks(const StreetGrid& grid, const LandmarkMap& map,
                       const std::vector<int>& max_num_keypoints,
-                      const std::vector<ExposurePoses>& exposures,
+                      const std::vector<ExposurePoses>& rows,
                       SyntheticWorld* world);
 
 }  // namespace adasfm

@@ -3,11 +3,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <opencv2/imgproc.hpp>
 #include <stdexcept>
 
+#include "synthetic/find_wall.h"
 #include "synthetic/paint_textures.h"
+#include "synthetic/photo_settings.h"
 
 namespace adasfm {
 namespace {
@@ -15,10 +16,10 @@ namespace {
 constexpr double kFacadeHeight = 10.0;
 constexpr double kFacadePxPerM = 45.0;
 constexpr double kRoadPxPerM = 30.0;
-constexpr double kViewLimit = 250.0;
 constexpr double kHazeDistance = 400.0;
 constexpr double kLensBlurPx = 0.5;
 constexpr double kSensorNoise = 1.2;  // grey levels, 1 sigma
+constexpr int kMaxNumMoments = 64;
 
 const Eigen::Vector3f kHaze(225.0f, 215.0f, 205.0f);
 
@@ -38,77 +39,27 @@ double HalfAxis(double width, double incidence_cosine) {
   return 0.5 * width / std::max(incidence_cosine, 0.02);
 }
 
-struct WallHit {
-  double distance = std::numeric_limits<double>::infinity();
-  // The crossings at the ends of the street that the wall belongs to.
-  GridNode from = {0, 0};
-  GridNode to = {0, 0};
-};
-
-// Meets one block; distances along the (not normalised) direction.
-bool HitBlock(const Eigen::Vector2d& from, const Eigen::Vector2d& direction,
-              int column, int row, WallHit* hit) {
-  const int cell[2] = {column, row};
-  double enter = 0.0;
-  double leave = std::numeric_limits<double>::infinity();
-  int axis = -1;
-  for (int k = 0; k < 2; ++k) {
-    const double low = cell[k] * kBlockSize + kStreetHalfWidth;
-    const double high = (cell[k] + 1) * kBlockSize - kStreetHalfWidth;
-    if (std::abs(direction[k]) < 1e-12) {
-      if (from[k] <= low || from[k] >= high) return false;
-      continue;
-    }
-    double a = (low - from[k]) / direction[k];
-    double b = (high - from[k]) / direction[k];
-    if (a > b) std::swap(a, b);
-    if (a > enter) {
-      enter = a;
-      axis = k;
-    }
-    leave = std::min(leave, b);
-  }
-  if (axis < 0 || enter >= leave) return false;
-  hit->distance = enter;
-  hit->from = {column, row};
-  if (direction[axis] < 0.0) ++hit->from[axis];
-  hit->to = hit->from;
-  ++hit->to[1 - axis];
-  return true;
-}
-
-// The first wall along the ray, walking through the cells of the grid.
-WallHit FindWall(const Eigen::Vector2d& from,
-                 const Eigen::Vector2d& direction) {
-  WallHit hit;
-  int cell[2];
-  double next[2];
-  double step[2];
-  for (int k = 0; k < 2; ++k) {
-    cell[k] = static_cast<int>(std::floor(from[k] / kBlockSize));
-    const double edge = (cell[k] + (direction[k] > 0.0)) * kBlockSize;
-    const bool moves = std::abs(direction[k]) > 1e-12;
-    const double infinity = std::numeric_limits<double>::infinity();
-    next[k] = moves ? (edge - from[k]) / direction[k] : infinity;
-    step[k] = moves ? kBlockSize / std::abs(direction[k]) : infinity;
-  }
-  double distance = 0.0;
-  const double limit = kViewLimit / std::max(direction.norm(), 1e-9);
-  while (distance < limit) {
-    if (HitBlock(from, direction, cell[0], cell[1], &hit)) return hit;
-    const int k = next[0] < next[1] ? 0 : 1;
-    distance = next[k];
-    cell[k] += direction[k] > 0.0 ? 1 : -1;
-    next[k] += step[k];
-  }
-  return hit;
+// Of a photo, while its shutter is open: what moves fastest moves by a pixel
+// from one to the next.
+int NumMoments(const SyntheticWorld& world, const SyntheticImage& image) {
+  const std::vector<double> lengths_px = ComputeBlurLengths(world, image);
+  if (lengths_px.empty()) return 1;
+  const double longest_px =
+      *std::max_element(lengths_px.begin(), lengths_px.end());
+  return std::clamp(static_cast<int>(std::ceil(longest_px)), 1, kMaxNumMoments);
 }
 
 }  // namespace
 
 WorldRenderer::WorldRenderer(const SyntheticWorld& world)
-    : world_(world), grid_(BuildStreetGrid(world.options, world.num_twins)) {
-  const SyntheticCamera& camera = world.camera;
+    : world_(world), grid_(BuildStreetGrid(world.options, world.num_twins)) {}
+
+void WorldRenderer::AimRays(double focal_factor) {
+  if (focal_factor == rays_focal_factor_) return;
+  rays_focal_factor_ = focal_factor;
+  SyntheticCamera camera = world_.camera;
+  camera.focal_px *= focal_factor;
+  rays_in_cam_.clear();
   rays_in_cam_.reserve(camera.width * camera.height);
   for (int y = 0; y < camera.height; ++y) {
     for (int x = 0; x < camera.width; ++x) {
@@ -261,27 +212,46 @@ void WorldRenderer::AddLensAndNoise(size_t image_index,
   }
 }
 
+cv::Mat WorldRenderer::RenderLight(const Rigid3d& cam_from_world) {
+  const SyntheticCamera& camera = world_.camera;
+  cv::Mat picture(camera.height, camera.width, CV_32FC3);
+  const Eigen::Vector3d center = cam_from_world.TargetOriginInSource();
+  const Eigen::Matrix3d world_from_cam =
+      cam_from_world.rotation.toRotationMatrix().transpose();
+  for (int y = 0; y < camera.height; ++y) {
+    float* row = picture.ptr<float>(y);
+    for (int x = 0; x < camera.width; ++x) {
+      PixelRay ray = rays_in_cam_[y * camera.width + x];
+      ray.direction = world_from_cam * ray.direction;
+      Eigen::Map<Eigen::Vector3f>(row + 3 * x) = Shade(center, ray);
+    }
+  }
+  return picture;
+}
+
+cv::Mat WorldRenderer::CollectLight(const SyntheticImage& image) {
+  const SyntheticCamera& camera = world_.camera;
+  if (image.keypoints.empty()) {
+    return cv::Mat(camera.height, camera.width, CV_32FC3,
+                   cv::Scalar(60.0, 60.0, 60.0));
+  }
+  AimRays(image.focal_factor);
+  const int num_moments = NumMoments(world_, image);
+  if (num_moments == 1) return RenderLight(image.cam_from_world);
+  cv::Mat sum(camera.height, camera.width, CV_32FC3, cv::Scalar());
+  for (int i = 0; i < num_moments; ++i) {
+    sum += RenderLight(image.shutter->CamFromWorldAt((i + 0.5) / num_moments));
+  }
+  return sum / num_moments;
+}
+
 cv::Mat WorldRenderer::Render(size_t image_index) {
   if (image_index >= world_.images.size()) {
     throw std::out_of_range("WorldRenderer: no image of that index");
   }
   const SyntheticImage& image = world_.images[image_index];
-  const SyntheticCamera& camera = world_.camera;
-  cv::Mat picture(camera.height, camera.width, CV_32FC3,
-                  cv::Scalar(60.0, 60.0, 60.0));
-  if (!image.keypoints.empty()) {
-    const Eigen::Vector3d center = image.cam_from_world.TargetOriginInSource();
-    const Eigen::Matrix3d world_from_cam =
-        image.cam_from_world.rotation.toRotationMatrix().transpose();
-    for (int y = 0; y < camera.height; ++y) {
-      float* row = picture.ptr<float>(y);
-      for (int x = 0; x < camera.width; ++x) {
-        PixelRay ray = rays_in_cam_[y * camera.width + x];
-        ray.direction = world_from_cam * ray.direction;
-        Eigen::Map<Eigen::Vector3f>(row + 3 * x) = Shade(center, ray);
-      }
-    }
-  }
+  cv::Mat picture = CollectLight(image);
+  picture *= image.exposure_gain;
   AddLensAndNoise(image_index, &picture);
   cv::Mat bytes;
   picture.convertTo(bytes, CV_8UC3);

@@ -16,8 +16,10 @@ namespace adasfm {
 
 // Photos of a world: one ray per pixel against facades, ground and sky, with
 // textures averaged over the pixel's footprint, a soft lens and sensor noise.
-// Images without keypoints (blackouts) show nothing. Streets that look alike
-// carry the same textures. Pixel (x, y) of the picture has its centre at
+// With an exposure time the photo is the mean of what is seen at even moments
+// while the shutter is open; its gain scales the grey levels, which end at
+// white. Images without keypoints (blackouts) show nothing. Streets that look
+// alike carry the same textures. Pixel (x, y) of the picture has its centre at
 // (x + 0.5, y + 0.5) in the camera's pixels, as in COLMAP.
 class WorldRenderer {
  public:
@@ -49,10 +51,16 @@ class WorldRenderer {
                  double* distance, Eigen::Vector3f* color);
   Eigen::Vector3f ShadeGround(const Eigen::Vector3d& center,
                               const PixelRay& ray);
+  // Fills rays_in_cam_ for a focal length.
+  void AimRays(double focal_factor);
+  // Grey levels without limit (CV_32FC3): at one pose, and of an image.
+  cv::Mat RenderLight(const Rigid3d& cam_from_world);
+  cv::Mat CollectLight(const SyntheticImage& image);
   void AddLensAndNoise(size_t image_index, cv::Mat* picture) const;
 
   const SyntheticWorld& world_;
   StreetGrid grid_;
+  double rays_focal_factor_ = 0.0;
   std::vector<PixelRay> rays_in_cam_;
   std::map<StreetId, Street> far_streets_;
   std::map<std::tuple<uint64_t, int>, Facade> facades_;

@@ -7,6 +7,7 @@
 #include "synthetic/drive.h"
 #include "synthetic/image_pairs.h"
 #include "synthetic/landmarks.h"
+#include "synthetic/photo_settings.h"
 #include "synthetic/sensor_logs.h"
 #include "synthetic/street_grid.h"
 #include "synthetic/traffic.h"
@@ -104,30 +105,9 @@ std::vector<double> TakeImages(const Drive& drive, SyntheticWorld* world) {
   return times_s;
 }
 
-// Of the rows of all images; empty for a global shutter.
-std::vector<ExposurePoses> TakeRows(const Drive& drive,
-                                    const std::vector<double>& times_s,
-                                    const SyntheticWorld& world) {
-  std::vector<ExposurePoses> exposures;
-  const double half_s = 0.5 * world.options.rolling_shutter_s;
-  if (half_s <= 0.0) return exposures;
-  const auto pose_at = [&](double time_s) {
-    return world.cam_from_imu * drive.StateAt(time_s).world_from_imu.Inverse();
-  };
-  for (const double time_s : times_s) {
-    exposures.push_back({pose_at(time_s - half_s), pose_at(time_s + half_s)});
-  }
-  while (exposures.size() < world.images.size()) {
-    const ExposurePoses& first = exposures[exposures.size() - times_s.size()];
-    exposures.push_back({world.cam1_from_cam0 * first.first_cam_from_world,
-                         world.cam1_from_cam0 * first.last_cam_from_world});
-  }
-  return exposures;
-}
-
 // What the camera sees, and the matches, with so many streets that look alike
 // as the share of look-alike pairs needs.
-void FillImagesAndPairs(const std::vector<ExposurePoses>& exposures,
+void FillImagesAndPairs(const std::vector<ExposurePoses>& rows,
                         const std::vector<double>& arc_lengths_m,
                         SyntheticWorld* world) {
   const SyntheticWorldOptions& options = world->options;
@@ -143,7 +123,7 @@ void FillImagesAndPairs(const std::vector<ExposurePoses>& exposures,
       image.keypoints.clear();
       image.landmark_ids.clear();
     }
-    ObserveLandmarks(grid, map, DrawBlackouts(options), exposures, world);
+    ObserveLandmarks(grid, map, DrawBlackouts(options), rows, world);
     AddTraffic(world);
     const double reached = MatchImages(grid, map, arc_lengths_m, world);
     if (reached == options.alias_pair_ratio) return;
@@ -174,6 +154,13 @@ void AddSecondCamera(SyntheticWorld* world) {
 
 }  // namespace
 
+Rigid3d ExposurePoses::CamFromWorldAt(double share) const {
+  return CamFromWorldWithCenter(
+      first_cam_from_world.rotation.slerp(share, last_cam_from_world.rotation),
+      (1.0 - share) * first_cam_from_world.TargetOriginInSource() +
+          share * last_cam_from_world.TargetOriginInSource());
+}
+
 SyntheticWorld BuildSyntheticWorld(const SyntheticWorldOptions& options) {
   std::string error;
   if (!options.IsValid(&error)) throw std::invalid_argument(error);
@@ -184,7 +171,7 @@ SyntheticWorld BuildSyntheticWorld(const SyntheticWorldOptions& options) {
   world.cam1_from_cam0 = MakeCam1FromCam0(options.stereo_baseline_m);
   world.imu_from_wheel = Rigid3d(Eigen::Quaterniond::Identity(),
                                  Eigen::Vector3d(-0.4, 0.05, -0.3));
-  // 1. The streets and the drive through them.
+  // 1. The streets, the drive through them, and how the camera is set.
   const Drive drive(options, BuildPath(options, BuildStreetGrid(options).route),
                     world.imu_from_wheel);
   const std::vector<double> times_s = TakeImages(drive, &world);
@@ -193,6 +180,9 @@ SyntheticWorld BuildSyntheticWorld(const SyntheticWorldOptions& options) {
     arc_lengths_m.push_back(drive.ArcLengthAt(time_s));
   }
   if (options.stereo_baseline_m > 0.0) AddSecondCamera(&world);
+  SetFocalFactors(&world);
+  SetExposureGains(&world);
+  OpenShutters(drive, times_s, &world);
   // 2. The logs.
   const double first_s = drive.FirstImageTime();
   const double end_s = times_s.back() + kTail;
@@ -200,7 +190,9 @@ SyntheticWorld BuildSyntheticWorld(const SyntheticWorldOptions& options) {
   SimulateWheels(drive, first_s, end_s, &world);
   SimulateGnss(drive, end_s, &world);
   // 3. What the camera sees, and the matches.
-  FillImagesAndPairs(TakeRows(drive, times_s, world), arc_lengths_m, &world);
+  FillImagesAndPairs(
+      PosesWithin(drive, times_s, options.rolling_shutter_s, world),
+      arc_lengths_m, &world);
   return world;
 }
 

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -25,6 +26,16 @@ struct SyntheticCamera {
   Eigen::Vector4d fisheye_coeffs = Eigen::Vector4d::Zero();
 };
 
+// Where the camera is from the beginning to the end of a short time: while the
+// rows of an image are read, or while its shutter is open.
+struct ExposurePoses {
+  Rigid3d first_cam_from_world;
+  Rigid3d last_cam_from_world;
+
+  // 0 at the beginning, 1 at the end; evenly in between.
+  Rigid3d CamFromWorldAt(double share) const;
+};
+
 struct SyntheticImage {
   image_t image_id = kInvalidImageId;  // 1, 2, ... in order of the list
   int camera_index = 0;
@@ -40,6 +51,12 @@ struct SyntheticImage {
   // cars.
   std::vector<int> car_point_ids;
   std::vector<Rigid3d> cam_from_car;
+  // This image's focal length per that of the camera.
+  double focal_factor = 1.0;
+  // What a photo's grey levels are multiplied with before they are clipped.
+  double exposure_gain = 1.0;
+  // While the shutter is open; unset where exposures take no time.
+  std::optional<ExposurePoses> shutter;
 };
 
 struct SyntheticPair {
@@ -93,6 +110,11 @@ struct SyntheticWorld {
 // Throws std::invalid_argument for options that are not valid, or ask for more
 // than the drive can have; the message names the largest possible value.
 SyntheticWorld BuildSyntheticWorld(const SyntheticWorldOptions& options);
+
+// The camera as it was when it took the image: with the image's focal length,
+// which nobody is told.
+SyntheticCamera CameraOfImage(const SyntheticCamera& camera,
+                              const SyntheticImage& image);
 
 // The ray of a pixel and its derivative. Throws for a pixel that the fisheye
 // model cannot reach.

@@ -32,6 +32,7 @@ bool SyntheticWorldOptions::IsValid(std::string* error) const {
            {"pixel_noise_px", pixel_noise_px},
            {"num_stops", num_stops},
            {"num_spins", num_spins},
+           {"num_focal_steps", num_focal_steps},
            {"blackout_num_keypoints", blackout_num_keypoints},
            {"num_blackouts", num_blackouts},
            {"gyroscope_noise_density", imu_noise.gyroscope_noise_density},
@@ -51,13 +52,18 @@ bool SyntheticWorldOptions::IsValid(std::string* error) const {
       .AtLeast(4.0 * lane_spacing_m, "lane_length_m", lane_length_m)
       .AtLeast(2.0, "spin_duration_s", spin_duration_s)
       .Within(0.0, 0.1, "rolling_shutter_s", rolling_shutter_s)
+      .Within(0.0, 0.1, "exposure_time_s", exposure_time_s)
+      .Within(1.1, 16.0, "exposure_jump_factor", exposure_jump_factor)
+      .Within(0.0, 0.2, "focal_breathing_ratio", focal_breathing_ratio)
       .Within(0.0, 0.5, "wheel_slip_sigma", wheel_slip_sigma)
       .Within(-1e6, 1e6, "gyro_drift", gyro_drift)
       .Within(-1e6, 1e6, "timeshift_cam_imu_s", timeshift_cam_imu_s)
       .Require(num_blackouts <= max_num_blackouts, "num_blackouts",
                num_blackouts,
                "must be at most " + std::to_string(max_num_blackouts) +
-                   ": half of the images keep their texture");
+                   ": half of the images keep their texture")
+      .Require(num_focal_steps < num_images, "num_focal_steps", num_focal_steps,
+               "must be less than num_images");
   const std::pair<const char*, double> shares[] = {
       {"outlier_match_ratio", outlier_match_ratio},
       {"moving_keypoint_ratio", moving_keypoint_ratio},
@@ -67,6 +73,7 @@ bool SyntheticWorldOptions::IsValid(std::string* error) const {
       {"alias_pair_ratio + spurious_pair_ratio",
        alias_pair_ratio + spurious_pair_ratio}};
   for (const auto& [name, value] : shares) checker.Within(0, 0.9, name, value);
+  checker.Within(0, 1, "exposure_jump_ratio", exposure_jump_ratio);
   return checker.AllHold();
 }
 

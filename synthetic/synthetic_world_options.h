@@ -55,6 +55,16 @@ struct SyntheticWorldOptions {
   double rolling_shutter_s = 0.0;
   // Share of an image's keypoints that lie on two cars that drive ahead.
   double moving_keypoint_ratio = 0.0;
+  // Autofocus: the largest error of a photo's focal length, as a share of the
+  // camera's; a slow wave of time, or constant between so many changes.
+  double focal_breathing_ratio = 0.0;
+  int num_focal_steps = 0;
+  // Only photos show the following three. Automatic exposure: the share of
+  // photos that are darker or brighter than the one before by a factor.
+  double exposure_jump_ratio = 0.0;
+  double exposure_jump_factor = 2.0;
+  // Motion blur: how long the shutter is open; the pose is that of the middle.
+  double exposure_time_s = 0.0;
   // Share of raw matches that are wrong at random (verification drops most).
   double outlier_match_ratio = 0.2;
   // Consecutive pairs up to this distance in the sequence are matched, as well

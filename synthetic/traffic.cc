@@ -93,7 +93,7 @@ class CarPainter {
   // Whether the point is in view.
   bool Replace(int car, int point, int keypoint, Random* random,
                SyntheticImage* image) const {
-    const SyntheticCamera& camera = world_.camera;
+    const SyntheticCamera camera = CameraOfImage(world_.camera, *image);
     Eigen::Vector2d pixel;
     if (!ProjectPoint(camera, image->cam_from_car[car] * points_[car][point],
                       &pixel) ||

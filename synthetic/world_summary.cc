@@ -2,13 +2,18 @@
 #include "synthetic/world_summary.h"
 
 #include <algorithm>
+#include <cmath>
+#include <numeric>
 #include <set>
+
+#include "synthetic/photo_settings.h"
 
 namespace adasfm {
 namespace {
 
 constexpr int kMinNumKeypoints = 15;
 constexpr int kMaxSequenceGap = 10;
+constexpr double kMaxSharpBlurPx = 2.0;
 
 double Ratio(double part, double all) { return all > 0.0 ? part / all : 0.0; }
 
@@ -91,6 +96,38 @@ void CountPairs(const SyntheticWorld& world, SyntheticWorldSummary* summary) {
   summary->moving_match_ratio = Ratio(num_moving, num_inliers);
 }
 
+void MeasurePhotos(const SyntheticWorld& world,
+                   SyntheticWorldSummary* summary) {
+  double sum_px = 0.0;
+  int num_photos = 0, num_blurred = 0, num_steps = 0, num_jumps = 0;
+  for (size_t i = 0; i < world.images.size(); ++i) {
+    const SyntheticImage& image = world.images[i];
+    summary->max_focal_error_percent =
+        std::max(summary->max_focal_error_percent,
+                 100.0 * std::abs(image.focal_factor - 1.0));
+    if (i > 0 && image.camera_index == world.images[i - 1].camera_index) {
+      const double step =
+          image.exposure_gain / world.images[i - 1].exposure_gain;
+      ++num_steps;
+      num_jumps += step != 1.0;
+      summary->max_exposure_factor =
+          std::max({summary->max_exposure_factor, step, 1.0 / step});
+    }
+    const std::vector<double> lengths_px = ComputeBlurLengths(world, image);
+    if (lengths_px.empty()) continue;
+    const double blur_px =
+        std::accumulate(lengths_px.begin(), lengths_px.end(), 0.0) /
+        lengths_px.size();
+    ++num_photos;
+    num_blurred += blur_px > kMaxSharpBlurPx;
+    sum_px += blur_px;
+    summary->max_blur_px = std::max(summary->max_blur_px, blur_px);
+  }
+  summary->exposure_jump_ratio = Ratio(num_jumps, num_steps);
+  summary->mean_blur_px = Ratio(sum_px, num_photos);
+  summary->blurred_photo_ratio = Ratio(num_blurred, num_photos);
+}
+
 }  // namespace
 
 SyntheticWorldSummary SummarizeWorld(const SyntheticWorld& world) {
@@ -110,12 +147,13 @@ SyntheticWorldSummary SummarizeWorld(const SyntheticWorld& world) {
   summary.num_gnss_fixes = static_cast<int>(world.gnss_fixes.size());
   CountImages(world, &summary);
   CountPairs(world, &summary);
+  MeasurePhotos(world, &summary);
   return summary;
 }
 
 std::vector<std::pair<std::string, double>> ListFigures(
     const SyntheticWorldSummary& s) {
-  return {
+  std::vector<std::pair<std::string, double>> figures = {
       {"num_images", s.num_images},
       {"driven_m", s.driven_m},
       {"duration_s", s.duration_s},
@@ -135,6 +173,19 @@ std::vector<std::pair<std::string, double>> ListFigures(
       {"outlier_match_ratio", s.outlier_match_ratio},
       {"num_gnss_fixes", s.num_gnss_fixes},
   };
+  if (s.exposure_jump_ratio > 0.0) {
+    figures.emplace_back("exposure_jump_ratio", s.exposure_jump_ratio);
+    figures.emplace_back("max_exposure_factor", s.max_exposure_factor);
+  }
+  if (s.max_blur_px > 0.0) {
+    figures.emplace_back("mean_blur_px", s.mean_blur_px);
+    figures.emplace_back("max_blur_px", s.max_blur_px);
+    figures.emplace_back("blurred_photo_ratio", s.blurred_photo_ratio);
+  }
+  if (s.max_focal_error_percent > 0.0) {
+    figures.emplace_back("max_focal_error_percent", s.max_focal_error_percent);
+  }
+  return figures;
 }
 
 }  // namespace adasfm

@@ -35,11 +35,22 @@ struct SyntheticWorldSummary {
   // Of the raw matches of true pairs.
   double outlier_match_ratio = 0.0;
   int num_gnss_fixes = 0;
+  // Of the photos after the first, those whose gain differs from the one
+  // before; the largest factor between two.
+  double exposure_jump_ratio = 0.0;
+  double max_exposure_factor = 1.0;
+  // How far a photo's keypoints move while the shutter is open, on average:
+  // mean and largest of the photos, and the share of photos above 2 px.
+  double mean_blur_px = 0.0;
+  double max_blur_px = 0.0;
+  double blurred_photo_ratio = 0.0;
+  double max_focal_error_percent = 0.0;
 };
 
 SyntheticWorldSummary SummarizeWorld(const SyntheticWorld& world);
 
-// Names and values, in the order above.
+// Names and values, in the order above; of exposure, blur and focal lengths
+// only what the world has.
 std::vector<std::pair<std::string, double>> ListFigures(
     const SyntheticWorldSummary& summary);
 

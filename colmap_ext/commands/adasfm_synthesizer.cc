@@ -4,8 +4,10 @@
 #include <map>
 #include <opencv2/imgcodecs.hpp>
 #include <set>
+#include <sstream>
 #include <stdexcept>
 #include <string>
+#include <utility>
 
 #include "colmap_ext/commands/command.h"
 #include "colmap_ext/commands/progress_display.h"
@@ -77,6 +79,11 @@ void AddImageOptions(SynthesizerOptions* options, CommandOptions* command) {
   add("rolling_shutter", &world->rolling_shutter_s,
       "time from the first to the last row of an image; 0: "
       "global shutter [s]");
+  add("focal_breathing", &world->focal_breathing_ratio,
+      "autofocus: largest error of an image's focal length, as a share of the "
+      "camera's, which stays stated");
+  add("focal_steps", &world->num_focal_steps,
+      "changes of that error under way, constant in between; 0: a slow wave");
   add("moving_ratio", &world->moving_keypoint_ratio,
       "share of keypoints on cars that drive ahead");
   add("outlier_ratio", &world->outlier_match_ratio,
@@ -86,6 +93,21 @@ void AddImageOptions(SynthesizerOptions* options, CommandOptions* command) {
       "images of each such interval");
   add("blackout_keypoints", &world->blackout_num_keypoints,
       "keypoints at most of such an image");
+}
+
+void AddPhotoOptions(SynthesizerOptions* options, CommandOptions* command) {
+  const auto add = [command](const char* name, auto* value, const char* help) {
+    command->AddDefault(name, value, help);
+  };
+  SyntheticWorldOptions* world = &options->world;
+  add("exposure_jumps", &world->exposure_jump_ratio,
+      "render: share of photos with more or less light than the one before");
+  add("exposure_factor", &world->exposure_jump_factor,
+      "render: by which factor; grey levels end at white");
+  add("exposure_time", &world->exposure_time_s,
+      "render: time for which the shutter is open, so that motion blurs; 0: "
+      "none [s]");
+  add("render", &options->render, "1: photos in images/ instead of a database");
 }
 
 void AddPairOptions(SyntheticWorldOptions* world, CommandOptions* command) {
@@ -135,8 +157,7 @@ void AddOptions(SynthesizerOptions* options, CommandOptions* command) {
   AddImageOptions(options, command);
   AddPairOptions(&options->world, command);
   AddSensorOptions(&options->world, command);
-  command->AddDefault("render", &options->render,
-                      "1: photos in images/ instead of a database");
+  AddPhotoOptions(options, command);
 }
 
 Status Translate(SynthesizerOptions* options) {
@@ -166,6 +187,14 @@ Status Translate(SynthesizerOptions* options) {
     return Status::Error(
         "render = 1, but photos show streets of one level only, without cars "
         "or rolling shutter");
+  }
+  for (const auto& [name, value] :
+       {std::pair("exposure_jumps", world.exposure_jump_ratio),
+        std::pair("exposure_time", world.exposure_time_s)}) {
+    if (options->render || value == 0.0) continue;
+    std::ostringstream text;
+    text << name << " = " << value << " needs render = 1: only photos show it";
+    return Status::Error(text.str());
   }
   return CheckOptions(world);
 }

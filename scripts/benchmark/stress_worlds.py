@@ -4,7 +4,8 @@
 
 Makes each dial's world with `adasfm_synthesizer`, reads from its world.json what
 the world really has, runs `adasfm_prior_importer`, `adasfm_global` and
-`adasfm_mapper` on it, and the last two again without any log, compares all
+`adasfm_mapper` on it, or `adasfm_automatic_reconstructor` where the world has
+photos, and all but the importer again without any log, compares all
 models with the truth, and writes a table: one row a dial and seed. A model is
 folded when its camera centres err by more than a bar after a similarity; a fold
 without a warning is the one thing that must not happen. Needs only Python's
@@ -18,79 +19,11 @@ import os
 import shutil
 import sys
 
+from benchmarking.dials import DIALS, MAX_DRIFT_WITHOUT_LOGS
 from benchmarking.figures import (add_arguments, measure, run_table,
                                   world_folder)
 from benchmarking.process import Failed, run
 
-# Without logs the scale drifts: a fold errs by more of the way driven.
-MAX_DRIFT_WITHOUT_LOGS = 0.005
-ALL_LOGS = ('imu', 'wheel')
-
-
-# One world: the figures of world.json that tell the dial, and options of the
-# synthesizer.
-def dial(figures=(), images=150, logs=ALL_LOGS, bar_m=0.5,
-         max_drift=MAX_DRIFT_WITHOUT_LOGS, **options):
-  return {'figures': list(figures), 'images': images, 'logs': list(logs), 'bar_m': bar_m,
-          'max_drift': max_drift, 'options': options}
-
-
-DIALS = {
-    'plain': dial(('mean_overlap',)),
-    'mower, lanes 1 m apart': dial(
-        ('driven_m', 'num_revisit_pairs'), 300, bar_m=0.1, trajectory='lanes',
-        spacing=0.5, image_interval=0.5),
-    'mower on gravel': dial(
-        ('driven_m',), 300, bar_m=0.1, trajectory='lanes', spacing=0.5,
-        image_interval=0.5, wheel_slip_noise=0.1, wheel_slips=6),
-    'mower, 5 turns on the spot, 2 stops': dial(
-        ('standing_s',), 300, bar_m=0.1, trajectory='lanes', spacing=0.5,
-        image_interval=0.5, spins=5, stops=2),
-    'parallel streets': dial(
-        ('alias_pair_ratio', 'num_images_with_false_pairs'),
-        trajectory='parallel', street_blocks=2, spacing=3, num_neighbors=6,
-        alias_ratio=0.3),
-    'parallel streets, half of the pairs false': dial(
-        ('alias_pair_ratio', 'num_images_with_false_pairs'),
-        trajectory='parallel', street_blocks=2, spacing=3, num_neighbors=3,
-        alias_ratio=0.45, spurious_ratio=0.05),
-    'parallel streets, three blackouts': dial(
-        ('alias_pair_ratio', 'num_images_without_texture'),
-        trajectory='parallel', street_blocks=2, spacing=3, num_neighbors=6,
-        alias_ratio=0.2, num_blackouts=3, blackout_images=10),
-    'two parallel streets, 180 images alike, a blackout between': dial(
-        ('alias_pair_ratio', 'num_images_with_false_pairs'), 400,
-        trajectory='parallel', spacing=1, num_neighbors=4, alias_ratio=0.2,
-        num_blackouts=1, blackout_images=40),
-    'floors of a car park': dial(
-        ('alias_pair_ratio', 'num_images_with_false_pairs'), 220,
-        max_drift=0, trajectory='floors', spacing=3, num_neighbors=6,
-        alias_ratio=0.3),
-    'town, 40 % look-alikes': dial(
-        ('alias_pair_ratio',), 200, alias_ratio=0.4),
-    'half of the pairs spurious': dial(
-        ('spurious_pair_ratio',), spurious_ratio=0.5),
-    '70 % of the pairs false': dial(
-        ('alias_pair_ratio', 'spurious_pair_ratio'), 200, alias_ratio=0.2,
-        spurious_ratio=0.5),
-    'turns on the spot': dial(('standing_s',), 200, spins=1, spin_duration=4),
-    'long standstill': dial(('standing_s',), 200, stops=1, stop_duration=12),
-    'wheels on gravel': dial((), wheel_slip_noise=0.03, wheel_slips=4),
-    'cars carry most matches': dial(
-        ('moving_keypoint_ratio', 'moving_match_ratio'), moving_ratio=0.45),
-    'rolling shutter of 30 ms': dial((), rolling_shutter=0.03),
-    'few keypoints inside parts': dial(
-        ('num_images_without_texture',), 200, num_blackouts=4,
-        blackout_images=12, blackout_keypoints=14),
-    'gyroscope drifts by 0.6 deg/s a minute': dial((), gyro_drift=1.75e-4),
-    'a third of the rotations wrong': dial(
-        ('rotation_outlier_ratio',), rotation_outliers=0.33),
-    '80 % outliers': dial(('outlier_match_ratio',), outlier_ratio=0.8,
-                          num_keypoints=600),
-    'GNSS with jumps, no other log': dial(
-        ('num_gnss_fixes',), logs=('gnss',), gnss_rate=1, gnss_jumps=1,
-        bar_m=1.0),
-}
 NOT_ABOUT_A_MODEL = ('are in no model', 'fall apart', 'may join another',
                      'joins not made')
 
@@ -128,6 +61,36 @@ def map_world(folder, logs, args):
     usage.append(run([args.colmap, 'adasfm_mapper', '--database_path', database,
                       '--input_path', coarse, '--output_path', final],
                      log_path))
+  return read_outcome(folder, coarse, final, log_path, usage, args)
+
+
+def read_intrinsics(folder):
+  """Of the first camera of sensors.yaml, as COLMAP's PINHOLE has them."""
+  with open(os.path.join(folder, 'sensors.yaml')) as file:
+    line = next(line for line in file if 'intrinsics:' in line)
+  return ''.join(line.split('[')[1].split(']')[0].split())
+
+
+def map_photos(folder, logs, args):
+  """From photos to a model by one command; returns what came out."""
+  suffix = 'with' if logs else 'without'
+  log_path = os.path.join(folder, suffix + '.log')
+  workspace = os.path.join(folder, suffix)
+  arguments = [args.colmap, 'adasfm_automatic_reconstructor', '--image_path',
+               os.path.join(folder, 'images'), '--workspace_path', workspace,
+               '--extractor', 'opencv', '--camera_model', 'PINHOLE',
+               '--camera_params', read_intrinsics(folder)]
+  if logs:
+    arguments += ['--image_times_path', os.path.join(folder, 'times.csv'),
+                  '--sensors_path', os.path.join(folder, 'sensors.yaml')]
+  for log in logs:
+    arguments += ['--%s_path' % log, os.path.join(folder, log + '.csv')]
+  usage = [run(arguments, log_path)]
+  return read_outcome(folder, os.path.join(workspace, 'coarse'),
+                      os.path.join(workspace, 'sparse'), log_path, usage, args)
+
+
+def read_outcome(folder, coarse, final, log_path, usage, args):
   models = [measure(path, folder, args, log_path)
             for path in list_models(final if args.run_mapper else coarse)]
   models = [model for model in models if model]
@@ -196,7 +159,8 @@ def run_dial(name, seed, args):
     if key not in args.runs.split(','):
       continue
     try:
-      record[key] = map_world(folder, logs, args)
+      map_it = map_photos if 'render' in row['options'] else map_world
+      record[key] = map_it(folder, logs, args)
     except Failed as error:
       record[key] = {'error': describe_failure(error, folder)}
     record[key]['bar_m'] = bar_m
