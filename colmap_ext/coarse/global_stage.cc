@@ -5,6 +5,7 @@
 #include <sstream>
 #include <stdexcept>
 
+#include "colmap_ext/coarse/join_models.h"
 #include "colmap_ext/coarse/measure_size.h"
 #include "colmap_ext/coarse/refine_stage_matches.h"
 #include "colmap_ext/scene/scene_bearings.h"
@@ -229,6 +230,10 @@ StatusOr<GlobalStageResult> RunGlobalStage(
   CoarseStructureOptions structure_options = options.structure;
   structure_options.bundle.shared_errors.length_drift_ratio =
       scene.length_drift_ratio;
+  const std::map<ImagePair, std::vector<FeatureMatch>> all_matches =
+      result.poses.components.size() > 1
+          ? correspondences.matches
+          : std::map<ImagePair, std::vector<FeatureMatch>>();
   for (const CoarseComponent& component : result.poses.components) {
     CoarseModelInput input = CreateModelInput(
         MatchAnew(options.refinement, scene, raw_matches,
@@ -241,6 +246,14 @@ StatusOr<GlobalStageResult> RunGlobalStage(
         structure_options, scene, correspondences.bearings, std::move(input)));
     result.steps.push_back(
         {"structure", watch.Seconds(), DescribeModel(result.models.back())});
+  }
+  if (result.models.size() > 1) {
+    watch = begin("joins of models", 0.85);
+    const int num_joins = JoinModels(options, scene, correspondences.bearings,
+                                     all_matches, &result);
+    result.steps.push_back(
+        {"joins of models", watch.Seconds(),
+         std::to_string(num_joins) + " of parts whose points tell their size"});
   }
   MeasurePairAgreements(options, scene, correspondences.bearings, &result);
 

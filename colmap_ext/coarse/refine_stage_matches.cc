@@ -139,17 +139,26 @@ void RefineRawMatches(const MatchRefinementOptions& options,
   }
 }
 
+PairAgreement MeasureModelAgreement(
+    const GlobalStageOptions& options, const SceneData& scene,
+    const ViewGraph& graph,
+    const std::map<image_t, std::vector<Bearing>>& bearings,
+    const CoarseModel& model) {
+  return MeasurePairAgreement(
+      FitToNoise(options.refinement, model.reconstruction), scene, graph,
+      CamsFromWorld(model.reconstruction),
+      model.cameras_refined
+          ? ComputeModelBearings(model.reconstruction, options.num_threads)
+          : bearings);
+}
+
 void MeasurePairAgreements(
     const GlobalStageOptions& options, const SceneData& scene,
     const std::map<image_t, std::vector<Bearing>>& bearings,
     GlobalStageResult* result) {
   for (CoarseModel& model : result->models) {
-    model.pair_agreement = MeasurePairAgreement(
-        FitToNoise(options.refinement, model.reconstruction), scene,
-        result->poses.graph, CamsFromWorld(model.reconstruction),
-        model.cameras_refined
-            ? ComputeModelBearings(model.reconstruction, options.num_threads)
-            : bearings);
+    model.pair_agreement = MeasureModelAgreement(
+        options, scene, result->poses.graph, bearings, model);
   }
 }
 

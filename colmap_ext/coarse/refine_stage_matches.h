@@ -22,6 +22,14 @@ void RefineRawMatches(const MatchRefinementOptions& options,
                       const std::vector<const ScenePair*>& pairs,
                       MatchRefinementReport* total);
 
+// How far the verified pairs agree with a model, by the noise of its keypoints;
+// bearings are those of the scene.
+PairAgreement MeasureModelAgreement(
+    const GlobalStageOptions& options, const SceneData& scene,
+    const ViewGraph& graph,
+    const std::map<image_t, std::vector<Bearing>>& bearings,
+    const CoarseModel& model);
+
 // Measures how far the verified pairs agree with every model of the result, by
 // the noise of its keypoints.
 void MeasurePairAgreements(
