@@ -119,7 +119,10 @@ TEST(NoiseFigures, FarTooSmallOnesAreSaid) {
   data.calibration.imu_noise.accelerometer_noise_density /= 100.0;
   data.calibration.wheel_speed_noise /= 100.0;
   const MotionLogs logs = {
-      data.logs.imu, ComputeWheelSpeeds(data.logs.wheel, data.calibration), {}};
+      data.logs.imu,
+      ComputeWheelSpeeds(data.logs.wheel, data.calibration),
+      {},
+      {}};
   std::vector<std::string> warnings;
   RaiseNoiseFigures(logs, &data.calibration, &warnings);
   EXPECT_EQ(warnings.size(), 3u);
@@ -219,6 +222,7 @@ TEST(NoiseFigures, RightOnesOfRealLogsAreNotAccused) {
     const MotionLogs logs = {
         data.logs.imu,
         ComputeWheelSpeeds(data.logs.wheel, data.calibration),
+        {},
         {}};
     std::vector<std::string> warnings;
     RaiseNoiseFigures(logs, &data.calibration, &warnings);
