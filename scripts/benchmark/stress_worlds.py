@@ -1,4 +1,4 @@
-#!/usr/bin/env python3
+#!/usr/bin/python3
 # SPDX-License-Identifier: BSD-3-Clause
 """One world for each thing that can go wrong: what it has, and what comes out.
 
@@ -8,8 +8,7 @@ the world really has, runs `adasfm_prior_importer`, `adasfm_global` and
 photos, and all but the importer again without any log, compares all
 models with the truth, and writes a table: one row a dial and seed. A model is
 folded when its camera centres err by more than a bar after a similarity; a fold
-without a warning is the one thing that must not happen. Needs only Python's
-standard library.
+without a warning is the one thing that must not happen. Needs numpy.
 """
 
 import argparse
@@ -22,6 +21,7 @@ import sys
 from benchmarking.dials import DIALS, MAX_DRIFT_WITHOUT_LOGS
 from benchmarking.figures import (add_arguments, measure, run_table,
                                   world_folder)
+from benchmarking.pair_counts import count_pairs
 from benchmarking.process import Failed, run
 
 NOT_ABOUT_A_MODEL = ('are in no model', 'fall apart', 'may join another',
@@ -61,7 +61,10 @@ def map_world(folder, logs, args):
     usage.append(run([args.colmap, 'adasfm_mapper', '--database_path', database,
                       '--input_path', coarse, '--output_path', final],
                      log_path))
-  return read_outcome(folder, coarse, final, log_path, usage, args)
+  outcome = read_outcome(folder, coarse, final, log_path, usage, args)
+  outcome['pairs'] = count_pairs(os.path.join(folder, 'database.db'), database,
+                                 folder)
+  return outcome
 
 
 def read_intrinsics(folder):
@@ -170,14 +173,24 @@ def run_dial(name, seed, args):
   return record
 
 
+def format_pairs(pairs):
+  """Lost of the true ones, of those the ones of right pose; kept false ones."""
+  if not pairs:
+    return '-'
+  return '%d (%d) of %d, %d of %d' % (
+      pairs['true_lost'], pairs['right_lost'], pairs['true'],
+      pairs['false_kept'], pairs['false'])
+
+
 def cells(outcome):
   if not outcome:
-    return ['', '', '']
+    return ['', '', '', '']
   if 'error' in outcome or outcome['rmse_m'] is None:
-    return ['-', '-', outcome['verdict']]
+    return ['-', '-', outcome['verdict'], '-']
   return ['%d' % outcome['images'] + (
       ' in %d models' % outcome['models'] if outcome['models'] > 1 else ''),
-          '%.3f' % outcome['rmse_m'], outcome['verdict']]
+          '%.3f' % outcome['rmse_m'], outcome['verdict'],
+          format_pairs(outcome.get('pairs'))]
 
 
 def format_figure(name, value):
@@ -193,11 +206,14 @@ def report(records, args):
       'similarity (the worst model where there are several), with the logs and '
       'without any. The bar is 0.5 m (lanes: 0.1 m, GNSS alone: 1 m) and, '
       'without logs, at least %g %% of the way. Warnings about images and parts that '
-      'are left out do not count as warnings about a model.' % (
+      'are left out do not count as warnings about a model. Pairs: true ones that '
+      '`adasfm_global` left without matches (of those, with a pose within 1 deg and '
+      '10 deg of direction), of all true ones; false ones that it kept, of all '
+      'false ones; not counted where photos are matched.' % (
           args.seeds, 100 * MAX_DRIFT_WITHOUT_LOGS), '',
-      '| dial | seed | what the world has | images | m | verdict | images, no '
-      'logs | m | verdict |',
-      '|---|---|---|---|---|---|---|---|---|']
+      '| dial | seed | what the world has | images | m | verdict | pairs: true '
+      'lost, false kept | images, no logs | m | verdict | pairs |',
+      '|---|---|---|---|---|---|---|---|---|---|---|']
   for record in records:
     world = record.get('world', {})
     figures = ', '.join(format_figure(key, world[key])
