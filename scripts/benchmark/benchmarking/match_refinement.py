@@ -15,7 +15,7 @@ import zlib
 
 import numpy as np
 
-from benchmarking.methods import (list_models, make_coarse_model, run_mapper)
+from benchmarking.methods import list_models, make_coarse_model, run_mapper
 from benchmarking.models import read_truth
 from benchmarking.process import Failed, run
 from benchmarking.sets import camera_params, extract_and_match
@@ -25,12 +25,15 @@ CASES = {
     'look-alike places': ['--num_images', '250', '--alias_ratio', '0.05',
                           '--num_blackouts', '2', '--wheel_slips', '2'],
     'little texture': ['--num_images', '250', '--num_blackouts', '4',
-                       '--blackout_keypoints', '40', '--outlier_ratio', '0.8'],
-    'mirrored': ['--num_images', '40', '--image_width', '640',
+                       '--blackout_keypoints', '80', '--outlier_ratio', '0.7'],
+    'mirrored': ['--num_images', '48', '--seed', '2', '--image_width', '640',
                  '--image_height', '400', '--render', '1'],
 }
+# The importer sees that gyroscope and mirrored photos contradict each other, and
+# ends unless it is told to go on.
+IMPORT_OPTIONS = {'mirrored': {'import': ['--force', '1']}}
 # A pair is of little texture when one of its images has no more keypoints.
-FEW_KEYPOINTS = 40
+FEW_KEYPOINTS = 80
 NUM_MIRRORED = 14
 # Matches of photos are true up to this distance from both epipolar lines
 # together, as adasfm_global has it [px].
@@ -39,7 +42,9 @@ MAX_EPIPOLAR_PX = 4.0
 
 def spec_of(case):
   """What a row depends on."""
-  return [CASES[case], FEW_KEYPOINTS, NUM_MIRRORED, MAX_EPIPOLAR_PX]
+  return [CASES[case], IMPORT_OPTIONS.get(case)] + {
+      'little texture': [FEW_KEYPOINTS],
+      'mirrored': [NUM_MIRRORED, MAX_EPIPOLAR_PX]}.get(case, [])
 
 
 def make_case(case, args):
@@ -230,7 +235,7 @@ def run_case(case, args):
     record['mapper_before'] = map_with_colmap(
         database, os.path.join(folder, 'before'), world, args)
     args.timeout = None
-    make_coarse_model(folder, world, args, True, {})
+    make_coarse_model(folder, world, args, True, IMPORT_OPTIONS.get(case, {}))
     after = read_pairs(database, truth)
     record['after'] = count(after, hard, truth)
     record['mapper_after'] = map_with_colmap(

@@ -69,14 +69,14 @@ def draw_view_graph(record, args):
   visual, sensors, removed = (set(unpack(record[key]))
                               for key in ('visual', 'sensors', 'removed'))
   figure, panels = pyplot.subplots(1, 3, figsize=(13.0, 5.2))
-  for pairs, colour, width, label in (
-      (removed, ORANGE, 0.6, 'verified pair, removed as false'),
-      (visual, GREY, 0.6, 'verified pair, kept'),
-      (sensors - visual, BLUE, 4.0, 'sensor edge where no pair is verified')):
+  for pairs, colour, width, zorder, label in (
+      (removed, ORANGE, 0.6, 1, 'verified pair, removed as false'),
+      (visual, GREY, 4.0, 2, 'verified pair, kept'),
+      (sensors - visual, BLUE, 4.0, 4, 'sensor edge where no pair is verified')):
     panels[0].add_collection(LineCollection(
         _segments(truth, pairs), colors=colour, linewidths=width,
-        label='%s (%d)' % (label, len(pairs)), zorder=2 + 2 * (width > 1)))
-  panels[0].plot(*truth.T, '.', color=BLACK, markersize=2.5, zorder=3,
+        label='%s (%d)' % (label, len(pairs)), zorder=zorder))
+  panels[0].plot(*truth.T, '.', color=BLACK, markersize=2, zorder=3,
                  label='images (%d)' % len(truth))
   _plain_axes(panels[0], 'view graph, from above')
   for axes, key, title in ((panels[1], 'without', 'coarse, no augmentation'),

@@ -3,6 +3,7 @@
 
 from statistics import median
 
+from benchmarking.match_refinement import FEW_KEYPOINTS
 from benchmarking.merge_trials import LEVELS_M, THRESHOLDS
 from benchmarking.sets import REAL_SETS
 from benchmarking.view_graph import unpack
@@ -275,11 +276,14 @@ def refinement_section(cases):
   lines = ['## Match refinement', '',
            'Verified pairs of three hard kinds, before and after '
            '`adasfm_global`. Look-alike: more false matches than true ones. '
-           'Little texture: an image of the pair has at most 40 keypoints. '
+           'Little texture: an image of the pair has at most %d keypoints. '
            'Mirrored: photos in a bend, whose right half is the mirror image '
            'of the left one; a match is true there when it fits the true poses '
-           'within 4 px and is not in the mirror. The mapper of COLMAP 3.8 ran '
-           'on all pairs, before and after. Worlds: %s.' % worlds, '',
+           'within 4 px and is not in the mirror (the importer refuses this '
+           'drive, whose gyroscope contradicts the pictures, without `--force '
+           '1`). The mapper of COLMAP 3.8 ran '
+           'on all pairs, before and after. Worlds: %s.' % (
+               FEW_KEYPOINTS, worlds), '',
            *refinement_table(cases)]
   if any(r.get('example') for r in cases):
     lines += ['', '![Matches of a mirrored pair before and after]'
