@@ -299,6 +299,7 @@ class PageTest(unittest.TestCase):
         '0.300 | 0.080 | 0.070 |',
         '| verified pairs only | 2 | 3, 3 | 0.100, 0.100 |',
         '| 0.5 | 0.50 | adaptive | 12 of 18 | 32 | 0.80 | 0.3 | '
+        '0.10 (0.10 to 0.10) | '
         '0.400 (0.200 to 0.600) | 0.400 (0.200 to 0.600) |',
         '| look-alike places | look-alike places | after | 0 | - | - | 0.0 | '
         'no model |',

@@ -8,6 +8,7 @@ import matplotlib
 matplotlib.use('agg')
 from matplotlib import pyplot  # noqa: E402
 from matplotlib.collections import LineCollection  # noqa: E402
+from matplotlib.ticker import LogLocator  # noqa: E402
 
 from benchmarking.merge_trials import LEVELS_M, THRESHOLDS  # noqa: E402
 from benchmarking.paper_tables import (pairs_of_sets,  # noqa: E402
@@ -126,17 +127,23 @@ def _draw_trial(axes, records, field, with_priors, label):
 
 
 def draw_merge_trials(records, args):
-  figure, panels = pyplot.subplots(1, 3, figsize=(12.5, 3.9))
+  figure, panels = pyplot.subplots(2, 2, figsize=(9.6, 7.4))
+  panels = panels.ravel()
   _draw_trial(panels[0], records, 'merged', False, 'parts merged [%]')
-  _draw_trial(panels[1], records, 'rmse_m', False,
+  _draw_trial(panels[1], records, 'separator_rmse_m', False,
+              'merged parts apart, RMSE [m]')
+  _draw_trial(panels[2], records, 'rmse_m', False,
               'final error, no priors in adjustment [m]')
-  _draw_trial(panels[2], records, 'rmse_m', True,
+  _draw_trial(panels[3], records, 'rmse_m', True,
               'final error, with priors [m]')
-  panels[1].set_yscale('log')
-  panels[1].yaxis.set_major_formatter('{x:g}')
-  panels[2].set_ylim(0, None)
+  for axes in panels[1:3]:
+    axes.set_yscale('log')
+    axes.yaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
+    axes.yaxis.set_major_formatter('{x:g}')
+    axes.yaxis.set_minor_formatter('')
   panels[0].set_ylim(-4, 104)
-  panels[2].legend(fontsize='small', loc='lower right')
+  panels[3].set_ylim(0, None)
+  panels[3].legend(fontsize='small', loc='lower right')
   figure.tight_layout()
   save(figure, args, 'paper_merge_trials.svg')
 

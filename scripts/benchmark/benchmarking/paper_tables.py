@@ -94,6 +94,8 @@ def trial_values(records, level_m, threshold, with_priors, field):
   """One value for each seed at which the run gave it."""
   found = [r[threshold] for r in records
            if r['level_m'] == level_m and r['with_priors'] == with_priors]
+  if field == 'separator_rmse_m':  # between parts: there must be two
+    found = [f for f in found if f.get('merged', 0) > 1]
   return [f[field] for f in found if f.get(field) is not None]
 
 
@@ -113,8 +115,8 @@ def _spread(values, form='%.3f'):
 def merge_table(records):
   lines = ['| disturbed by m | coarse error m | threshold m | parts merged | '
            'images at coarse poses | inlier ratio, median part | threshold used '
-           '| error without priors m | with priors m |',
-           '|---:|---:|---|---:|---:|---:|---:|---|---|']
+           '| parts apart m | error without priors m | with priors m |',
+           '|---:|---:|---|---:|---:|---:|---:|---|---|---|']
   for level_m in (0,) + LEVELS_M:
     coarse = [r['coarse_rmse_m'] for r in records if r['level_m'] == level_m]
     for threshold in THRESHOLDS:
@@ -122,29 +124,40 @@ def merge_table(records):
         return trial_values(records, level_m, threshold, with_priors, field)
 
       merged, parts = sum(values('merged')), sum(values('parts'))
-      lines.append('| %g | %s | %s | %d of %d | %s | %s | %s | %s | %s |' % (
+      lines.append('| %g | %s | %s | %d of %d | %s | %s | %s | %s | %s | %s |' % (
           level_m, _median(coarse, '%.2f'), threshold, merged, parts,
           _median(values('coarse_images'), '%.0f'),
           _median([median(v) for v in values('inlier_ratios')], '%.2f'),
           _median([median(v) for v in values('thresholds_m')], '%.1f'),
+          _spread(values('separator_rmse_m'), '%.2f'),
           _spread(values('rmse_m')), _spread(values('rmse_m', True))))
   return lines
 
 
 def best_thresholds(records):
-  """For each level and mode, which threshold has the smallest median error."""
+  """Which threshold has the smallest median error at which level, and where the
+  adaptive one's range of errors lies apart from those of all others."""
   words = []
   for with_priors, name in ((False, 'without priors'), (True, 'with priors')):
-    won = {}
+    won, apart = {}, []
     for level_m in LEVELS_M:
-      medians = {t: median(values) for t in THRESHOLDS if (
+      errors = {t: values for t in THRESHOLDS if (
           values := trial_values(records, level_m, t, with_priors, 'rmse_m'))}
-      if medians:
-        won.setdefault(min(medians, key=medians.get), []).append('%g m' % level_m)
-    words.append('%s: %s' % (name, '; '.join(
-        '%s at %s' % (t + ('' if t == 'adaptive' else ' m'), ', '.join(levels))
-        for t, levels in won.items())))
-  return 'Smallest median error ' + '. '.join(words) + '.'
+      if 'adaptive' not in errors:
+        continue
+      best = min(errors, key=lambda t: median(errors[t]))
+      won.setdefault(best, []).append('%g m' % level_m)
+      if max(errors['adaptive']) < min(min(values) for t, values in
+                                       errors.items() if t != 'adaptive'):
+        apart.append('%g m' % level_m)
+    words.append('Smallest median error %s: %s. The adaptive threshold\'s errors '
+                 'are below all others %s.' % (name, '; '.join(
+                     '%s at %s' % (t if t == 'adaptive' else t + ' m',
+                                   ', '.join(levels))
+                     for t, levels in won.items()),
+                               'at ' + ', '.join(apart) if apart else
+                               'at no disturbance: the ranges overlap'))
+  return ' '.join(words)
 
 
 def _model_cell(models):
@@ -262,7 +275,9 @@ def merge_section(trials):
           'in a row, ten times as far beside the way. Parts have 50 images '
           '(`--AdaSfmPartition.max_part_size 50`); a part whose inlier ratio is '
           'below 0.7 is not merged, and its images begin at the coarse poses. '
-          'Medians of three disturbances, with their range; without priors is '
+          'Parts apart: RMSE between the places of an image in two parts, before '
+          'the parts are relaxed. Medians of three disturbances, with their '
+          'range; without priors is '
           '`--AdaSfmMapper.use_priors_in_adjustment 0`. No threshold exceeds '
           'a tenth of its part: 10 m became what the table says.', '',
           '![Merged parts and errors over the disturbance]'
