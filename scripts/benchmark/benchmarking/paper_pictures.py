@@ -142,7 +142,7 @@ def draw_merge_trials(records, args):
     axes.yaxis.set_major_formatter('{x:g}')
     axes.yaxis.set_minor_formatter('')
   panels[0].set_ylim(-4, 104)
-  panels[3].set_ylim(0, None)
+  panels[3].set_ylim(0, 1.1 * panels[3].get_ylim()[1])
   panels[3].legend(fontsize='small', loc='lower right')
   figure.tight_layout()
   save(figure, args, 'paper_merge_trials.svg')
