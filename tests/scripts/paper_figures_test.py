@@ -20,11 +20,12 @@ import paper_figures  # noqa: E402
 from benchmarking import (match_refinement, merge_trials, models,  # noqa: E402
                           paper_tables, view_graph)
 from benchmarking.ledger import Ledger, make_stamp  # noqa: E402
+from benchmarking.pair_counts import rotation_matrix  # noqa: E402
 from benchmarking.pages import write_table  # noqa: E402
 
 
 def random_rotation(generator):
-  return models.rotation_of(generator.normal(size=4))
+  return rotation_matrix(generator.normal(size=4))
 
 
 def drive(num_images):
@@ -56,7 +57,7 @@ class ModelsTest(unittest.TestCase):
       rotation = random_rotation(generator)
       self.assertAlmostEqual(np.linalg.det(rotation), 1.0)
       np.testing.assert_allclose(
-          models.rotation_of(models.quaternion_of(rotation)), rotation,
+          rotation_matrix(models.quaternion_of(rotation)), rotation,
           atol=1e-12)
 
   def test_replaced_poses_are_read_again_and_points_stay(self):
@@ -148,7 +149,7 @@ class MatchRefinementTest(unittest.TestCase):
     truth = self.truth('mirrored')
     truth.calibration = np.array([[400., 0, 320], [0, 400, 200], [0, 0, 1]])
     angle = np.radians(10) / 2
-    turn = models.rotation_of([np.cos(angle), 0, np.sin(angle), 0])
+    turn = rotation_matrix([np.cos(angle), 0, np.sin(angle), 0])
     truth.poses = {'a': (np.eye(3), np.zeros(3)),
                    'b': (turn, np.array([0.3, 0.1, -1.0]))}
     world = np.array([[-3., 1, 9], [-4, -2, 12], [3, 1, 8], [-2, 2, 10]])
@@ -171,7 +172,7 @@ class MatchRefinementTest(unittest.TestCase):
     poses = {}
     for k in range(12):
       angle = np.radians(min(max(k - 5, 0), 3) * 20) / 2
-      poses['%02d' % k] = (models.rotation_of(
+      poses['%02d' % k] = (rotation_matrix(
           [np.cos(angle), 0, 0, np.sin(angle)]), np.zeros(3))
     self.assertEqual(match_refinement.sharpest_bend(poses, 4),
                      ['05', '06', '07', '08'])

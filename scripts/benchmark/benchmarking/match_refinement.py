@@ -16,10 +16,10 @@ import zlib
 import numpy as np
 
 from benchmarking.methods import list_models, make_coarse_model, run_mapper
-from benchmarking.models import read_truth
+from benchmarking.pair_counts import (angle_deg, read_landmarks, read_pairs,
+                                      read_true_poses, relative_pose)
 from benchmarking.process import Failed, run
 from benchmarking.sets import camera_params, extract_and_match
-from benchmarking.view_graph import MAX_NUM_IMAGES
 
 CASES = {
     'look-alike places': ['--num_images', '250', '--alias_ratio', '0.05',
@@ -68,7 +68,7 @@ def make_case(case, args):
 
 
 def turn_deg(a, b):
-  return np.degrees(np.arccos(np.clip((np.trace(a.T @ b) - 1) / 2, -1, 1)))
+  return angle_deg((np.trace(a.T @ b) - 1) / 2)
 
 
 def sharpest_bend(truth, count):
@@ -83,7 +83,7 @@ def sharpest_bend(truth, count):
 def mirror_photos(folder):
   """Mirrors the left half of the photos in the sharpest bend onto the right."""
   from matplotlib import pyplot
-  names = sharpest_bend(read_truth(os.path.join(folder, 'gt.txt')),
+  names = sharpest_bend(read_true_poses(os.path.join(folder, 'gt.txt')),
                         NUM_MIRRORED)
   for name in names:
     path = os.path.join(folder, 'images', name)
@@ -94,22 +94,16 @@ def mirror_photos(folder):
   return names
 
 
-def read_landmarks(path):
-  with open(path) as file:
-    return {fields[0]: np.array(fields[1:], int)
-            for fields in (line.split() for line in file) if fields}
-
-
 class Truth:
   """Which matches of a case's database are true, and which pairs are hard."""
 
   def __init__(self, case, folder):
     self.case, self.folder = case, folder
-    self.poses = read_truth(os.path.join(folder, 'gt.txt'))
+    self.poses = read_true_poses(os.path.join(folder, 'gt.txt'))
     connection = sqlite3.connect(os.path.join(folder, 'database.db'))
-    self.names = dict(connection.execute('SELECT image_id, name FROM images'))
+    names = dict(connection.execute('SELECT image_id, name FROM images'))
     self.points = {
-        self.names[image_id]: np.frombuffer(data, np.float32).reshape(
+        names[image_id]: np.frombuffer(data, np.float32).reshape(
             rows, columns)[:, :2].astype(float) if rows else np.zeros((0, 2))
         for image_id, rows, columns, data in connection.execute(
             'SELECT image_id, rows, cols, data FROM keypoints')}
@@ -126,8 +120,7 @@ class Truth:
       self.landmarks = read_landmarks(os.path.join(folder, 'landmarks.txt'))
 
   def epipolar_errors(self, a, b, matches):
-    (r1, t1), (r2, t2) = self.poses[a], self.poses[b]
-    r, t = r2 @ r1.T, t2 - r2 @ r1.T @ t1
+    r, t = relative_pose((a, b), self.poses)
     cross = np.array([[0, -t[2], t[1]], [t[2], 0, -t[0]], [-t[1], t[0], 0]])
     inverse = np.linalg.inv(self.calibration)
     f = inverse.T @ cross @ r @ inverse
@@ -158,17 +151,9 @@ class Truth:
     return min(len(self.points[a]), len(self.points[b])) <= FEW_KEYPOINTS
 
 
-def read_pairs(database, truth):
+def read_matches(database):
   """{(name, name): matches (N, 2)} of the verified pairs."""
-  connection = sqlite3.connect(database)
-  pairs = {}
-  for pair_id, rows, data in connection.execute(
-      'SELECT pair_id, rows, data FROM two_view_geometries WHERE rows > 0'):
-    a, b = divmod(pair_id, MAX_NUM_IMAGES)
-    pairs[truth.names[a], truth.names[b]] = np.frombuffer(
-        data, np.uint32).reshape(rows, 2)
-  connection.close()
-  return pairs
+  return {names: pair[0] for names, pair in read_pairs(database).items()}
 
 
 def count(pairs, hard, truth):
@@ -228,7 +213,7 @@ def run_case(case, args):
   truth = Truth(case, world)
   record = {'case': case, 'options': ' '.join(CASES[case])}
   try:
-    before = read_pairs(database, truth)
+    before = read_matches(database)
     hard = {pair for pair, matches in before.items()
             if truth.is_hard(*pair, truth.are_true(*pair, matches))}
     record['before'] = count(before, hard, truth)
@@ -236,7 +221,7 @@ def run_case(case, args):
         database, os.path.join(folder, 'before'), world, args)
     args.timeout = None
     make_coarse_model(folder, world, args, True, IMPORT_OPTIONS.get(case, {}))
-    after = read_pairs(database, truth)
+    after = read_matches(database)
     record['after'] = count(after, hard, truth)
     record['mapper_after'] = map_with_colmap(
         database, os.path.join(folder, 'after'), world, args)

@@ -9,8 +9,8 @@ import shutil
 import numpy as np
 
 from benchmarking.methods import evaluate
-from benchmarking.models import (centre_of, read_model, replace_poses,
-                                 rotation_of)
+from benchmarking.models import centre_of, read_model, replace_poses
+from benchmarking.pair_counts import rotation_matrix
 from benchmarking.process import Failed, run
 
 # Amplitudes of the disturbance [m], its seeds, and thresholds [m].
@@ -51,7 +51,7 @@ def disturb(poses, sigma_m, seed):
   result = {}
   for name, centre in zip(names, centres + shifts):
     angle = np.radians(DEG_PER_M * sigma_m) * generator.normal(size=3)
-    rotation = rotation_of([1.0, *(angle / 2)]) @ poses[name][0]
+    rotation = rotation_matrix([1.0, *(angle / 2)]) @ poses[name][0]
     result[name] = rotation, -rotation @ centre
   return result
 

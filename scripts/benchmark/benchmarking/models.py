@@ -1,19 +1,12 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Poses of COLMAP's binary models and of gt.txt, with numpy."""
+"""Poses of COLMAP's binary models."""
 
 import os
 import struct
 
 import numpy as np
 
-
-def rotation_of(qvec):
-  """3x3 of a quaternion w, x, y, z."""
-  w, x, y, z = np.asarray(qvec, float) / np.linalg.norm(qvec)
-  return np.array([
-      [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
-      [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
-      [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)]])
+from benchmarking.pair_counts import rotation_matrix
 
 
 def quaternion_of(rotation):
@@ -30,18 +23,6 @@ def quaternion_of(rotation):
 
 def centre_of(rotation, translation):
   return -rotation.T @ translation
-
-
-def read_truth(path):
-  """{name: (R, t)}, cam_from_world."""
-  poses = {}
-  with open(path) as file:
-    for line in file:
-      fields = line.split()
-      if len(fields) == 8 and not line.startswith('#'):
-        values = [float(x) for x in fields[1:]]
-        poses[fields[0]] = rotation_of(values[:4]), np.array(values[4:])
-  return poses
 
 
 def _walk_images(data):
@@ -62,7 +43,7 @@ def read_model(folder):
   poses = {}
   for at, name in _walk_images(data):
     values = struct.unpack_from('<7d', data, at)
-    poses[name] = rotation_of(values[:4]), np.array(values[4:])
+    poses[name] = rotation_matrix(values[:4]), np.array(values[4:])
   return poses
 
 

@@ -8,9 +8,9 @@ import sqlite3
 import numpy as np
 
 from benchmarking.methods import evaluate, make_coarse_model
-from benchmarking.models import centre_of, read_model, read_truth
+from benchmarking.models import centre_of, read_model
+from benchmarking.pair_counts import MAX_PAIR_IMAGES, read_true_poses
 
-MAX_NUM_IMAGES = 2147483647  # COLMAP's: pair_id = this * id1 + id2
 VARIANTS = {'with': [], 'without': ['--AdaSfmGlobal.use_augmentation', '0']}
 
 
@@ -41,7 +41,7 @@ def read_edges(database, names, sensors=False):
     pairs = connection.execute('SELECT image_id1, image_id2 FROM '
                                'adasfm_relative_pose_priors').fetchall()
   else:
-    pairs = [divmod(row[0], MAX_NUM_IMAGES) for row in connection.execute(
+    pairs = [divmod(row[0], MAX_PAIR_IMAGES) for row in connection.execute(
         'SELECT pair_id FROM two_view_geometries WHERE rows > 0')]
   connection.close()
   return {tuple(sorted((place[a], place[b]))) for a, b in pairs}
@@ -78,13 +78,13 @@ def run_coarse(variant, world, args):
         'se3_rmse_m': figures['se3_least_squares']['translation_rmse_m'],
         'scale': figures['sim3_least_squares']['scale'],
         'centres': pack_points(place_at_first_camera(
-            read_model(path), read_truth(truth_path)))})
+            read_model(path), read_true_poses(truth_path)))})
   return database, models
 
 
 def run_view_graph(world, args):
   """The record of the picture; world has database.db, logs and truth."""
-  truth = read_truth(os.path.join(world, 'gt.txt'))
+  truth = read_true_poses(os.path.join(world, 'gt.txt'))
   names = sorted(truth)
   before = read_edges(os.path.join(world, 'database.db'), names)
   record = {'truth': pack_points([centre_of(*truth[n])[:2] for n in names])}
