@@ -214,6 +214,7 @@ def all_records():
       'refinement, look-alike places': {
           'case': 'look-alike places', 'options': '--num_images 9',
           'before': counts, 'after': gone, 'mapper_after': [],
+          'coarse': [{'images': 9, 'rmse_m': 0.013}],
           'mapper_before': [{'images': 3, 'rmse_m': 44.0},
                             {'images': 2, 'rmse_m': 0.1}]},
       'refinement, little texture': {
@@ -222,6 +223,7 @@ def all_records():
       'refinement, mirrored': {
           'case': 'mirrored', 'options': '--render 1', 'before': counts,
           'after': counts, 'mapper_before': [], 'mapper_after': [],
+          'coarse': [],
           'example': {'names': ['no.png', 'photo.png'], 'photos': 'gone',
                       'before': '1,2,3,4,0',
                       'after': ''}}}
@@ -303,7 +305,7 @@ class PageTest(unittest.TestCase):
         '0.10 (0.10 to 0.10) | '
         '0.400 (0.200 to 0.600) | 0.400 (0.200 to 0.600) |',
         '| look-alike places | look-alike places | after | 0 | - | - | 0.0 | '
-        'no model |',
+        'no model | 9 images, 0.013 m |',
         '3 + 2 images, 44.000, 0.100 m', 'mapper ended with 1'):
       self.assertIn(line, text)
     self.assertIn('not been run on kitti06-51', text)

@@ -15,7 +15,8 @@ import zlib
 
 import numpy as np
 
-from benchmarking.methods import list_models, make_coarse_model, run_mapper
+from benchmarking.methods import (evaluate, list_models, make_coarse_model,
+                                  run_mapper)
 from benchmarking.pair_counts import (angle_deg, read_landmarks, read_pairs,
                                       read_true_poses, relative_pose)
 from benchmarking.process import Failed, run
@@ -42,7 +43,7 @@ MAX_EPIPOLAR_PX = 4.0
 
 def spec_of(case):
   """What a row depends on."""
-  return [CASES[case], IMPORT_OPTIONS.get(case)] + {
+  return [CASES[case], IMPORT_OPTIONS.get(case), 'coarse model'] + {
       'little texture': [FEW_KEYPOINTS],
       'mirrored': [NUM_MIRRORED, MAX_EPIPOLAR_PX]}.get(case, [])
 
@@ -221,6 +222,12 @@ def run_case(case, args):
         database, os.path.join(folder, 'before'), world, args)
     args.timeout = None
     make_coarse_model(folder, world, args, True, IMPORT_OPTIONS.get(case, {}))
+    coarse = evaluate(os.path.join(folder, 'global'),
+                      os.path.join(world, 'gt.txt'), args,
+                      os.path.join(folder, 'run.log'))
+    record['coarse'] = [{'images': coarse['num_images'],
+                         'rmse_m': coarse['sim3_least_squares']
+                                   ['translation_rmse_m']}]
     after = read_matches(database)
     record['after'] = count(after, hard, truth)
     record['mapper_after'] = map_with_colmap(

@@ -9,6 +9,7 @@ matplotlib.use('agg')
 from matplotlib import pyplot  # noqa: E402
 from matplotlib.collections import LineCollection  # noqa: E402
 from matplotlib.ticker import LogLocator  # noqa: E402
+from PIL import Image  # noqa: E402
 
 from benchmarking.merge_trials import LEVELS_M, THRESHOLDS  # noqa: E402
 from benchmarking.paper_tables import (pairs_of_sets,  # noqa: E402
@@ -17,13 +18,23 @@ from benchmarking.view_graph import unpack, unpack_points  # noqa: E402
 
 BLUE, ORANGE, GREEN, PURPLE = '#0072B2', '#D55E00', '#009E73', '#CC79A7'
 GREY, YELLOW, BLACK = '#999999', '#E69F00', '#000000'
+NUM_COLOURS = 32
+# So many matches of a pair are drawn.
+NUM_LINES = 90
 
 
 def save(figure, args, name):
   os.makedirs(args.images_path, exist_ok=True)
   path = os.path.join(args.images_path, name)
-  metadata = {'Date': None} if name.endswith('.svg') else {'Software': None}
-  figure.savefig(path, metadata=metadata, facecolor='white', dpi=110)
+  if name.endswith('.svg'):
+    figure.savefig(path, metadata={'Date': None}, facecolor='white')
+  else:
+    figure.savefig(path, metadata={'Software': None}, facecolor='white',
+                   dpi=110)
+    # Few colours make a small file.
+    with Image.open(path) as picture:
+      small = picture.convert('RGB').quantize(NUM_COLOURS, dither=0)
+    small.save(path, optimize=True)
   pyplot.close(figure)
 
 
@@ -148,7 +159,8 @@ def draw_merge_trials(records, args):
   save(figure, args, 'paper_merge_trials.svg')
 
 
-def _draw_matches(axes, photos, matches, title):
+def _draw_matches(axes, photos, matches, step, title):
+  """Every step-th match as a line; the legend counts all."""
   height, width = photos[0].shape[:2]
   gap = 12
   for k, photo in enumerate(photos):
@@ -158,8 +170,8 @@ def _draw_matches(axes, photos, matches, title):
   for true, colour, style in ((0, ORANGE, '--'), (1, '#56B4E9', '-')):
     chosen = [m for m in matches if m[4] == true]
     axes.add_collection(LineCollection(
-        [((m[0], m[1]), (m[2] + width + gap, m[3])) for m in chosen],
-        colors=colour, linewidths=0.7, linestyles=style,
+        [((m[0], m[1]), (m[2] + width + gap, m[3])) for m in chosen[::step]],
+        colors=colour, linewidths=1.0, linestyles=style,
         label='%d %s' % (len(chosen), 'true' if true else 'false')))
   axes.set_xlim(0, 2 * width + gap)
   axes.set_ylim(height, 0)
@@ -179,12 +191,14 @@ def draw_mirrored_pair(example, args):
   photos = [p[..., :3].mean(axis=2)[::2, ::2] if p.ndim == 3 else p[::2, ::2]
             for p in photos]
   figure, panels = pyplot.subplots(2, 1, figsize=(7.2, 5.2))
+  step = 1 + len(example['before'].split()) // NUM_LINES
   for axes, key, title in ((panels[0], 'before', 'as COLMAP verified them'),
                            (panels[1], 'after', 'after adasfm_global')):
     matches = [[float(v) for v in word.split(',')]
                for word in example[key].split()]
     matches = [[0.5 * v for v in m[:4]] + [m[4]] for m in matches]
-    _draw_matches(axes, photos, matches, title)
+    _draw_matches(axes, photos, matches, step,
+                  '%s (every %dth match)' % (title, step))
   figure.tight_layout()
   save(figure, args, 'paper_mirrored_pair.png')
 

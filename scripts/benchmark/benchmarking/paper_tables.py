@@ -170,23 +170,25 @@ def _model_cell(models):
 
 def refinement_table(records):
   lines = ['| case | pairs | | number | matches a pair | precision % | '
-           'true matches kept % | COLMAP mapper on all pairs |',
-           '|---|---|---|---:|---:|---:|---:|---|']
+           'true matches kept % | COLMAP mapper on all pairs | coarse model |',
+           '|---|---|---|---:|---:|---:|---:|---|---|']
   for record in records:
     if 'after' not in record:
-      lines.append('| %s | %s | | | | | | |' % (record['case'],
-                                               record.get('error')))
+      lines.append('| %s | %s | | | | | | | |' % (
+          record['case'], record.get('error')))
       continue
     for kind, label in (('hard', record['case']), ('other', 'all others')):
       for when in ('before', 'after'):
         f = record[when][kind]
         true_before = max(1, record['before'][kind]['true'])
-        lines.append('| %s | %s | %s | %d | %s | %s | %s | %s |' % (
+        lines.append('| %s | %s | %s | %d | %s | %s | %s | %s | %s |' % (
             record['case'], label, when, f['pairs'],
             '%.1f' % (f['matches'] / f['pairs']) if f['pairs'] else '-',
             '%.2f' % (100 * f['true'] / f['matches']) if f['matches'] else '-',
             '' if when == 'before' else '%.1f' % (100 * f['true'] / true_before),
-            _model_cell(record['mapper_' + when]) if kind == 'hard' else ''))
+            _model_cell(record['mapper_' + when]) if kind == 'hard' else '',
+            _model_cell(record['coarse']) if kind == 'hard' and
+            when == 'after' else ''))
   return lines
 
 
@@ -297,7 +299,9 @@ def refinement_section(cases):
            'within 4 px and is not in the mirror (the importer refuses this '
            'drive, whose gyroscope contradicts the pictures, without `--force '
            '1`). The mapper of COLMAP 3.8 ran '
-           'on all pairs, before and after. Worlds: %s.' % (
+           'on all pairs, before and after; the coarse model is that of '
+           '`adasfm_global`. The false matches that are left fit the epipolar '
+           'lines of the global poses. Worlds: %s.' % (
                FEW_KEYPOINTS, worlds), '',
            *refinement_table(cases)]
   if any(r.get('example') for r in cases):
