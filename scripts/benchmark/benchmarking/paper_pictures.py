@@ -18,12 +18,12 @@ from benchmarking.view_graph import unpack, unpack_points  # noqa: E402
 
 BLUE, ORANGE, GREEN, PURPLE = '#0072B2', '#D55E00', '#009E73', '#CC79A7'
 GREY, YELLOW, BLACK = '#999999', '#E69F00', '#000000'
-NUM_COLOURS = 32
 # So many matches of a pair are drawn.
 NUM_LINES = 90
 
 
-def save(figure, args, name):
+def save(figure, args, name, num_colours=0):
+  """A PNG of few colours makes a small file of photos."""
   os.makedirs(args.images_path, exist_ok=True)
   path = os.path.join(args.images_path, name)
   if name.endswith('.svg'):
@@ -31,9 +31,9 @@ def save(figure, args, name):
   else:
     figure.savefig(path, metadata={'Software': None}, facecolor='white',
                    dpi=110)
-    # Few colours make a small file.
+  if num_colours:
     with Image.open(path) as picture:
-      small = picture.convert('RGB').quantize(NUM_COLOURS, dither=0)
+      small = picture.convert('RGB').quantize(num_colours, dither=0)
     small.save(path, optimize=True)
   pyplot.close(figure)
 
@@ -200,7 +200,7 @@ def draw_mirrored_pair(example, args):
     _draw_matches(axes, photos, matches, step,
                   '%s (every %dth match)' % (title, step))
   figure.tight_layout()
-  save(figure, args, 'paper_mirrored_pair.png')
+  save(figure, args, 'paper_mirrored_pair.png', num_colours=32)
 
 
 def draw_all(records, two_view, args):
