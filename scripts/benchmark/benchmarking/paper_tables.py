@@ -151,13 +151,13 @@ def best_thresholds(records):
       if max(errors['adaptive']) < min(min(values) for t, values in
                                        errors.items() if t != 'adaptive'):
         apart.append('%g m' % level_m)
-    words.append('Smallest median error %s: %s. The adaptive threshold\'s errors '
-                 'are below all others %s.' % (name, '; '.join(
+    words.append('Smallest median error %s: %s. The adaptive threshold errs less '
+                 'than all others %s.' % (name, '; '.join(
                      '%s at %s' % (t if t == 'adaptive' else t + ' m',
                                    ', '.join(levels))
                      for t, levels in won.items()),
-                               'at ' + ', '.join(apart) if apart else
-                               'at no disturbance: the ranges overlap'))
+                               'in all trials at ' + ', '.join(apart) if apart
+                               else 'at none of them: the ranges overlap'))
   return ' '.join(words)
 
 
