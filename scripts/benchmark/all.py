@@ -198,6 +198,13 @@ STEPS = {
                                         '--data_path', args.data_path,
                                         '--features_path', os.path.join(
                                             args.output_path, 'features')),
+    # After readme and two_view, whose figures it takes.
+    'paper': lambda args: run_script(
+        args, 'paper', 'paper_figures.py', '--data_path', args.data_path,
+        '--features_path', os.path.join(args.output_path, 'features'),
+        '--benchmark_path', os.path.join(args.figures_path, 'benchmark.json'),
+        '--two_view_path', os.path.join(args.figures_path, 'two_view.json'),
+        '--images_path', os.path.join(args.docs_root, 'docs', 'images')),
     'stress_worlds': lambda args: run_script(args, 'stress_worlds',
                                              'stress_worlds.py'),
     'global_results': lambda args: run_script(
