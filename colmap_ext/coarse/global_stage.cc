@@ -8,6 +8,7 @@
 #include "colmap_ext/coarse/join_models.h"
 #include "colmap_ext/coarse/measure_size.h"
 #include "colmap_ext/coarse/refine_stage_matches.h"
+#include "colmap_ext/coarse/split_models.h"
 #include "colmap_ext/scene/scene_bearings.h"
 #include "core/option_checker.h"
 #include "core/release_memory.h"
@@ -231,7 +232,7 @@ StatusOr<GlobalStageResult> RunGlobalStage(
   structure_options.bundle.shared_errors.length_drift_ratio =
       scene.length_drift_ratio;
   const std::map<ImagePair, std::vector<FeatureMatch>> all_matches =
-      result.poses.components.size() > 1
+      result.poses.components.size() > 1 || !result.poses.components[0].metric
           ? correspondences.matches
           : std::map<ImagePair, std::vector<FeatureMatch>>();
   for (const CoarseComponent& component : result.poses.components) {
@@ -247,13 +248,18 @@ StatusOr<GlobalStageResult> RunGlobalStage(
     result.steps.push_back(
         {"structure", watch.Seconds(), DescribeModel(result.models.back())});
   }
+  const int num_split = SplitModels(options, scene, correspondences.bearings,
+                                    all_matches, &result);
   if (result.models.size() > 1) {
     watch = begin("joins of models", 0.85);
     const int num_joins = JoinModels(options, scene, correspondences.bearings,
                                      all_matches, &result);
-    result.steps.push_back(
-        {"joins of models", watch.Seconds(),
-         std::to_string(num_joins) + " of parts whose points tell their size"});
+    if (num_split > 0 || num_joins > 0) SortModels(&result);
+    result.steps.push_back({"joins of models", watch.Seconds(),
+                            std::to_string(num_joins) +
+                                " of parts whose points tell their size, " +
+                                std::to_string(num_split) +
+                                " parts taken out that no points tie"});
   }
   MeasurePairAgreements(options, scene, correspondences.bearings, &result);
 

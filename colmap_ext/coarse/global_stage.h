@@ -68,7 +68,7 @@ using StageProgress = std::function<void(const std::string&, double)>;
 //   2.1      view graph                  BuildInitialViewGraph
 //   2.1-2.6  coarse poses                EstimateCoarsePoses
 //   2.7      tracks, points, adjustment  BuildCoarseModel, per component
-//            joins of adjusted models    JoinModels
+//            parts that nothing ties     SplitModels, JoinModels
 //   2.8      match refinement            RefineMatches
 //   2.9      metres without wheels       MeasureSize, per component
 // The scene is read with original two-view geometries; raw matches, those of

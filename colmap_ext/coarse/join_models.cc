@@ -240,7 +240,8 @@ bool ModelJoiner::Adjust(const std::set<int>& models,
   return true;
 }
 
-// Drops emptied models, and sorts the rest, largest first.
+}  // namespace
+
 void SortModels(GlobalStageResult* result) {
   std::vector<size_t> order;
   for (size_t k = 0; k < result->models.size(); ++k) {
@@ -262,16 +263,11 @@ void SortModels(GlobalStageResult* result) {
   result->poses.components = std::move(components);
 }
 
-}  // namespace
-
 int JoinModels(const GlobalStageOptions& options, const SceneData& scene,
                const std::map<image_t, std::vector<Bearing>>& bearings,
                const std::map<ImagePair, std::vector<FeatureMatch>>& matches,
                GlobalStageResult* result) {
-  const int num_joins =
-      ModelJoiner(options, scene, bearings, matches, result).Run();
-  if (num_joins > 0) SortModels(result);
-  return num_joins;
+  return ModelJoiner(options, scene, bearings, matches, result).Run();
 }
 
 }  // namespace adasfm

@@ -22,10 +22,14 @@ namespace adasfm {
 // whose size is known to 5 % are made, the best first, and each new model is
 // adjusted as a whole; it takes the parts' place where the verified pairs agree
 // with it.
-// Returns the number of joins made. On failure: the models stay apart.
+// Returns the number of joins made; models that went into another one are left
+// empty. On failure: the models stay apart.
 int JoinModels(const GlobalStageOptions& options, const SceneData& scene,
                const std::map<image_t, std::vector<Bearing>>& bearings,
                const std::map<ImagePair, std::vector<FeatureMatch>>& matches,
                GlobalStageResult* result);
+
+// Drops empty models, and sorts the rest, largest first.
+void SortModels(GlobalStageResult* result);
 
 }  // namespace adasfm

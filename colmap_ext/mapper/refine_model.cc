@@ -15,6 +15,7 @@
 #include "colmap_ext/mapper/prior_support.h"
 #include "colmap_ext/mapper/register_image.h"
 #include "colmap_ext/scene/georeference.h"
+#include "colmap_ext/scene/untied_parts.h"
 #include "core/disjoint_sets.h"
 #include "core/release_memory.h"
 
@@ -63,6 +64,7 @@ class ModelRefiner {
     Adjust(1e-6, FindPriors(), &summary_.keypoint_sigma_factor);
     Filter(local_.filter_max_reproj_error_px);
     LeaveOutUnsupportedImages();
+    LeaveOutUntiedParts();
   }
 
  private:
@@ -269,6 +271,18 @@ class ModelRefiner {
       }
       scene_.mapper.Deregister(image_id);
       ++summary_.num_images_left_out;
+    }
+  }
+
+  // Their poses are right among themselves only.
+  void LeaveOutUntiedParts() {
+    if (!scene_.data->positions.empty()) return;
+    for (const std::set<image_t>& part :
+         FindUntiedParts(scene_.priors, reconstruction_)) {
+      for (const image_t image_id : part) {
+        scene_.mapper.Deregister(image_id);
+        ++summary_.num_images_left_out;
+      }
     }
   }
 
