@@ -209,7 +209,8 @@ def report(records, args):
       'are left out do not count as warnings about a model. Pairs: true ones that '
       '`adasfm_global` left without matches (of those, with a pose within 1 deg and '
       '10 deg of direction), of all true ones; false ones that it kept, of all '
-      'false ones; not counted where photos are matched.' % (
+      'false ones, at most half of whose matches see one thing that stands still; '
+      'not counted where photos are matched.' % (
           args.seeds, 100 * MAX_DRIFT_WITHOUT_LOGS), '',
       '| dial | seed | what the world has | images | m | verdict | pairs: true '
       'lost, false kept | images, no logs | m | verdict | pairs |',
