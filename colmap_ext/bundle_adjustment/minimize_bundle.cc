@@ -83,6 +83,7 @@ class BundleMinimizer {
       : options_(options),
         reducer_(bundle, options.num_threads),
         region_(options.initial_radius) {
+    if (!HasFreePoses()) return;
     factorization_.analyzePattern(reducer_.Matrix().Matrix());
     max_num_gradients_ =
         static_cast<int>(factorization_.NumOperations() /
@@ -103,6 +104,8 @@ class BundleMinimizer {
         return Finish(true, "no gradient is left");
       }
       if (!std::isfinite(cost_)) return Finish(false, "the cost is infinite");
+      // CHOLMOD has no factor of nothing.
+      if (!HasFreePoses()) return Finish(true, "no pose is free");
       if (Iterate()) return summary_;
       if (region_.Radius() <= kMinRadius) {
         return Finish(true, "no step is small enough");
@@ -111,6 +114,8 @@ class BundleMinimizer {
   }
 
  private:
+  bool HasFreePoses() { return reducer_.Matrix().Matrix().rows() > 0; }
+
   MinimizeBundleSummary Finish(bool success, const std::string& message) {
     summary_.success = success;
     summary_.final_cost = cost_;

@@ -418,5 +418,29 @@ TEST(PriorBundleAdjustmentOptionsTest, NamesTheBrokenRule) {
       std::invalid_argument);
 }
 
+// Wrong matches may leave points that one image of a pair sees twice and the
+// other one not at all: the one is held, and the other has no residual.
+TEST(AdjustBundleTest, WithoutAFreePoseNothingMoves) {
+  colmap::Reconstruction world = BuildBundleWorld({});
+  const auto ids = world.Point3DIds();
+  for (const auto id : std::set<colmap::point3D_t>(ids.begin(), ids.end())) {
+    world.DeletePoint3D(id);
+  }
+  const Rigid3d world_from_cam = CamFromWorld(world.Image(1)).Inverse();
+  for (int k = 0; k < 10; ++k) {
+    colmap::Track track;
+    track.AddElement(1, 2 * k);
+    track.AddElement(1, 2 * k + 1);
+    world.AddPoint3D(world_from_cam * Eigen::Vector3d(0.1 * k, 0.0, 10.0),
+                     track);
+  }
+  PriorBundleAdjustmentProblem problem;
+  problem.images = {1, 2};
+  const PriorBundleAdjustmentSummary summary =
+      AdjustBundle({}, problem, &world);
+  EXPECT_GT(summary.num_residuals, 0);
+  EXPECT_EQ(summary.message, "no pose is free");
+}
+
 }  // namespace
 }  // namespace adasfm
