@@ -40,8 +40,8 @@ struct InertialLength {
   image_t image_id1 = kInvalidImageId;  // the earlier one
   image_t image_id2 = kInvalidImageId;
   double length_m = 0.0;
-  // 1 sigma, such that all of a model together keep its unit and hardly hold
-  // its shape (colmap_ext/coarse/measure_size.h).
+  // 1 sigma that claims nothing of the shape: all of a model together tell its
+  // size to 100 % (colmap_ext/coarse/measure_size.h).
   double sigma_m = 0.0;
   // 1 sigma of the unit, as a ratio.
   double scale_sigma = 0.0;

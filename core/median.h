@@ -12,4 +12,14 @@ double Median(std::vector<double> values);
 // values: for inner loops.
 double UpperMedian(std::vector<double>* values);
 
+struct WeightedValue {
+  double value = 0.0;
+  double weight = 0.0;
+};
+
+// The first value, in ascending order, at which half of the weight is reached;
+// there must be one. Reorders the values. Halves the range around it while that
+// pays.
+double WeightedMedian(std::vector<WeightedValue>* values);
+
 }  // namespace adasfm

@@ -157,6 +157,7 @@ Status PriorEstimator::CheckMotion() {
 
 void PriorEstimator::Fuse() {
   const std::vector<timestamp_t> times_ns = ImageTimesOfImu();
+  logs_.seen_moving_ns = vision_.seen_moving_ns;
   for (auto& [start_ns, end_ns] : logs_.seen_moving_ns) {
     start_ns += vision_.timeshift_ns;
     end_ns += vision_.timeshift_ns;
@@ -274,7 +275,7 @@ StatusOr<PriorEstimate> PriorEstimator::Run(
     times_ns[image.image_id] = image.timestamp_ns;
   }
   vision_.rotations = ComputeTimedRotations(rotations, times_ns);
-  logs_.seen_moving_ns = FindSeenMotion(rotations, times_ns);
+  vision_.seen_moving_ns = FindSeenMotion(rotations, times_ns);
   status =
       UseVision(calibration_, options_, &logs_, &vision_, &estimate_.summary);
   if (!status.ok()) return status;

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <utility>
 #include <vector>
 
 #include "core/status.h"
@@ -15,6 +16,8 @@ namespace adasfm {
 struct VisionUse {
   // None when they contradict the gyroscope.
   std::vector<TimedRotation> rotations;
+  // FindSeenMotion, on the camera's clock.
+  std::vector<std::pair<timestamp_t, timestamp_t>> seen_moving_ns;
   // IMU time = camera time + shift; begins as the calibration's.
   timestamp_t timeshift_ns = 0;
   // The gyroscope's bias at the start with 1 sigma, rad/s.

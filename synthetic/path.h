@@ -4,7 +4,7 @@
 #include <Eigen/Core>
 #include <vector>
 
-#include "synthetic/smooth_step.h"
+#include "synthetic/taylor.h"
 
 namespace adasfm {
 

@@ -1,34 +1,16 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "colmap_ext/scene/keep_inertial_unit.h"
 
-#include <algorithm>
-#include <utility>
-
 #include "colmap_ext/host/pose_conversion.h"
 #include "colmap_ext/scene/align_to_gravity.h"
+#include "core/median.h"
 #include "core/sim3d.h"
 
 namespace adasfm {
-namespace {
-
-// Of (value, weight) pairs, the value up to which half of the weight lies.
-double WeightedMedian(std::vector<std::pair<double, double>> values) {
-  std::sort(values.begin(), values.end());
-  double total = 0.0;
-  for (const auto& [value, weight] : values) total += weight;
-  double sum = 0.0;
-  for (const auto& [value, weight] : values) {
-    sum += weight;
-    if (2.0 * sum >= total) return value;
-  }
-  return values.back().first;
-}
-
-}  // namespace
 
 void KeepInertialUnit(const std::vector<RelativePosePrior>& priors,
                       colmap::Reconstruction* reconstruction) {
-  std::vector<std::pair<double, double>> ratios;
+  std::vector<WeightedValue> ratios;
   for (const RelativePosePrior& prior : priors) {
     const auto has_pose = [&](image_t image_id) {
       return reconstruction->ExistsImage(image_id) &&
@@ -45,12 +27,12 @@ void KeepInertialUnit(const std::vector<RelativePosePrior>& priors,
             CamFromWorld(reconstruction->Image(prior.image_id2)))
             .translation.norm();
     if (stated > 0.0 && present > 0.0) {
-      ratios.emplace_back(stated / present, stated);
+      ratios.push_back({stated / present, stated});
     }
   }
   if (ratios.empty()) return;
   TransformReconstruction(
-      Sim3d(WeightedMedian(std::move(ratios)), Eigen::Quaterniond::Identity(),
+      Sim3d(WeightedMedian(&ratios), Eigen::Quaterniond::Identity(),
             Eigen::Vector3d::Zero()),
       reconstruction);
 }

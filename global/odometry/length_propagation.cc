@@ -6,6 +6,7 @@
 #include <limits>
 #include <utility>
 
+#include "core/median.h"
 #include "core/parallel.h"
 #include "core/so3.h"
 #include "global/view_graph/epipolar.h"
@@ -257,36 +258,6 @@ bool LengthPropagation::LearnLength(std::vector<WeightedValue>* values,
   log_length->log_sigma = 1.4826 * 1.2533 * WeightedMedian(values) /
                           std::sqrt(static_cast<double>(values->size()));
   return log_length->log_sigma <= options_.max_log_sigma;
-}
-
-// The first value at which half of the weight is reached; halves the range
-// around it while that pays.
-double LengthPropagation::WeightedMedian(std::vector<WeightedValue>* values) {
-  const auto is_less = [](const WeightedValue& a, const WeightedValue& b) {
-    return a.value < b.value;
-  };
-  double half = 0.0;
-  for (const WeightedValue& value : *values) half += 0.5 * value.weight;
-  auto begin = values->begin();
-  auto end = values->end();
-  while (end - begin > 16) {
-    const auto middle = begin + (end - begin) / 2;
-    std::nth_element(begin, middle, end, is_less);
-    double left = 0.0;
-    for (auto it = begin; it != middle; ++it) left += it->weight;
-    if (left >= half) {
-      end = middle;
-    } else {
-      half -= left;
-      begin = middle;
-    }
-  }
-  std::sort(begin, end, is_less);
-  for (; begin + 1 != end; ++begin) {
-    half -= begin->weight;
-    if (half <= 0.0) break;
-  }
-  return begin->value;
 }
 
 }  // namespace adasfm

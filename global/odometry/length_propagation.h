@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "core/disjoint_sets.h"
+#include "core/median.h"
 #include "global/odometry/edge_lengths.h"
 #include "global/view_graph/correspondences.h"
 #include "global/view_graph/view_graph.h"
@@ -52,15 +53,9 @@ class LengthPropagation {
     float offset = 0.0f;
     float weight = 0.0f;
   };
-  struct WeightedValue {
-    double value = 0.0;
-    double weight = 0.0;
-  };
-
   // Of the units that an edge shares enough keypoints with, those whose size
   // against its own these tell.
   std::vector<int> FindUnitsOfKnownSize(int edge, DisjointSets* sets) const;
-  static double WeightedMedian(std::vector<WeightedValue>* values);
   std::vector<Observation> ObserveEdge(
       const ViewGraphEdge& edge,
       const GlobalCorrespondences& correspondences) const;

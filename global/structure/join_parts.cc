@@ -31,12 +31,6 @@ using Vector7 = Eigen::Matrix<double, 7, 1>;
 using Matrix7 = Eigen::Matrix<double, 7, 7>;
 using Matrix37 = Eigen::Matrix<double, 3, 7>;
 
-Eigen::Matrix3d Cross(const Eigen::Vector3d& v) {
-  Eigen::Matrix3d cross;
-  cross << 0, -v.z(), v.y(), v.z(), 0, -v.x(), -v.y(), v.x(), 0;
-  return cross;
-}
-
 // sin of the angle between the ray and the point that the camera should see,
 // as ray x (point - center) / |point - center|, in the world of a.
 struct Residual {
@@ -59,11 +53,11 @@ Residual ComputeResidual(const SightAcross& sight, const Sim3d& a_from_b) {
   Residual residual;
   residual.value = ray.cross(to_point) / distance;
   residual.is_in_front = ray.dot(to_point) > 0.0;
-  const Eigen::Matrix3d across = sign / distance * Cross(ray);
-  residual.jacobian << across * -Cross(turned), across, across * turned;
+  const Eigen::Matrix3d across = sign / distance * Hat(ray);
+  residual.jacobian << across * -Hat(turned), across, across * turned;
   if (sight.is_point_of_a) {
     // (turn x ray) x to_point
-    residual.jacobian.leftCols<3>() += Cross(to_point / distance) * Cross(ray);
+    residual.jacobian.leftCols<3>() += Hat(to_point / distance) * Hat(ray);
   }
   return residual;
 }
@@ -197,7 +191,7 @@ class PartJoiner {
     for (const SightAcross* sight : {&sight1, &sight2}) {
       const bool of_a = sight->is_point_of_a;
       const Eigen::Matrix3d cross =
-          Cross(of_a ? a_from_b_.rotation * sight->ray : sight->ray);
+          Hat(of_a ? a_from_b_.rotation * sight->ray : sight->ray);
       rows.middleRows<3>(row) << cross,
           cross * (a_from_b_.rotation * (of_a ? sight->center : sight->point));
       right.segment<3>(row) = cross * (of_a ? sight->point : sight->center);
