@@ -9,6 +9,7 @@
 
 #include "core/random.h"
 #include "core/so3.h"
+#include "synthetic/street_grid.h"
 
 namespace adasfm {
 namespace {

@@ -9,15 +9,20 @@
 namespace adasfm {
 namespace {
 
+// CHOLMOD's nested dissection takes longer than both others, and saves a
+// twentieth of the factor of 30,000 images, an eighth of that of 4,000.
+constexpr int kMinNumBlocksToDissect = 2000;
+
 class BlockAnalysis
     : public Eigen::CholmodSupernodalLLT<Eigen::SparseMatrix<double>> {
  public:
   // The lower triangle; the values mean nothing.
   explicit BlockAnalysis(const Eigen::SparseMatrix<double>& pattern) {
     cholmod().print = 0;
-    cholmod().nmethods = 2;
+    cholmod().nmethods = pattern.rows() < kMinNumBlocksToDissect ? 2 : 3;
     cholmod().method[0].ordering = CHOLMOD_AMD;
     cholmod().method[1].ordering = CHOLMOD_METIS;
+    cholmod().method[2].ordering = CHOLMOD_NESDIS;
     analyzePattern(pattern);
     if (m_cholmodFactor == nullptr) throw std::bad_alloc();
   }

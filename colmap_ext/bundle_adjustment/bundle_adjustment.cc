@@ -3,14 +3,15 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <stdexcept>
-#include <unordered_map>
 
 #include "colmap_ext/bundle_adjustment/block_ordering.h"
 #include "colmap_ext/bundle_adjustment/bundle_problem.h"
 #include "colmap_ext/bundle_adjustment/minimize_bundle.h"
 #include "colmap_ext/bundle_adjustment/position_priors.h"
 #include "colmap_ext/bundle_adjustment/reduced_system.h"
+#include "colmap_ext/scene/covisibility.h"
 #include "core/median.h"
 #include "core/option_checker.h"
 #include "core/parallel.h"
@@ -31,6 +32,12 @@ constexpr double kMaxDirectionSigmaRad = 0.5;
 constexpr double kMinLengthM = 1e-9;
 // Problems with fewer residuals are solved faster by one thread.
 constexpr int kMinNumResidualsForThreads = 20000;
+// Beyond so many blocks (1.2 GB) of the factor a point is one for each group of
+// its images of which any two share three points: of tens of thousands of
+// images a third of the pairs that see points together share fewer, which tell
+// little of each other, but take much of the memory (docs/reference/math.md).
+constexpr size_t kMaxNumBlocksWhole = 4000000;
+constexpr int kMinNumSharedPoints = 3;
 
 bool HasMeasuredLengths(const std::vector<PosePriorEdge>& priors) {
   return std::any_of(priors.begin(), priors.end(), [](const auto& edge) {
@@ -79,44 +86,33 @@ void AssignWindows(const SharedErrorOptions& options,
   }
 }
 
-// By index in `images`, those of higher index that see a point together.
 // Priors tie images of one drive that see points together anyway.
-std::vector<std::vector<int>> FindNeighbors(
-    const std::set<image_t>& images,
-    const colmap::Reconstruction& reconstruction) {
-  std::unordered_map<image_t, int> index_of;
-  for (const image_t image_id : images) {
-    index_of.emplace(image_id, index_of.size());
-  }
-  std::vector<std::vector<int>> neighbors(images.size());
-  std::vector<int> last_seen_from(images.size(), -1);
-  for (const image_t image_id : images) {
-    if (!reconstruction.ExistsImage(image_id)) continue;
-    const int index = index_of.at(image_id);
-    for (const auto& point2D : reconstruction.Image(image_id).Points2D()) {
-      if (!point2D.HasPoint3D()) continue;
-      const auto& point = reconstruction.Point3D(PointIdOf(point2D));
-      for (const auto& element : TrackOf(point).Elements()) {
-        const auto other = index_of.find(element.image_id);
-        if (other == index_of.end() || other->second <= index ||
-            last_seen_from[other->second] == index) {
-          continue;
-        }
-        last_seen_from[other->second] = index;
-        neighbors[index].push_back(other->second);
-      }
-    }
-  }
-  return neighbors;
+size_t CountFactorBlocks(const Covisibility& covisibility) {
+  return FindBlockOrdering(covisibility.Neighbors()).num_factor_blocks;
 }
 
-// Whether the factor of the reduced camera system is no larger than that of so
-// many images that all see each other. Drives, nearly banded, stay far below.
-bool HasSmallFactor(size_t num_full_images, const std::set<image_t>& images,
-                    const colmap::Reconstruction& reconstruction) {
-  if (images.size() <= num_full_images) return true;
-  return FindBlockOrdering(FindNeighbors(images, reconstruction))
-             .num_factor_blocks <= num_full_images * (num_full_images - 1) / 2;
+// How the reduced camera system is solved.
+struct FactorPlan {
+  // Whether its factor is no larger than that of max_num_images_sparse images
+  // that all see each other. Drives, nearly banded, stay far below.
+  bool is_small = true;
+  // Where points must be cut for it.
+  std::optional<Covisibility> cut;
+};
+
+FactorPlan PlanFactor(size_t max_num_images_sparse,
+                      const std::set<image_t>& images,
+                      const colmap::Reconstruction& reconstruction) {
+  FactorPlan plan;
+  if (images.size() <= max_num_images_sparse) return plan;
+  size_t num_blocks = CountFactorBlocks(Covisibility(images, reconstruction));
+  if (num_blocks > kMaxNumBlocksWhole) {
+    plan.cut.emplace(images, reconstruction, kMinNumSharedPoints);
+    num_blocks = CountFactorBlocks(*plan.cut);
+  }
+  plan.is_small =
+      num_blocks <= max_num_images_sparse * (max_num_images_sparse - 1) / 2;
+  return plan;
 }
 
 int NumThreads(const PriorBundleAdjustmentOptions& options,
@@ -271,10 +267,12 @@ PriorBundleAdjustmentSummary AdjustBundle(
   summary.prior_sigma_factors = options.prior_sigma_factors;
   PriorBundleAdjustmentProblem with_windows = problem;
   AssignWindows(options.shared_errors, &with_windows.priors);
-  const bool has_small_factor = HasSmallFactor(options.max_num_images_sparse,
-                                               problem.images, *reconstruction);
+  FactorPlan plan = PlanFactor(options.max_num_images_sparse, problem.images,
+                               *reconstruction);
   BundleProblem bundle(options, with_windows, *reconstruction,
-                       /*may_keep_points_apart=*/has_small_factor);
+                       /*may_keep_points_apart=*/plan.is_small,
+                       plan.cut ? &*plan.cut : nullptr);
+  plan.cut.reset();
   summary.num_images = bundle.NumImages();
   summary.num_points = bundle.NumPoints();
   summary.num_residuals = bundle.NumResiduals();
@@ -291,7 +289,7 @@ PriorBundleAdjustmentSummary AdjustBundle(
   if (bundle.NumPointsApart() > 0) {
     SolveByPoints(options, &bundle, &summary);
   } else {
-    SolveWithCeres(options, has_small_factor, &bundle, &summary);
+    SolveWithCeres(options, plan.is_small, &bundle, &summary);
   }
   summary.seconds = watch.Seconds();
   summary.success =

@@ -3,6 +3,7 @@
 
 #include <ceres/normal_prior.h>
 
+#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <functional>
@@ -16,7 +17,8 @@ namespace adasfm {
 BundleProblem::BundleProblem(const PriorBundleAdjustmentOptions& options,
                              const PriorBundleAdjustmentProblem& problem,
                              const colmap::Reconstruction& reconstruction,
-                             bool may_keep_points_apart)
+                             bool may_keep_points_apart,
+                             const Covisibility* covisibility)
     : options_(options),
       prior_loss_(
           std::make_unique<ceres::CauchyLoss>(options.prior_loss_scale)) {
@@ -33,7 +35,7 @@ BundleProblem::BundleProblem(const PriorBundleAdjustmentOptions& options,
   AddImages(problem, reconstruction);
   points_apart_ =
       may_keep_points_apart && !options.RefinesCameras() && mounts_.empty();
-  AddPoints(reconstruction);
+  AddPoints(reconstruction, points_apart_ ? covisibility : nullptr);
   AddPriors(problem.priors);
   AddMountPriors(problem.rigs);
   AddSharedErrorPriors(problem.priors);
@@ -181,7 +183,30 @@ std::vector<BundleProblem::Observation> BundleProblem::FindObservations(
   return observations;
 }
 
-void BundleProblem::AddPoints(const colmap::Reconstruction& reconstruction) {
+// One alone says nothing.
+std::vector<std::vector<BundleProblem::Observation>> BundleProblem::CutTrack(
+    const Covisibility& covisibility,
+    const std::vector<Observation>& observations) {
+  std::vector<image_t> images;
+  for (const Observation& observation : observations) {
+    images.push_back(observation.image_id);
+  }
+  const std::vector<int> group_of = covisibility.CutTrack(images);
+  std::vector<std::vector<Observation>> groups(
+      *std::max_element(group_of.begin(), group_of.end()) + 1);
+  for (size_t i = 0; i < observations.size(); ++i) {
+    groups[group_of[i]].push_back(observations[i]);
+  }
+  groups.erase(std::remove_if(groups.begin(), groups.end(),
+                              [](const std::vector<Observation>& group) {
+                                return group.size() < 2;
+                              }),
+               groups.end());
+  return groups;
+}
+
+void BundleProblem::AddPoints(const colmap::Reconstruction& reconstruction,
+                              const Covisibility* covisibility) {
   std::vector<colmap::point3D_t> point_ids;
   for (const auto& [image_id, block] : images_) {
     if (block.is_constant) continue;
@@ -206,9 +231,14 @@ void BundleProblem::AddPoints(const colmap::Reconstruction& reconstruction) {
     const std::vector<Observation> observations =
         FindObservations(reconstruction, point);
     if (observations.empty()) continue;
-    points_.push_back({point_id, XyzOf(point), observations_.size()});
-    for (const Observation& observation : observations) {
-      AddObservation(reconstruction, observation, &points_.back());
+    for (const std::vector<Observation>& group :
+         covisibility == nullptr
+             ? std::vector<std::vector<Observation>>{observations}
+             : CutTrack(*covisibility, observations)) {
+      points_.push_back({point_id, XyzOf(point), observations_.size()});
+      for (const Observation& observation : group) {
+        AddObservation(reconstruction, observation, &points_.back());
+      }
     }
   }
 }
@@ -377,6 +407,34 @@ bool BundleProblem::IsFinite() const {
   return true;
 }
 
+Eigen::Vector3d BundleProblem::PositionOf(size_t begin, size_t end) const {
+  Eigen::Vector3d xyz = points_[begin].xyz;
+  if (end == begin + 1) return xyz;
+  // The robust weights settle slowly where observations disagree.
+  constexpr int kNumIterations = 10;
+  for (int iteration = 0; iteration < kNumIterations; ++iteration) {
+    Eigen::Matrix3d information = Eigen::Matrix3d::Zero();
+    Eigen::Vector3d gradient = Eigen::Vector3d::Zero();
+    for (size_t k = begin; k < end; ++k) {
+      for (const PointObservation& observation : ObservationsOf(k)) {
+        Eigen::Vector2d residual;
+        Eigen::Matrix<double, 2, 3, Eigen::RowMajor> by_point;
+        observation.Evaluate(xyz, residual.data(), nullptr, by_point.data());
+        double rho[3] = {0.0, 1.0, 0.0};
+        if (reprojection_loss_ != nullptr) {
+          reprojection_loss_->Evaluate(residual.squaredNorm(), rho);
+        }
+        information += rho[1] * by_point.transpose() * by_point;
+        gradient += rho[1] * by_point.transpose() * residual;
+      }
+    }
+    const Eigen::Vector3d step = information.ldlt().solve(gradient);
+    if (!step.allFinite()) break;
+    xyz -= step;
+  }
+  return xyz;
+}
+
 void BundleProblem::WriteTo(colmap::Reconstruction* reconstruction) const {
   for (const auto& [image_id, block] : images_) {
     AdjustedPose pose = *block.SolvedPose();
@@ -391,8 +449,10 @@ void BundleProblem::WriteTo(colmap::Reconstruction* reconstruction) const {
     }
     SetCamFromWorld(cam_from_world, &reconstruction->Image(image_id));
   }
-  for (const PointBlock& point : points_) {
-    SetXyz(point.xyz, &reconstruction->Point3D(point.id));
+  for (size_t k = 0; k < points_.size();) {
+    const size_t begin = k;
+    while (k < points_.size() && points_[k].id == points_[begin].id) ++k;
+    SetXyz(PositionOf(begin, k), &reconstruction->Point3D(points_[begin].id));
   }
   for (const auto& [camera_id, block] : cameras_) {
     if (block.is_used) {

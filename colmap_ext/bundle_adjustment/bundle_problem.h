@@ -13,6 +13,7 @@
 #include "colmap_ext/bundle_adjustment/pose_prior_cost.h"
 #include "colmap_ext/bundle_adjustment/reprojection_cost.h"
 #include "colmap_ext/bundle_adjustment/rig_cost.h"
+#include "colmap_ext/scene/covisibility.h"
 
 namespace adasfm {
 
@@ -23,11 +24,14 @@ class BundleProblem final : private ceres::EvaluationCallback {
   // The options are valid. Images without a residual do not take part, nor do
   // points behind all but one of their cameras. Points may be kept apart from
   // the Ceres problem, which then has neither them nor their observations, as
-  // long as these depend on one pose alone: no intrinsics, no mounts.
+  // long as these depend on one pose alone: no intrinsics, no mounts. With
+  // `covisibility` such a point becomes one for each group of its track's
+  // images that share points.
   BundleProblem(const PriorBundleAdjustmentOptions& options,
                 const PriorBundleAdjustmentProblem& problem,
                 const colmap::Reconstruction& reconstruction,
-                bool may_keep_points_apart = false);
+                bool may_keep_points_apart = false,
+                const Covisibility* covisibility = nullptr);
   BundleProblem(const BundleProblem&) = delete;
   BundleProblem& operator=(const BundleProblem&) = delete;
 
@@ -105,7 +109,7 @@ class BundleProblem final : private ceres::EvaluationCallback {
     AdjustedPose* SolvedPose() const { return IsDerived() ? frame : pose; }
   };
   struct PointBlock {
-    colmap::point3D_t id = 0;
+    colmap::point3D_t id = 0;  // Of all groups of its track.
     Eigen::Vector3d xyz;
     size_t first_observation = 0;  // Where they are kept apart.
   };
@@ -138,7 +142,11 @@ class BundleProblem final : private ceres::EvaluationCallback {
                                  ceres::LossFunction* loss,
                                  const std::vector<const ImageBlock*>& images,
                                  const std::vector<double*>& others = {});
-  void AddPoints(const colmap::Reconstruction& reconstruction);
+  void AddPoints(const colmap::Reconstruction& reconstruction,
+                 const Covisibility* covisibility);
+  // Where all observations of the points from `begin` to `end`, which are one
+  // in the model, see it.
+  Eigen::Vector3d PositionOf(size_t begin, size_t end) const;
   double KeypointSigmaPx(camera_t camera_id) const;
   // Of the images in use.
   double MedianNumObservations() const;
@@ -146,6 +154,10 @@ class BundleProblem final : private ceres::EvaluationCallback {
   std::vector<Observation> FindObservations(
       const colmap::Reconstruction& reconstruction,
       const colmap::Point3D& point) const;
+  // The groups of two observations or more.
+  static std::vector<std::vector<Observation>> CutTrack(
+      const Covisibility& covisibility,
+      const std::vector<Observation>& observations);
   void AddObservation(const colmap::Reconstruction& reconstruction,
                       const Observation& observation, PointBlock* point);
   void AddPriors(const std::vector<PosePriorEdge>& edges);

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "global/translation_averaging/refine_positions.h"
 
-#include <Eigen/SparseCholesky>
+#include <Eigen/CholmodSupport>
 #include <Eigen/SparseCore>
 #include <algorithm>
 #include <cmath>
@@ -44,6 +44,14 @@ EdgeTerm ComputeTerm(const TranslationAveragingOptions& options,
   term.information /= 1.0 + squared / std::pow(options.refine_loss_scale, 2);
   return term;
 }
+
+// Supernodal: of 30,000 images the factor has tens of millions of entries. It
+// prints nothing: the caller says what failed.
+class QuietCholesky
+    : public Eigen::CholmodSupernodalLLT<Eigen::SparseMatrix<double>> {
+ public:
+  QuietCholesky() { cholmod().print = 0; }
+};
 
 class RefinementSystem {
  public:
@@ -99,7 +107,7 @@ class RefinementSystem {
   int size_;
   std::vector<Eigen::Triplet<double>> triplets_;
   Eigen::VectorXd right_side_;
-  Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>> factorization_;
+  QuietCholesky factorization_;
   bool is_analyzed_ = false;
 };
 

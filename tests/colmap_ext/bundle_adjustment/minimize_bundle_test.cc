@@ -3,6 +3,10 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cmath>
+#include <set>
+
 #include "colmap_ext/bundle_adjustment/bundle_problem.h"
 #include "tests/testing/colmap_ext/bundle_world_problem.h"
 
@@ -65,6 +69,94 @@ Solutions SolveBoth(const BundleWorldOptions& world,
   listed.WriteTo(&solutions.models[0]);
   apart.WriteTo(&solutions.models[1]);
   return solutions;
+}
+
+// The reprojection error of a point of the model, were it there, with the
+// adjustment's loss (Cauchy), in px^2.
+double ReprojectionCostPx(const colmap::Reconstruction& model,
+                          const colmap::Point3D& point,
+                          const Eigen::Vector3d& xyz) {
+  const double scale_px = PriorBundleAdjustmentOptions().reproj_loss_scale_px;
+  double sum = 0.0;
+  for (const auto& element : TrackOf(point).Elements()) {
+    const colmap::Image& image = model.Image(element.image_id);
+    const Eigen::Vector3d in_cam = CamFromWorld(image) * xyz;
+    const double error_px =
+        (PixelFromPlane(model.Camera(image.CameraId()), in_cam.hnormalized()) -
+         XyOf(image.Point2D(element.point2D_idx)))
+            .norm();
+    sum += scale_px * scale_px * std::log1p(std::pow(error_px / scale_px, 2));
+  }
+  return sum;
+}
+
+// Whether cutting leaves observations alone, which do not take part.
+bool HasSingles(const Covisibility& covisibility,
+                const colmap::Point3D& point) {
+  std::set<image_t> images;
+  for (const auto& element : TrackOf(point).Elements()) {
+    images.insert(element.image_id);
+  }
+  const std::vector<int> group_of =
+      covisibility.CutTrack({images.begin(), images.end()});
+  return std::any_of(group_of.begin(), group_of.end(), [&](int group) {
+    return std::count(group_of.begin(), group_of.end(), group) == 1;
+  });
+}
+
+// Points that are cut where images share few of them tell the poses nearly the
+// same, and end where all of their observations see them.
+TEST(MinimizeBundleTest, PointsMayBeCutWhereImagesShareFew) {
+  // A hundredth of the variance of a coordinate.
+  constexpr double kTolerance = 0.01 * 0.5 * 0.5;
+  for (const uint64_t seed : {1, 2, 3}) {
+    BundleWorldOptions world;
+    world.num_images = 100;
+    world.pixel_noise_px = 0.5;
+    world.seed = seed;
+    colmap::Reconstruction whole = BuildBundleWorld(world);
+    PerturbBundleWorld(2e-3, 0.05, seed, &whole);
+    colmap::Reconstruction cut = whole;
+    PriorBundleAdjustmentProblem problem = ProblemOfAll(whole);
+    problem.priors = TruePriors(world);
+    const Covisibility covisibility(problem.images, cut, 10);
+    int num_blocks[2];
+    for (const bool is_cut : {false, true}) {
+      colmap::Reconstruction& model = is_cut ? cut : whole;
+      BundleProblem bundle({}, problem, model, /*may_keep_points_apart=*/true,
+                           is_cut ? &covisibility : nullptr);
+      bundle.FixFirstPose();
+      num_blocks[is_cut] = bundle.NumPoints();
+      MinimizeBundleOptions minimize;
+      minimize.function_tolerance = 1e-10;
+      EXPECT_TRUE(MinimizeBundle(minimize, &bundle).success);
+      bundle.WriteTo(&model);
+    }
+    EXPECT_GT(num_blocks[true], num_blocks[false]);
+    double sum = 0.0;
+    for (const image_t id : problem.images) {
+      sum += (CamFromWorld(cut.Image(id)).TargetOriginInSource() -
+              CamFromWorld(whole.Image(id)).TargetOriginInSource())
+                 .squaredNorm();
+    }
+    // Less than what the noise of the keypoints makes of either.
+    EXPECT_LT(std::sqrt(sum / problem.images.size()),
+              CenterError(world, whole));
+    for (const colmap::Reconstruction* model : {&whole, &cut}) {
+      for (const auto& [id, point] : model->Points3D()) {
+        if (HasSingles(covisibility, point)) continue;
+        const auto cost = [&](const Eigen::Vector3d& xyz) {
+          return ReprojectionCostPx(*model, point, xyz);
+        };
+        const double smallest = cost(XyzOf(point)) - kTolerance;
+        for (int axis = 0; axis < 3; ++axis) {
+          const Eigen::Vector3d step = 1e-3 * Eigen::Vector3d::Unit(axis);
+          EXPECT_GT(cost(XyzOf(point) + step), smallest);
+          EXPECT_GT(cost(XyzOf(point) - step), smallest);
+        }
+      }
+    }
+  }
 }
 
 // From near the minimum, and from where steps are refused.

@@ -1,0 +1,37 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <map>
+#include <set>
+#include <vector>
+
+#include "colmap_ext/host/colmap.h"
+#include "core/types.h"
+
+namespace adasfm {
+
+// Which of some images share points.
+class Covisibility {
+ public:
+  // Images that share fewer points than this count as sharing none.
+  Covisibility(const std::set<image_t>& images,
+               const colmap::Reconstruction& reconstruction,
+               int min_num_shared_points = 1);
+
+  // Of each image, in order of ids, the places of those behind it that share
+  // points with it; sorted.
+  const std::vector<std::vector<int>>& Neighbors() const { return neighbors_; }
+
+  // The images of a point's track in groups in which any two share points: of
+  // each image the group. An image goes into the first group that it fits, and
+  // one that is not among the images of the constructor fits all.
+  std::vector<int> CutTrack(const std::vector<image_t>& images) const;
+
+ private:
+  bool SharePoints(image_t image_id1, image_t image_id2) const;
+
+  std::map<image_t, int> index_of_;
+  std::vector<std::vector<int>> neighbors_;
+};
+
+}  // namespace adasfm

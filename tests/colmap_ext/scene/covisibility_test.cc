@@ -1,0 +1,104 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "colmap_ext/scene/covisibility.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+#include "colmap_ext/host/pose_conversion.h"
+#include "tests/testing/colmap_ext/bundle_world.h"
+
+namespace adasfm {
+namespace {
+
+std::vector<image_t> ImagesOf(const colmap::Point3D& point) {
+  std::vector<image_t> images;
+  for (const auto& element : TrackOf(point).Elements()) {
+    images.push_back(element.image_id);
+  }
+  std::sort(images.begin(), images.end());
+  return images;
+}
+
+// Counted pair by pair.
+std::map<std::pair<image_t, image_t>, int> CountSharedPoints(
+    const colmap::Reconstruction& world) {
+  std::map<std::pair<image_t, image_t>, int> counts;
+  for (const auto& [id, point] : world.Points3D()) {
+    const std::vector<image_t> images = ImagesOf(point);
+    for (size_t i = 0; i < images.size(); ++i) {
+      for (size_t j = i + 1; j < images.size(); ++j) {
+        ++counts[{images[i], images[j]}];
+      }
+    }
+  }
+  return counts;
+}
+
+class CovisibilityTest : public testing::TestWithParam<int> {
+ protected:
+  CovisibilityTest() {
+    BundleWorldOptions options;
+    options.num_images = 40;
+    options.seed = GetParam();
+    world_ = BuildBundleWorld(options);
+    counts_ = CountSharedPoints(world_);
+    images_ = RegisteredImages(world_);
+  }
+
+  colmap::Reconstruction world_;
+  std::map<std::pair<image_t, image_t>, int> counts_;
+  std::set<image_t> images_;
+};
+
+TEST_P(CovisibilityTest, TellsWhoSharesSoManyPoints) {
+  for (const int min_num : {1, 5}) {
+    const Covisibility covisibility(images_, world_, min_num);
+    const std::vector<image_t> ids(images_.begin(), images_.end());
+    ASSERT_EQ(covisibility.Neighbors().size(), ids.size());
+    for (size_t i = 0; i < ids.size(); ++i) {
+      std::vector<int> expected;
+      for (size_t j = i + 1; j < ids.size(); ++j) {
+        const auto count = counts_.find({ids[i], ids[j]});
+        if (count != counts_.end() && count->second >= min_num) {
+          expected.push_back(static_cast<int>(j));
+        }
+      }
+      EXPECT_EQ(covisibility.Neighbors()[i], expected);
+    }
+  }
+}
+
+TEST_P(CovisibilityTest, CutsTracksWhereImagesShareFewPoints) {
+  constexpr int kMinNum = 5;
+  const Covisibility covisibility(images_, world_, kMinNum);
+  const auto fits = [&](image_t image_id, int group,
+                        const std::vector<image_t>& images,
+                        const std::vector<int>& group_of) {
+    for (size_t i = 0; images[i] < image_id; ++i) {
+      if (group_of[i] == group && counts_.at({images[i], image_id}) < kMinNum) {
+        return false;
+      }
+    }
+    return true;
+  };
+  int num_cut = 0;
+  for (const auto& [id, point] : world_.Points3D()) {
+    const std::vector<image_t> images = ImagesOf(point);
+    const std::vector<int> group_of = covisibility.CutTrack(images);
+    ASSERT_EQ(group_of.size(), images.size());
+    for (size_t i = 0; i < images.size(); ++i) {
+      EXPECT_TRUE(fits(images[i], group_of[i], images, group_of));
+      for (int group = 0; group < group_of[i]; ++group) {
+        EXPECT_FALSE(fits(images[i], group, images, group_of));
+      }
+    }
+    num_cut += *std::max_element(group_of.begin(), group_of.end()) > 0;
+  }
+  EXPECT_GT(num_cut, 0);
+}
+
+INSTANTIATE_TEST_SUITE_P(Seeds, CovisibilityTest, testing::Values(1, 2, 3));
+
+}  // namespace
+}  // namespace adasfm
