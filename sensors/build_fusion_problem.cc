@@ -3,6 +3,7 @@
 
 #include "core/so3.h"
 #include "sensors/bridged_holes.h"
+#include "sensors/seen_slips.h"
 #include "sensors/smoother/initial_odometry.h"
 
 namespace adasfm {
@@ -61,6 +62,9 @@ FusionInput BuildFusionProblem(const PriorEstimationOptions& options,
     input.visual_links = AddVisualRotations(
         vision.rotations, vision.timeshift_ns,
         calibration.cam_from_imu.rotation, timeline, &problem);
+    input.num_seen_slips = LeaveOutSeenSlips(
+        vision.rotations, vision.timeshift_ns,
+        calibration.cam_from_imu.rotation, timeline, options.fusion, &problem);
   }
   // What the links hold already must not count twice.
   if (vision.has_bias && input.visual_links.num_links == 0) {

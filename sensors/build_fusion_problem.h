@@ -15,6 +15,8 @@ struct FusionInput {
   OdometryTimeline timeline;
   OdometryFusionProblem problem;
   VisualLinks visual_links;
+  // Intervals where wheels without the IMU slip (sensors/seen_slips.h).
+  int num_seen_slips = 0;
 };
 
 // Preintegrates the logs between the images, with states between images far

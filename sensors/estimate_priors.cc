@@ -164,12 +164,14 @@ void PriorEstimator::Fuse() {
   }
   SensorSummary& summary = estimate_.summary;
   double wheel_persistence = 1.0;
+  int num_seen_slips = 0;
   for (int i = 0; i <= kMaxNumCorrections; ++i) {
     FusionInput input =
         BuildFusionProblem(options_, calibration_, times_ns, logs_, vision_);
     timeline_ = std::move(input.timeline);
     problem_ = std::move(input.problem);
     problem_.wheel_persistence = wheel_persistence;
+    num_seen_slips = input.num_seen_slips;
     summary.num_visual_links = input.visual_links.num_links;
     summary.visual_sigma_deg = RadToDeg(input.visual_links.sigma_rad);
     fused_ = FuseOdometry(problem_, options_.fusion);
@@ -178,6 +180,12 @@ void PriorEstimator::Fuse() {
                              &summary)) {
       break;
     }
+  }
+  if (num_seen_slips > 0) {
+    summary.warnings.push_back(
+        "the wheels turn otherwise than the cameras between " +
+        std::to_string(num_seen_slips) +
+        " pairs of images in a row: they slip there, and are left out");
   }
   summary.gyroscope_noise_factor =
       calibration_.imu_noise.gyroscope_noise_density /

@@ -95,28 +95,42 @@ std::vector<std::pair<timestamp_t, timestamp_t>> FindSeenMotion(
   return intervals;
 }
 
+std::optional<size_t> FindLinkOfRotation(const TimedRotation& rotation,
+                                         timestamp_t timeshift_ns,
+                                         const OdometryTimeline& timeline) {
+  if (rotation.weight < kMinNumInliers) return std::nullopt;
+  const std::vector<timestamp_t>& times = timeline.times_ns;
+  const timestamp_t start = rotation.start_ns + timeshift_ns;
+  const auto it = std::lower_bound(times.begin(), times.end(), start);
+  const size_t k = it - times.begin();
+  if (k + 1 >= times.size() || times[k] != start ||
+      times[k + 1] != rotation.end_ns + timeshift_ns) {
+    return std::nullopt;
+  }
+  return k;
+}
+
+// cam2_from_cam1 turns against the body's motion.
+Eigen::Quaterniond BodyRotation(const TimedRotation& rotation,
+                                const Eigen::Quaterniond& cam_from_imu) {
+  return cam_from_imu.conjugate() * rotation.cam2_from_cam1.conjugate() *
+         cam_from_imu;
+}
+
 VisualLinks AddVisualRotations(const std::vector<TimedRotation>& rotations,
                                timestamp_t timeshift_ns,
                                const Eigen::Quaterniond& cam_from_imu,
                                const OdometryTimeline& timeline,
                                OdometryFusionProblem* problem) {
-  const std::vector<timestamp_t>& times = timeline.times_ns;
   std::vector<size_t> indices;
   for (const TimedRotation& rotation : rotations) {
-    if (rotation.weight < kMinNumInliers) continue;
-    const timestamp_t start = rotation.start_ns + timeshift_ns;
-    const auto it = std::lower_bound(times.begin(), times.end(), start);
-    const size_t k = it - times.begin();
-    if (k + 1 >= times.size() || times[k] != start ||
-        times[k + 1] != rotation.end_ns + timeshift_ns ||
-        !problem->links[k].has_imu || problem->links[k].dt_s <= 0.0) {
-      continue;
-    }
-    // cam2_from_cam1 turns against the body's motion.
-    problem->links[k].visual_rotation = cam_from_imu.conjugate() *
-                                        rotation.cam2_from_cam1.conjugate() *
-                                        cam_from_imu;
-    indices.push_back(k);
+    const std::optional<size_t> k =
+        FindLinkOfRotation(rotation, timeshift_ns, timeline);
+    if (!k) continue;
+    OdometryLink& link = problem->links[*k];
+    if (!link.has_imu || link.dt_s <= 0.0) continue;
+    link.visual_rotation = BodyRotation(rotation, cam_from_imu);
+    indices.push_back(*k);
   }
   if (indices.size() < kMinNumLinks) return VisualLinks();
   const double sigma = EstimateSigma(problem->links, indices);

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <map>
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -28,6 +29,16 @@ struct VisualLinks {
   // 1 sigma of an axis when not turning, rad.
   double sigma_rad = 0.0;
 };
+
+// The link that joins the images of a rotation, where these are in a row; none
+// where the rotation has too few inliers.
+std::optional<size_t> FindLinkOfRotation(const TimedRotation& rotation,
+                                         timestamp_t timeshift_ns,
+                                         const OdometryTimeline& timeline);
+
+// The body's rotation (first_from_second) from the camera's.
+Eigen::Quaterniond BodyRotation(const TimedRotation& rotation,
+                                const Eigen::Quaterniond& cam_from_imu);
 
 // Gives the links of `problem` that join two images in a row what vision saw of
 // their rotation, as a further observation: over many links it holds the

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "colmap_ext/bundle_adjustment/estimate_keypoint_sigma.h"
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <map>
@@ -16,6 +17,8 @@ namespace {
 // A point of two images has one degree of freedom, whose median says little.
 constexpr size_t kMinTrackLength = 3;
 constexpr size_t kMinNumPoints = 100;
+// Of right observations 0.03 % err by more.
+constexpr double kMaxErrorPerSigma = 4.0;
 
 // The median of chi-square with k degrees of freedom over k.
 double MedianOfChi2PerDof(double num_dof) {
@@ -107,6 +110,13 @@ KeypointSigmas EstimateKeypointSigmas(
     if (sigma_px) sigmas.of_cameras_px[camera_id] = *sigma_px;
   }
   return sigmas;
+}
+
+double MaxReprojErrorPx(double min_error_px,
+                        const colmap::Reconstruction& reconstruction) {
+  const KeypointSigmas sigmas = EstimateKeypointSigmas(reconstruction);
+  return std::max(min_error_px,
+                  kMaxErrorPerSigma * sigmas.of_all_px.value_or(0.0));
 }
 
 }  // namespace adasfm

@@ -29,4 +29,11 @@ struct KeypointSigmas {
 KeypointSigmas EstimateKeypointSigmas(
     const colmap::Reconstruction& reconstruction);
 
+// The largest reprojection error of a right observation of an adjusted
+// reconstruction: min_error_px, or four sigmas of its keypoints where that is
+// more. A threshold below the noise takes right observations away, and what is
+// left understates the noise.
+double MaxReprojErrorPx(double min_error_px,
+                        const colmap::Reconstruction& reconstruction);
+
 }  // namespace adasfm

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <utility>
 
+#include "colmap_ext/bundle_adjustment/estimate_keypoint_sigma.h"
 #include "colmap_ext/coarse/select_coarse_points.h"
 #include "colmap_ext/host/pose_conversion.h"
 #include "colmap_ext/scene/align_to_gravity.h"
@@ -114,9 +115,11 @@ void AddPositions(const SceneData& scene, const CoarseModelInput& input,
   problem->gravity_sigma_rad = verticals.sigma_rad;
 }
 
-// The threshold falls from round to round, geometrically.
+// The threshold falls from round to round, geometrically; in the last one not
+// below the noise of the model before.
 TrackTriangulationOptions TriangulationOptions(
-    const CoarseStructureOptions& options, int round) {
+    const CoarseStructureOptions& options, int round,
+    const colmap::Reconstruction& before) {
   TrackTriangulationOptions triangulation = options.triangulation;
   triangulation.min_triangulation_angle_deg =
       std::min(options.min_angle_floor_deg,
@@ -127,6 +130,10 @@ TrackTriangulationOptions TriangulationOptions(
                                                        (options.num_rounds - 1)
                                                  : 1.0;
   triangulation.max_reproj_error_px *= std::pow(ratio, progress);
+  if (round + 1 == options.num_rounds) {
+    triangulation.max_reproj_error_px =
+        MaxReprojErrorPx(options.final_max_reproj_error_px, before);
+  }
   return triangulation;
 }
 
@@ -176,10 +183,10 @@ void BuildRound(const CoarseStructureOptions& options, const SceneData& scene,
     refined = ComputeModelBearings(model->reconstruction,
                                    options.triangulation.num_threads);
   }
-  std::vector<TriangulatedTrack> points =
-      TriangulateTracks(TriangulationOptions(options, round), cams_from_world,
-                        refined.empty() ? bearings : refined,
-                        tracks.Of(round + 1 == options.num_rounds));
+  std::vector<TriangulatedTrack> points = TriangulateTracks(
+      TriangulationOptions(options, round, model->reconstruction),
+      cams_from_world, refined.empty() ? bearings : refined,
+      tracks.Of(round + 1 == options.num_rounds));
   model->reconstruction =
       CreateReconstruction(scene, cams_from_world, model->reconstruction);
   AddPoints(
@@ -316,10 +323,11 @@ CoarseModel BuildCoarseModel(
     AdjustLenses(options, scene, bearings, input, tracks, problem,
                  &keypoint_sigma_factor, &model);
   }
-  FilterPoints(options.final_max_reproj_error_px,
-               std::min(options.min_angle_floor_deg,
-                        options.triangulation.min_triangulation_angle_deg),
-               &model.reconstruction);
+  FilterPoints(
+      MaxReprojErrorPx(options.final_max_reproj_error_px, model.reconstruction),
+      std::min(options.min_angle_floor_deg,
+               options.triangulation.min_triangulation_angle_deg),
+      &model.reconstruction);
   model.gravity_aligned =
       is_georeferenced ||
       AlignToGravity(scene, &model.reconstruction, input.camera_mount);

@@ -37,7 +37,8 @@ struct CoarseStructureOptions {
   // down to this one.
   double min_angle_floor_deg = 1.0;
   // Rounds of triangulation and adjustment; the largest reprojection error
-  // shrinks from triangulation.max_reproj_error_px to this.
+  // shrinks from triangulation.max_reproj_error_px to this, or to what the
+  // keypoints' noise asks for where that is more (MaxReprojErrorPx).
   int num_rounds = 3;
   double final_max_reproj_error_px = 4.0;
   // Relative change of the cost at which the rounds before the last end: their

@@ -127,7 +127,8 @@ void GlobalOptionAdder::AddStructure() {
   Add("num_rounds", &stage_->structure.num_rounds,
       "rounds of triangulation and bundle adjustment");
   Add("final_max_reproj_error_px", &stage_->structure.final_max_reproj_error_px,
-      "largest error of a point in the last round [px]");
+      "largest error of a point in the last round [px]; four sigmas of the "
+      "keypoints' noise where that is more");
   Add("early_function_tolerance", &stage_->structure.early_function_tolerance,
       "rounds before the last end at this relative change of the cost");
   Add("keyframe_min_num_images", &stage_->structure.keyframes.min_num_images,

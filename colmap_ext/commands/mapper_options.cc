@@ -79,7 +79,8 @@ void AddMapperOptions(MapOptions* options, CommandOptions* command) {
   add("max_keypoint_sigma_factor", &local.balance.max_sigma_factor,
       "largest factor by which the keypoint sigma is raised");
   add("filter_max_reproj_error_px", &local.filter_max_reproj_error_px,
-      "observations beyond it are removed [px]");
+      "observations beyond it, and beyond four sigmas of their noise, are "
+      "removed [px]");
   add("min_triangulation_angle_deg", &local.min_triangulation_angle_deg,
       "points below it are removed [deg]");
   add("global_adjustment_growth", &local.global_adjustment_growth,

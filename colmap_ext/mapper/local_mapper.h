@@ -22,8 +22,10 @@ struct LocalMapperOptions {
   // part's adjustments (paper, eq. 8). Off: the coarse model came from the same
   // matches, which would count twice (docs/reference/mapper.md has figures).
   bool use_coarse_motions_in_parts = false;
-  // After an adjustment, observations beyond this error are removed, and points
-  // below this angle.
+  // Tracks are completed and joined within this error. After an adjustment
+  // observations beyond it are removed, or beyond what their noise asks for
+  // where that is more (MaxReprojErrorPx), and points below this angle. Joining
+  // does not follow the noise: it would join neighbouring points.
   double filter_max_reproj_error_px = 4.0;
   double min_triangulation_angle_deg = 1.5;
   // The whole part is adjusted when it has grown by this factor since the last

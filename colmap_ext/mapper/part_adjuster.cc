@@ -5,6 +5,7 @@
 #include <map>
 #include <utility>
 
+#include "colmap_ext/bundle_adjustment/estimate_keypoint_sigma.h"
 #include "colmap_ext/bundle_adjustment/variance_components.h"
 #include "colmap_ext/host/pose_conversion.h"
 
@@ -155,14 +156,15 @@ void PartAdjuster::AdjustAll(int max_num_iterations) {
   ++num_global_adjustments_;
   scene_.mapper.CompleteAndMergeTracks(options_.filter_max_reproj_error_px);
   AdjustImages(RegisteredImages(reconstruction_), {}, max_num_iterations);
-  scene_.mapper.FilterPoints(options_.filter_max_reproj_error_px,
-                             options_.min_triangulation_angle_deg);
+  scene_.mapper.FilterPoints(
+      MaxReprojErrorPx(options_.filter_max_reproj_error_px, reconstruction_),
+      options_.min_triangulation_angle_deg);
 }
 
 void PartAdjuster::Filter(const std::set<image_t>& images) {
-  scene_.mapper.FilterPointsInImages(options_.filter_max_reproj_error_px,
-                                     options_.min_triangulation_angle_deg,
-                                     images);
+  scene_.mapper.FilterPointsInImages(
+      MaxReprojErrorPx(options_.filter_max_reproj_error_px, reconstruction_),
+      options_.min_triangulation_angle_deg, images);
 }
 
 }  // namespace adasfm

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "colmap_ext/bundle_adjustment/bundle_adjustment.h"
+#include "colmap_ext/bundle_adjustment/estimate_keypoint_sigma.h"
 #include "colmap_ext/host/pose_conversion.h"
 #include "colmap_ext/mapper/part_adjuster.h"
 #include "colmap_ext/mapper/prior_support.h"
@@ -78,8 +79,9 @@ class ModelRefiner {
   double LoosePx() const { return 3.0 * local_.filter_max_reproj_error_px; }
 
   void Filter(double max_reproj_error_px) {
-    scene_.mapper.FilterPoints(max_reproj_error_px,
-                               local_.min_triangulation_angle_deg);
+    scene_.mapper.FilterPoints(
+        MaxReprojErrorPx(max_reproj_error_px, reconstruction_),
+        local_.min_triangulation_angle_deg);
   }
 
   // COLMAP's Retriangulate, pair by pair, gives the same model but takes 5 %

@@ -206,6 +206,47 @@ TEST(SyntheticPriors, ASlipUntilTheEndIsFound) {
   }
 }
 
+// One wheel that slips turns the log by tens of degrees, which without the IMU
+// only the cameras can tell. Where no wheel slips they have no say.
+TEST(SyntheticPriors, CamerasSeeWheelsSlipWithoutAnImu) {
+  for (const uint64_t seed : {1, 2, 3}) {
+    const SyntheticWorld world = BuildSyntheticWorld(SmallWorld(seed));
+    Dataset data = ToDataset(world);
+    data.calibration.has_imu = false;
+    data.logs.imu.clear();
+    const std::vector<VisualRotation> vision =
+        SimulateVision(world, seed, {5e-3, 1});
+    const auto estimate = [&](const std::vector<VisualRotation>& rotations) {
+      return EstimatePriors(data.images, data.logs, data.calibration, rotations,
+                            {})
+          .value();
+    };
+    const PriorEstimate before = estimate(vision);
+    EXPECT_TRUE(before.summary.warnings.empty());
+    const PriorEstimate without = estimate({});
+    for (size_t i = 0; i < before.priors.size(); ++i) {
+      EXPECT_EQ(before.priors[i].covariance, without.priors[i].covariance);
+    }
+    const timestamp_t begin_ns = data.images[40].timestamp_ns;
+    for (WheelSample& sample : data.logs.wheel) {
+      if (sample.timestamp_ns >= begin_ns &&
+          sample.timestamp_ns < begin_ns + 1'000'000'000) {
+        sample.second *= 1.5;
+      }
+    }
+    EXPECT_GT(ComputePairErrors(estimate({}), data.cams_from_world).chi2, 3.0);
+    const PriorEstimate after = estimate(vision);
+    EXPECT_EQ(after.summary.warnings.size(), 1);
+    EXPECT_LT(ComputePairErrors(after, data.cams_from_world).chi2, 1.25)
+        << "seed " << seed;
+    // A wrong rotation costs a prior, no more.
+    const PriorEstimate wrong =
+        estimate(SimulateVision(world, seed, {5e-3, 1, 0.05}));
+    EXPECT_LT(ComputePairErrors(wrong, data.cams_from_world).chi2, 1.25)
+        << "seed " << seed;
+  }
+}
+
 TEST(SyntheticPriors, GravityPointsDown) {
   const SyntheticWorld world = BuildSyntheticWorld(SmallWorld(6));
   const Dataset data = ToDataset(world);

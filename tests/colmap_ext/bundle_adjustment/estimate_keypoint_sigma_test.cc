@@ -70,6 +70,17 @@ TEST(EstimateKeypointSigmaTest, WrongMatchesDoNotCount) {
   EXPECT_NEAR(*sigma_px, 0.5, 0.1);
 }
 
+TEST(MaxReprojErrorTest, IsFourSigmasAndTheOneGivenAtLeast) {
+  BundleWorldOptions options;
+  options.pixel_noise_px = 0.5;
+  const colmap::Reconstruction reconstruction = AdjustedWorld(options);
+  const double four_sigmas_px =
+      4.0 * EstimateKeypointSigmas(reconstruction).of_all_px.value();
+  EXPECT_EQ(MaxReprojErrorPx(1.0, reconstruction), four_sigmas_px);
+  EXPECT_EQ(MaxReprojErrorPx(4.0, reconstruction), 4.0);
+  EXPECT_EQ(MaxReprojErrorPx(4.0, colmap::Reconstruction()), 4.0);
+}
+
 TEST(EstimateKeypointSigmaTest, NothingToTellFrom) {
   EXPECT_FALSE(
       EstimateKeypointSigmas(colmap::Reconstruction()).of_all_px.has_value());

@@ -137,6 +137,21 @@ TEST(BuildCoarseModelTest, LowersTheAngleWhereImagesNeedIt) {
   EXPECT_LT(wide.num_points, model.num_points);
 }
 
+// A last threshold of 4 px would leave a noise of 1.9 px of 3, and half of the
+// observations.
+TEST(BuildCoarseModelTest, ThresholdFollowsTheNoise) {
+  for (const uint64_t seed : {1, 2, 3}) {
+    SyntheticWorldOptions options = SmallWorld();
+    options.seed = seed;
+    options.pixel_noise_px = 3.0;
+    const Fixture fixture = BuildFixture(options, 0.05);
+    const CoarseModel model =
+        BuildCoarseModel(CoarseStructureOptions(), fixture.scene,
+                         fixture.bearings, fixture.input);
+    EXPECT_NEAR(model.keypoint_sigma_px, 3.0, 0.3) << "seed " << seed;
+  }
+}
+
 TEST(BuildCoarseModelTest, OptionsChangeTheOutcome) {
   const Fixture fixture = BuildFixture(SmallWorld(), 0.05);
   const auto build = [&](const CoarseStructureOptions& options) {

@@ -93,6 +93,18 @@ TEST_F(MapperStageTest, WorksWithoutSensors) {
   EXPECT_FALSE(summary_.is_level);
 }
 
+// A filter at 4 px would leave a noise of 1.9 px.
+TEST_F(MapperStageTest, FilterFollowsTheNoise) {
+  for (uint64_t seed = 1; seed <= 3; ++seed) {
+    MapperWorldOptions options;
+    options.world.num_images = 60;
+    options.world.seed = seed;
+    options.world.pixel_noise_px = 3.0;
+    RunAndExpectBetterThanCoarse(options);
+    EXPECT_NEAR(summary_.refine.keypoint_sigma_px, 3.0, 0.3) << "seed " << seed;
+  }
+}
+
 TEST_F(MapperStageTest, StraightRoadIsReconstructed) {
   for (uint64_t seed = 1; seed <= 2; ++seed) {
     MapperWorldOptions options;
