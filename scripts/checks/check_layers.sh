@@ -40,8 +40,8 @@ colmap_ext/host/v4             core colmap_ext/io colmap_ext/matching
 colmap_ext/host                colmap_ext/host/v3 colmap_ext/host/v4 core global/view_graph global/two_view colmap_ext/io colmap_ext/matching
 colmap_ext/features            core colmap_ext/host
 colmap_ext/database            core colmap_ext/io colmap_ext/host global/calibration
-colmap_ext/bundle_adjustment   core colmap_ext/host colmap_ext/scene
 colmap_ext/scene               core colmap_ext/io colmap_ext/host colmap_ext/database global/view_graph global/two_view
+colmap_ext/bundle_adjustment   core colmap_ext/host colmap_ext/scene
 colmap_ext/priors              core colmap_ext/host colmap_ext/database colmap_ext/scene sensors sensors/... global/two_view
 colmap_ext/coarse              core colmap_ext/host colmap_ext/bundle_adjustment colmap_ext/scene global global/...
 colmap_ext/mapper              core colmap_ext/host colmap_ext/bundle_adjustment colmap_ext/scene partition
