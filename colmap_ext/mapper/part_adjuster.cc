@@ -83,7 +83,8 @@ PartAdjuster::PartAdjuster(const LocalMapperOptions& options,
                            MapperScene* scene)
     : options_(options),
       scene_(*scene),
-      reconstruction_(scene->reconstruction) {}
+      reconstruction_(scene->reconstruction),
+      max_reproj_error_px_(options.filter_max_reproj_error_px) {}
 
 void PartAdjuster::AdjustPair(image_t image_id1, image_t image_id2) {
   const std::set<image_t> images = {image_id1, image_id2};
@@ -156,15 +157,15 @@ void PartAdjuster::AdjustAll(int max_num_iterations) {
   ++num_global_adjustments_;
   scene_.mapper.CompleteAndMergeTracks(options_.filter_max_reproj_error_px);
   AdjustImages(RegisteredImages(reconstruction_), {}, max_num_iterations);
-  scene_.mapper.FilterPoints(
-      MaxReprojErrorPx(options_.filter_max_reproj_error_px, reconstruction_),
-      options_.min_triangulation_angle_deg);
+  max_reproj_error_px_ =
+      MaxReprojErrorPx(options_.filter_max_reproj_error_px, reconstruction_);
+  scene_.mapper.FilterPoints(max_reproj_error_px_,
+                             options_.min_triangulation_angle_deg);
 }
 
 void PartAdjuster::Filter(const std::set<image_t>& images) {
   scene_.mapper.FilterPointsInImages(
-      MaxReprojErrorPx(options_.filter_max_reproj_error_px, reconstruction_),
-      options_.min_triangulation_angle_deg, images);
+      max_reproj_error_px_, options_.min_triangulation_angle_deg, images);
 }
 
 }  // namespace adasfm

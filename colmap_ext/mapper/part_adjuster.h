@@ -57,6 +57,8 @@ class PartAdjuster {
   MapperScene& scene_;
   colmap::Reconstruction& reconstruction_;
   double keypoint_sigma_factor_ = 1.0;
+  // As the last adjustment of all images asks for.
+  double max_reproj_error_px_ = 0.0;
   int num_global_adjustments_ = 0;
 };
 
