@@ -295,6 +295,7 @@ PriorBundleAdjustmentSummary AdjustBundle(
   summary.success =
       summary.success && std::isfinite(summary.final_cost) && bundle.IsFinite();
   if (summary.success) {
+    bundle.UpdatePoses();  // The last step may have been taken back.
     bundle.WriteTo(reconstruction);
     summary.shared_errors = bundle.EstimatedSharedErrors();
     if (system != nullptr) *system = BuildReducedSystem(&bundle);
