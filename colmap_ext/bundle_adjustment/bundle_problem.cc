@@ -231,13 +231,17 @@ void BundleProblem::AddPoints(const colmap::Reconstruction& reconstruction,
     const std::vector<Observation> observations =
         FindObservations(reconstruction, point);
     if (observations.empty()) continue;
-    for (const std::vector<Observation>& group :
-         covisibility == nullptr
-             ? std::vector<std::vector<Observation>>{observations}
-             : CutTrack(*covisibility, observations)) {
+    const auto add = [&](const std::vector<Observation>& group) {
       points_.push_back({point_id, XyzOf(point), observations_.size()});
       for (const Observation& observation : group) {
         AddObservation(reconstruction, observation, &points_.back());
+      }
+    };
+    if (covisibility == nullptr) {
+      add(observations);
+    } else {
+      for (const auto& group : CutTrack(*covisibility, observations)) {
+        add(group);
       }
     }
   }

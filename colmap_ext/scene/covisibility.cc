@@ -16,7 +16,8 @@ Covisibility::Covisibility(const std::set<image_t>& images,
   neighbors_.resize(images.size());
   std::vector<int> num_shared(images.size(), 0);
   std::vector<int> others;
-  for (const auto& [image_id, index] : index_of_) {
+  for (const image_t image_id : images) {
+    const int index = index_of_.at(image_id);
     if (!reconstruction.ExistsImage(image_id)) continue;
     others.clear();
     for (const auto& point2D : reconstruction.Image(image_id).Points2D()) {

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <map>
 #include <set>
+#include <unordered_map>
 #include <vector>
 
 #include "colmap_ext/host/colmap.h"
@@ -30,7 +30,7 @@ class Covisibility {
  private:
   bool SharePoints(image_t image_id1, image_t image_id2) const;
 
-  std::map<image_t, int> index_of_;
+  std::unordered_map<image_t, int> index_of_;
   std::vector<std::vector<int>> neighbors_;
 };
 

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <map>
 
 #include "colmap_ext/host/pose_conversion.h"
 #include "tests/testing/colmap_ext/bundle_world.h"
