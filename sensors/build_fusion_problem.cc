@@ -3,7 +3,7 @@
 
 #include "core/so3.h"
 #include "sensors/bridged_holes.h"
-#include "sensors/seen_slips.h"
+#include "sensors/seen_wheel_yaw.h"
 #include "sensors/smoother/initial_odometry.h"
 
 namespace adasfm {
@@ -62,7 +62,7 @@ FusionInput BuildFusionProblem(const PriorEstimationOptions& options,
     input.visual_links = AddVisualRotations(
         vision.rotations, vision.timeshift_ns,
         calibration.cam_from_imu.rotation, timeline, &problem);
-    input.num_seen_slips = LeaveOutSeenSlips(
+    input.num_seen_slips = UseSeenWheelYaw(
         vision.rotations, vision.timeshift_ns,
         calibration.cam_from_imu.rotation, timeline, options.fusion, &problem);
   }

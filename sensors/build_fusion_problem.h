@@ -15,7 +15,7 @@ struct FusionInput {
   OdometryTimeline timeline;
   OdometryFusionProblem problem;
   VisualLinks visual_links;
-  // Intervals where wheels without the IMU slip (sensors/seen_slips.h).
+  // Intervals where wheels without the IMU slip (sensors/seen_wheel_yaw.h).
   int num_seen_slips = 0;
 };
 

@@ -19,6 +19,7 @@
 #include "sensors/smoother/compose_prior.h"
 #include "sensors/use_vision.h"
 #include "sensors/visual_links.h"
+#include "sensors/wheel_skids.h"
 
 namespace adasfm {
 namespace {
@@ -56,6 +57,8 @@ class PriorEstimator {
   void SelectLogs(const SensorLogs& logs);
   Status FindImagesInLogs();
   void CorrectWheelClock();
+  // Of wheels that no IMU watches.
+  void LeaveOutWheelSkids();
   // The images' times on the IMU's clock.
   std::vector<timestamp_t> ImageTimesOfImu() const;
   Status CheckMotion();
@@ -131,6 +134,15 @@ void PriorEstimator::CorrectWheelClock() {
       "wheels and gyroscope turn at times that differ by %+.3f s: this was "
       "added to the times of the wheels",
       *shift_s, 0.0));
+}
+
+void PriorEstimator::LeaveOutWheelSkids() {
+  if (!logs_.imu.empty()) return;
+  const int num_skids = LeaveOutSkids(&logs_.wheel);
+  if (num_skids == 0) return;
+  estimate_.summary.warnings.push_back(
+      "the wheels move as no tyre holds (more than 12 m/s^2) in " +
+      std::to_string(num_skids) + " places: they skid there, and are left out");
 }
 
 std::vector<timestamp_t> PriorEstimator::ImageTimesOfImu() const {
@@ -295,6 +307,7 @@ StatusOr<PriorEstimate> PriorEstimator::Run(
   if (!status.ok()) return status;
   // The other sensors against each other.
   CorrectWheelClock();
+  LeaveOutWheelSkids();
   status = CheckMotion();
   if (!status.ok()) return status;
   // 3. and 4. Preintegration and smoother.

@@ -52,9 +52,9 @@ void SummarizeFusion(const OdometryFusionProblem& problem,
     if (!problem.links[k].has_wheel) continue;
     summary->distance_m += fused.motions[k].body2_from_body1.translation.norm();
   }
+  summary->gyroscope_bias_covariance = fused.gyroscope_bias_covariance;
   if (!logs.imu.empty()) {
     summary->gyroscope_bias = fused.gyroscope_bias;
-    summary->gyroscope_bias_covariance = fused.gyroscope_bias_covariance;
     for (const OdometryState& state : fused.states) {
       summary->accelerometer_bias +=
           state.bias.accelerometer / fused.states.size();

@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "sensors/smoother/chain_problem.h"
 
+#include <Eigen/Cholesky>
+#include <Eigen/LU>
+
 namespace adasfm {
 namespace {
 
@@ -75,13 +78,21 @@ ChainMessage ChainProblem::FirstMessage() const {
       ChainGlobals::PriorSigmas(options);
   const auto information = sigma.cwiseAbs2().cwiseInverse().eval();
   message.h = information.asDiagonal();
-  message.g = information.cwiseProduct(error);
+  if (problem.wheel_yaw_prior) {
+    const WheelYawPrior& prior = *problem.wheel_yaw_prior;
+    constexpr int kYaw = kGlobals + ChainGlobals::kLoggedYaw;
+    error.segment<2>(kYaw) =
+        globals.values.segment<2>(ChainGlobals::kLoggedYaw) -
+        Eigen::Vector2d(prior.logged_yaw, prior.curvature);
+    message.h.block<2, 2>(kYaw, kYaw) = prior.covariance.inverse();
+  }
+  message.g = message.h * error;
   return message;
 }
 
 double ChainProblem::Cost() const {
   const ChainMessage first = FirstMessage();
-  double cost = first.g.cwiseAbs2().cwiseQuotient(first.h.diagonal()).sum();
+  double cost = first.g.dot(first.h.llt().solve(first.g));
   for (size_t k = 0; k < NumLinks(); ++k) {
     cost += Residuals(k).values.squaredNorm();
   }

@@ -33,7 +33,7 @@ struct ChainGlobals {
   enum Offset {
     kLoggedLength = 0,
     kLoggedYaw,
-    kCurvature,
+    kCurvature,  // follows kLoggedYaw: they have a covariance
     kMountYaw,
     kMountPitch,
     kVisualTurn,

@@ -72,7 +72,8 @@ RelativePosePrior ComposePrior(const OdometryFusionProblem& problem,
     has_imu &= link.has_imu;
     has_wheel &= link.has_wheel;
     has_yaw &=
-        link.has_wheel && (link.has_wheel_yaw || link.wheel.has_rotation);
+        link.has_vision ||
+        (link.has_wheel && (link.has_wheel_yaw || link.wheel.has_rotation));
     is_slipping |= fused.motions[k].wheel_weight < kSlipWeight;
   }
   const bool has_rotation = has_imu || has_yaw;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "sensors/smoother/fusion_covariances.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include "core/so3.h"
@@ -20,6 +21,7 @@ struct Marginals {
   std::vector<Eigen::Matrix<double, 6, Shared::kSize>> by_shared;
   // Of the last link, as any link's would do.
   double length_variance = 0.0, delay_variance = 0.0;
+  Eigen::Matrix2d wheel_yaw_covariance = Eigen::Matrix2d::Zero();
   Eigen::Array2d mount_variance = Eigen::Array2d::Zero();
 };
 
@@ -59,6 +61,7 @@ Eigen::Matrix<double, 6, kLinkSize> MotionMap(const ChainProblem& chain,
 Marginals CollectMarginals(const ChainProblem& chain,
                            OdometryFusionResult* result) {
   constexpr int kMount = 2 * ChainState::kSize + ChainGlobals::kMountYaw;
+  constexpr int kYaw = 2 * ChainState::kSize + ChainGlobals::kLoggedYaw;
   constexpr int kDelay = 2 * ChainState::kSize + ChainGlobals::kWheelDelay;
   const size_t num_links = chain.NumLinks();
   Marginals sums;
@@ -86,11 +89,36 @@ Marginals CollectMarginals(const ChainProblem& chain,
             covariance.diagonal().segment<3>(ChainState::kAccel).mean();
         sums.length_variance = covariance(Shared::Column(Shared::kScale),
                                           Shared::Column(Shared::kScale));
+        sums.wheel_yaw_covariance = covariance.block<2, 2>(kYaw, kYaw);
         sums.mount_variance = covariance.diagonal().segment<2>(kMount);
         sums.delay_variance = covariance(kDelay, kDelay);
       });
   result->accelerometer_bias_sigma = std::sqrt(accel_variance / num_links);
   return sums;
+}
+
+// A machine stays upright: whatever all links tilt by alike is this small.
+constexpr double kTiltRateSigma = 1e-4;  // rad/s
+
+// What the errors of track and curvature make all links turn by, as a rate: the
+// mean over the links of its covariance; zero where no wheels tell a turn.
+Eigen::Matrix3d WheelYawRateCovariance(
+    const ChainProblem& chain, const Eigen::Matrix2d& wheel_yaw_covariance) {
+  double variance = 0.0;
+  int num_links = 0;
+  for (const OdometryLink& link : chain.problem.links) {
+    if (!link.has_wheel_yaw || link.dt_s <= 0.0) continue;
+    // Of (logged yaw + curvature * distance) / logged per true.
+    const Eigen::Vector2d by_unknowns =
+        Eigen::Vector2d(-link.wheel.yaw_rad, link.wheel.distance_m) / link.dt_s;
+    variance += by_unknowns.dot(wheel_yaw_covariance * by_unknowns);
+    ++num_links;
+  }
+  if (num_links == 0) return Eigen::Matrix3d::Zero();
+  const Eigen::Vector3d up =
+      chain.problem.imu_from_wheel.rotation * Eigen::Vector3d::UnitZ();
+  return variance / num_links * up * up.transpose() +
+         kTiltRateSigma * kTiltRateSigma * Eigen::Matrix3d::Identity();
 }
 
 }  // namespace
@@ -111,6 +139,12 @@ void FillCovariances(const ChainProblem& chain, OdometryFusionResult* result) {
       (root.asDiagonal() * result->gyroscope_bias_covariance *
        root.asDiagonal())
           .eval();
+  const auto& links = chain.problem.links;
+  if (std::none_of(links.begin(), links.end(),
+                   [](const OdometryLink& link) { return link.has_imu; })) {
+    result->gyroscope_bias_covariance =
+        WheelYawRateCovariance(chain, sums.wheel_yaw_covariance);
+  }
   result->gyroscope_bias_sigma =
       std::sqrt(result->gyroscope_bias_covariance.trace() / 3.0);
   result->wheel_delay_sigma_s = std::sqrt(sums.delay_variance);

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -95,6 +96,14 @@ struct OdometryLink {
   double visual_sigma_rad = 0.0;
 };
 
+// Logged yaw = logged_yaw * true yaw - curvature * distance (rad/m), and the
+// covariance of both.
+struct WheelYawPrior {
+  double logged_yaw = 1.0;
+  double curvature = 0.0;
+  Eigen::Matrix2d covariance = Eigen::Matrix2d::Identity();
+};
+
 struct OdometryFusionProblem {
   // link k joins states k and k + 1: one less than states.
   std::vector<OdometryLink> links;
@@ -107,6 +116,8 @@ struct OdometryFusionProblem {
   // vision; a sigma of 0 takes the options'.
   Eigen::Vector3d prior_gyroscope_bias = Eigen::Vector3d::Zero();
   double prior_gyroscope_bias_sigma = 0.0;
+  // What is known of the wheels' yaw, in place of the options' sigmas.
+  std::optional<WheelYawPrior> wheel_yaw_prior;
   // First values, e.g. from EstimateInitialOdometry; one more than links.
   std::vector<OdometryState> initial_states;
 };
@@ -158,7 +169,9 @@ struct OdometryFusionResult {
   double wheel_delay_s = 0.0;
   double wheel_delay_sigma_s = 0.0;
   // rad/s in the body (IMU) frame: mean over the states, and the mean of their
-  // covariances (rad^2/s^2).
+  // covariances (rad^2/s^2). Without any IMU the covariance is of the rate that
+  // the errors of track and curvature give all links, zero where no wheels tell
+  // a turn.
   Eigen::Vector3d gyroscope_bias = Eigen::Vector3d::Zero();
   Eigen::Matrix3d gyroscope_bias_covariance = Eigen::Matrix3d::Zero();
   double gyroscope_bias_sigma = 0.0;      // mean of states and axes
