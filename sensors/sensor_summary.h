@@ -30,7 +30,8 @@ struct SensorSummary {
   double gyroscope_bias_sigma = 0.0;
   Eigen::Vector3d accelerometer_bias = Eigen::Vector3d::Zero();
   double accelerometer_bias_sigma = 0.0;
-  // Covariance of the gyroscope's bias (rad^2/s^2), body (IMU) frame.
+  // Covariance of the gyroscope's bias (rad^2/s^2), body (IMU) frame. Without
+  // an IMU of the rate that wheels err by alike, OdometryFusionResult.
   Eigen::Matrix3d gyroscope_bias_covariance = Eigen::Matrix3d::Zero();
   // Noise in use over the stated one, as the logs show it.
   double gyroscope_noise_factor = 1.0;

@@ -43,7 +43,8 @@ struct PriorTables {
   // Of the positions' ENU frame; none for positions in a frame of their own.
   std::optional<GeodeticPosition> position_origin;
   // Of what the import left of the gyroscope's bias, in the camera frame,
-  // rad^2/s^2; none without a gyroscope, and in databases of before it.
+  // rad^2/s^2, and without an IMU of the rate that wheels err by alike; none
+  // where neither tells a turn, and in databases of before it.
   std::optional<Eigen::Matrix3d> gyroscope_bias_covariance;
   // 1 sigma of the error that the lengths of neighbouring priors share, as a
   // ratio; 0 where nothing shows one, and in databases of before it.

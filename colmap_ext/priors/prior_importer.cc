@@ -222,7 +222,7 @@ Status CheckEstimate(const PriorEstimate& estimate,
                        kRemedy);
 }
 
-// None without a gyroscope.
+// None where neither a gyroscope nor wheels tell a turn.
 std::optional<Eigen::Matrix3d> BiasCovarianceInCam(
     const SensorSummary& summary, const SensorCalibration& calibration) {
   if (summary.gyroscope_bias_covariance.isZero(0.0)) return std::nullopt;
