@@ -25,7 +25,7 @@ void MarkTurns(const std::vector<WheelSpeed>& speeds,
                std::vector<bool>* skids) {
   const timestamp_t window_ns = NsFromSeconds(kWindowS);
   double speed = 0.0, yaw_rate = 0.0;
-  size_t begin = 0, marked = 0;
+  size_t begin = 0;
   for (size_t end = 0; end < speeds.size(); ++end) {
     speed += speeds[end].speed;
     yaw_rate += speeds[end].yaw_rate;
@@ -35,10 +35,9 @@ void MarkTurns(const std::vector<WheelSpeed>& speeds,
       ++begin;
     }
     const double size = end - begin + 1.0;
-    if (std::abs(speed * yaw_rate) <= kMaxAcceleration * size * size) continue;
-    marked = std::max(marked, begin);
-    Mark(marked, end + 1, skids);
-    marked = end + 1;
+    if (std::abs(speed * yaw_rate) > kMaxAcceleration * size * size) {
+      Mark(begin, end + 1, skids);
+    }
   }
 }
 
@@ -67,27 +66,28 @@ void MarkJumps(const std::vector<WheelSpeed>& speeds,
   const size_t half = std::lround(kWindowS / 2.0 / period_s);
   const std::vector<double> changes = SpeedChanges(speeds, half);
   const double limit = kMaxAcceleration * half * period_s;
-  // The largest change of each run beyond the limit.
-  size_t open = 0;
-  bool is_open = false;
-  for (size_t i = 0; i < changes.size();) {
-    size_t best = i, end = i;
-    for (; end < changes.size() && std::abs(changes[end]) > limit &&
-           changes[end] * changes[i] > 0.0;
-         ++end) {
-      if (std::abs(changes[end]) > std::abs(changes[best])) best = end;
+  std::vector<size_t> jumps;
+  size_t last = 0;
+  for (size_t i = 0; i < changes.size(); ++i) {
+    if (std::abs(changes[i]) <= limit) continue;
+    // A jump takes several samples, of which the largest counts.
+    const bool is_same = !jumps.empty() && last == i - 1 &&
+                         changes[i] * changes[jumps.back()] > 0.0;
+    last = i;
+    if (!is_same) {
+      jumps.push_back(i);
+    } else if (std::abs(changes[i]) > std::abs(changes[jumps.back()])) {
+      jumps.back() = i;
     }
-    if (end == i) {
-      ++i;
+  }
+  for (size_t k = 1; k < jumps.size(); ++k) {
+    const size_t begin = jumps[k - 1], end = jumps[k];
+    if (changes[begin] * changes[end] > 0.0 ||
+        times_ns[end] - times_ns[begin] > NsFromSeconds(kMaxSkidS)) {
       continue;
     }
-    const bool closes =
-        is_open && changes[best] * changes[open] < 0.0 &&
-        times_ns[best] - times_ns[open] < NsFromSeconds(kMaxSkidS);
-    if (closes) Mark(open, best, skids);
-    is_open = !closes;
-    open = best;
-    i = end;
+    Mark(begin, end, skids);
+    ++k;  // This jump has its partner.
   }
 }
 

@@ -13,6 +13,9 @@ namespace {
 
 using Shared = SharedUncertainty;
 
+// A machine stays upright: whatever all links tilt by alike is this small.
+constexpr double kTiltRateSigma = 1e-4;  // rad/s
+
 // What the marginals of the links add up to.
 struct Marginals {
   Shared shared;
@@ -96,9 +99,6 @@ Marginals CollectMarginals(const ChainProblem& chain,
   result->accelerometer_bias_sigma = std::sqrt(accel_variance / num_links);
   return sums;
 }
-
-// A machine stays upright: whatever all links tilt by alike is this small.
-constexpr double kTiltRateSigma = 1e-4;  // rad/s
 
 // What the errors of track and curvature make all links turn by, as a rate: the
 // mean over the links of its covariance; zero where no wheels tell a turn.
