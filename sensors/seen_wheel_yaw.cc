@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <optional>
+#include <set>
 
 #include "core/median.h"
 #include "core/so3.h"
@@ -28,8 +29,9 @@ constexpr int kNumRounds = 20;
 // Vision is taken for half as much again as it scatters: it is used again.
 constexpr double kVisualSigmaFactor = 1.5;
 
-struct SeenLink {
-  size_t index = 0;
+// What wheels turned from one image to a later one, and cameras saw of it.
+struct SeenTurn {
+  size_t first_link = 0;
   double start_s = 0.0;
   // (wheels' yaw, distance), and true minus wheels' yaw.
   Eigen::Vector2d row = Eigen::Vector2d::Zero();
@@ -37,42 +39,47 @@ struct SeenLink {
   double yaw_variance = 0.0;
 };
 
-std::vector<SeenLink> FindSeenLinks(const std::vector<TimedRotation>& rotations,
+// Those over num_links links, all by wheels without IMU, in order of time.
+std::vector<SeenTurn> FindSeenTurns(const std::vector<TimedRotation>& rotations,
                                     timestamp_t timeshift_ns,
                                     const Eigen::Quaterniond& cam_from_imu,
                                     const OdometryTimeline& timeline,
-                                    const OdometryFusionProblem& problem) {
+                                    const OdometryFusionProblem& problem,
+                                    size_t num_links) {
   const Eigen::Vector3d up =
       problem.imu_from_wheel.rotation * Eigen::Vector3d::UnitZ();
-  std::vector<SeenLink> seen;
+  std::vector<SeenTurn> seen;
   for (const TimedRotation& rotation : rotations) {
-    const std::optional<size_t> k =
-        FindLinkOfRotation(rotation, timeshift_ns, timeline);
-    if (!k) continue;
-    const OdometryLink& link = problem.links[*k];
-    if (link.has_imu || !link.has_wheel || !link.has_wheel_yaw) continue;
-    SeenLink entry;
-    entry.index = *k;
-    entry.start_s =
-        SecondsFromNs(timeline.times_ns[*k] - timeline.times_ns.front());
-    entry.row << link.wheel.yaw_rad, link.wheel.distance_m;
-    entry.difference_rad =
-        up.dot(LogSo3(BodyRotation(rotation, cam_from_imu))) -
-        link.wheel.yaw_rad;
-    entry.yaw_variance = link.wheel.yaw_variance;
-    seen.push_back(entry);
+    const std::optional<size_t> first =
+        FindLinkOfRotation(rotation, timeshift_ns, timeline, num_links);
+    if (!first) continue;
+    SeenTurn turn;
+    turn.first_link = *first;
+    turn.start_s =
+        SecondsFromNs(timeline.times_ns[*first] - timeline.times_ns.front());
+    bool is_by_wheels = true;
+    for (size_t k = *first; k < *first + num_links; ++k) {
+      const OdometryLink& link = problem.links[k];
+      is_by_wheels &= !link.has_imu && link.has_wheel && link.has_wheel_yaw;
+      turn.row += Eigen::Vector2d(link.wheel.yaw_rad, link.wheel.distance_m);
+      turn.yaw_variance += link.wheel.yaw_variance;
+    }
+    if (!is_by_wheels) continue;
+    turn.difference_rad =
+        up.dot(LogSo3(BodyRotation(rotation, cam_from_imu))) - turn.row[0];
+    seen.push_back(turn);
   }
-  std::sort(seen.begin(), seen.end(), [](const SeenLink& a, const SeenLink& b) {
-    return a.index < b.index;
+  std::sort(seen.begin(), seen.end(), [](const SeenTurn& a, const SeenTurn& b) {
+    return a.first_link < b.first_link;
   });
   return seen;
 }
 
 class WheelYawFit {
  public:
-  WheelYawFit(const std::vector<SeenLink>& links,
+  WheelYawFit(const std::vector<SeenTurn>& turns,
               const OdometryFusionOptions& options)
-      : links_(links), weights_(links.size(), 1.0) {
+      : turns_(turns), weights_(turns.size(), 1.0) {
     prior_information_ = ChainGlobals::PriorSigmas(options)
                              .segment<2>(ChainGlobals::kLoggedYaw)
                              .cwiseAbs2()
@@ -87,11 +94,11 @@ class WheelYawFit {
   }
 
   double scale_rad() const { return scale_; }
-  double Residual(const SeenLink& link) const {
-    return link.difference_rad - link.row.dot(unknowns_);
+  double Residual(const SeenTurn& turn) const {
+    return turn.difference_rad - turn.row.dot(unknowns_);
   }
-  double Variance(const SeenLink& link) const {
-    return link.row.dot(covariance_ * link.row);
+  double Variance(const SeenTurn& turn) const {
+    return turn.row.dot(covariance_ * turn.row);
   }
 
   // As the smoother has them: of 1 / (1 + m) and c / (1 + m).
@@ -111,10 +118,10 @@ class WheelYawFit {
   void Solve() {
     Eigen::Matrix2d matrix = prior_information_.asDiagonal();
     Eigen::Vector2d sum = Eigen::Vector2d::Zero();
-    for (size_t i = 0; i < links_.size(); ++i) {
+    for (size_t i = 0; i < turns_.size(); ++i) {
       const double weight = weights_[i] / (scale_ * scale_);
-      matrix += weight * links_[i].row * links_[i].row.transpose();
-      sum += weight * links_[i].row * links_[i].difference_rad;
+      matrix += weight * turns_[i].row * turns_[i].row.transpose();
+      sum += weight * turns_[i].row * turns_[i].difference_rad;
     }
     inverse_ = matrix.inverse();
     unknowns_ = inverse_ * sum;
@@ -122,17 +129,17 @@ class WheelYawFit {
 
   double Scale() const {
     std::vector<double> errors;
-    for (const SeenLink& link : links_) {
-      errors.push_back(std::abs(Residual(link)));
+    for (const SeenTurn& turn : turns_) {
+      errors.push_back(std::abs(Residual(turn)));
     }
     return std::max(kMinScale, UpperMedian(&errors) / kMedianAbs);
   }
 
   void UpdateWeights() {
-    for (size_t i = 0; i < links_.size(); ++i) {
+    for (size_t i = 0; i < turns_.size(); ++i) {
       weights_[i] =
           1.0 /
-          (1.0 + std::pow(Residual(links_[i]) / (kLossScale * scale_), 2));
+          (1.0 + std::pow(Residual(turns_[i]) / (kLossScale * scale_), 2));
     }
   }
 
@@ -141,11 +148,11 @@ class WheelYawFit {
     Eigen::Vector2d score = Eigen::Vector2d::Zero();
     double noise = 0.0;
     int num_blocks = 0;
-    for (size_t i = 0; i < links_.size(); ++i) {
+    for (size_t i = 0; i < turns_.size(); ++i) {
       const double weight = weights_[i] / (scale_ * scale_);
-      score += weight * Residual(links_[i]) * links_[i].row;
-      noise += weight * links_[i].yaw_variance;
-      const bool is_last = i + 1 == links_.size();
+      score += weight * Residual(turns_[i]) * turns_[i].row;
+      noise += weight * turns_[i].yaw_variance;
+      const bool is_last = i + 1 == turns_.size();
       if (!is_last && Block(i + 1) == Block(i)) continue;
       scores += score * score.transpose();
       score.setZero();
@@ -158,10 +165,10 @@ class WheelYawFit {
   }
 
   int Block(size_t i) const {
-    return static_cast<int>(links_[i].start_s / kBlockS);
+    return static_cast<int>(turns_[i].start_s / kBlockS);
   }
 
-  const std::vector<SeenLink>& links_;
+  const std::vector<SeenTurn>& turns_;
   std::vector<double> weights_;
   Eigen::Vector2d prior_information_;
   double scale_ = 1.0;
@@ -203,20 +210,30 @@ int UseSeenWheelYaw(const std::vector<TimedRotation>& rotations,
                     const OdometryTimeline& timeline,
                     const OdometryFusionOptions& options,
                     OdometryFusionProblem* problem) {
-  const std::vector<SeenLink> seen =
-      FindSeenLinks(rotations, timeshift_ns, cam_from_imu, timeline, *problem);
+  const auto find_turns = [&](size_t num_links) {
+    return FindSeenTurns(rotations, timeshift_ns, cam_from_imu, timeline,
+                         *problem, num_links);
+  };
+  const std::vector<SeenTurn> seen = find_turns(1);
   if (seen.size() < kMinNumSeenLinks) return 0;
   const WheelYawFit fit(seen, options);
   problem->wheel_yaw_prior = fit.Prior();
-  std::vector<size_t> slips;
-  for (const SeenLink& link : seen) {
+  const auto differs = [&](const SeenTurn& turn) {
     const double variance =
-        std::max(fit.scale_rad() * fit.scale_rad(), link.yaw_variance) +
-        fit.Variance(link);
-    if (std::abs(fit.Residual(link)) >
-        options.slip_threshold_sigma * std::sqrt(variance)) {
-      slips.push_back(link.index);
-    }
+        std::max(fit.scale_rad() * fit.scale_rad(), turn.yaw_variance) +
+        fit.Variance(turn);
+    return std::abs(fit.Residual(turn)) >
+           options.slip_threshold_sigma * std::sqrt(variance);
+  };
+  std::set<size_t> slips;
+  for (const SeenTurn& turn : seen) {
+    if (differs(turn)) slips.insert(turn.first_link);
+  }
+  // An image between two links may have all its pairs wrong.
+  for (const SeenTurn& turn : find_turns(2)) {
+    if (differs(turn)) continue;
+    slips.erase(turn.first_link);
+    slips.erase(turn.first_link + 1);
   }
   if (slips.size() > kMaxSlipRatio * seen.size()) slips.clear();
   for (const size_t k : slips) {

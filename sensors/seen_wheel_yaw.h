@@ -19,10 +19,11 @@ namespace adasfm {
 // from the median) with the options' sigmas as priors. Their covariance is the
 // sandwich estimate over blocks of two seconds, and what the wheels' noise
 // takes from m. It takes the place of the options' in the problem
-// (wheel_yaw_prior). A link beyond slip_threshold_sigma slips: nothing is known
-// of its motion, its length included; more than a fifth of the links are no
-// slips, and left as they are. Links without wheels, these among them, turn as
-// cameras saw, where the rotations among three images agree
+// (wheel_yaw_prior). A link beyond slip_threshold_sigma slips, unless wheels
+// and cameras agree over it and a neighbour together (then the image between
+// errs): nothing is known of its motion, its length included; more than a fifth
+// of the links are no slips, and left as they are. Links without wheels, these
+// among them, turn as cameras saw, where the rotations among three images agree
 // (rotation_triples.h). Vision has no other part in these priors, since it is
 // used again later.
 // On failure: fewer than 20 links change nothing.

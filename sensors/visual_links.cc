@@ -97,14 +97,15 @@ std::vector<std::pair<timestamp_t, timestamp_t>> FindSeenMotion(
 
 std::optional<size_t> FindLinkOfRotation(const TimedRotation& rotation,
                                          timestamp_t timeshift_ns,
-                                         const OdometryTimeline& timeline) {
+                                         const OdometryTimeline& timeline,
+                                         size_t num_links) {
   if (rotation.weight < kMinNumInliers) return std::nullopt;
   const std::vector<timestamp_t>& times = timeline.times_ns;
   const timestamp_t start = rotation.start_ns + timeshift_ns;
   const auto it = std::lower_bound(times.begin(), times.end(), start);
   const size_t k = it - times.begin();
-  if (k + 1 >= times.size() || times[k] != start ||
-      times[k + 1] != rotation.end_ns + timeshift_ns) {
+  if (k + num_links >= times.size() || times[k] != start ||
+      times[k + num_links] != rotation.end_ns + timeshift_ns) {
     return std::nullopt;
   }
   return k;

@@ -30,11 +30,12 @@ struct VisualLinks {
   double sigma_rad = 0.0;
 };
 
-// The link that joins the images of a rotation, where these are in a row; none
-// where the rotation has too few inliers.
+// The first of num_links links from one image of a rotation to the other; none
+// where these are not so far apart, or the rotation has too few inliers.
 std::optional<size_t> FindLinkOfRotation(const TimedRotation& rotation,
                                          timestamp_t timeshift_ns,
-                                         const OdometryTimeline& timeline);
+                                         const OdometryTimeline& timeline,
+                                         size_t num_links = 1);
 
 // The body's rotation (first_from_second) from the camera's.
 Eigen::Quaterniond BodyRotation(const TimedRotation& rotation,

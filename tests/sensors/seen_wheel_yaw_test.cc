@@ -1,0 +1,167 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "sensors/seen_wheel_yaw.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "core/so3.h"
+#include "tests/testing/sensors/synthetic_dataset.h"
+
+namespace adasfm {
+namespace {
+
+Dataset WheelsAlone(const SyntheticWorld& world) {
+  Dataset data = ToDataset(world);
+  data.calibration.has_imu = false;
+  data.logs.imu.clear();
+  return data;
+}
+
+double Duration(const Dataset& data) {
+  return SecondsFromNs(data.images.back().timestamp_ns -
+                       data.images[0].timestamp_ns);
+}
+
+// By how much all priors together turn too far about the vertical, rad.
+double SummedYawError(const PriorEstimate& estimate, const Dataset& data) {
+  double sum = 0.0;
+  for (const RelativePosePrior& prior : estimate.priors) {
+    const Rigid3d truth = data.cams_from_world.at(prior.image_id2) *
+                          data.cams_from_world.at(prior.image_id1).Inverse();
+    sum +=
+        LogSo3(prior.cam2_from_cam1.rotation * truth.rotation.conjugate()).y();
+  }
+  return std::abs(sum);
+}
+
+// What two-view rotations' noise makes of one error that all links share, and
+// the noise of the wheels.
+double SummedYawSigma(double vision_sigma_rad, const SyntheticWorld& world,
+                      const Dataset& data) {
+  const double of_wheels =
+      std::sqrt(2.0) * world.options.wheel_speed_noise / world.track_width_m *
+      std::sqrt(Duration(data) / world.options.wheel_rate_hz);
+  return std::hypot(
+      vision_sigma_rad * std::sqrt(static_cast<double>(data.images.size())),
+      of_wheels);
+}
+
+// One wheel that slips turns the log by tens of degrees: faster than any tyre
+// holds, or, at a smaller slip, so that without the IMU only cameras can tell.
+TEST(SeenWheelYaw, WheelsThatSlipWithoutAnImuAreFound) {
+  for (const uint64_t seed : {1, 2, 3}) {
+    const SyntheticWorld world = BuildSyntheticWorld(SmallWorld(seed));
+    Dataset data = WheelsAlone(world);
+    const std::vector<VisualRotation> vision =
+        SimulateVision(world, seed, {5e-3, 1});
+    const auto estimate = [&](double slip,
+                              const std::vector<VisualRotation>& rotations) {
+      SensorLogs logs = data.logs;
+      const timestamp_t begin_ns = data.images[40].timestamp_ns;
+      for (WheelSample& sample : logs.wheel) {
+        if (sample.timestamp_ns >= begin_ns &&
+            sample.timestamp_ns < begin_ns + 1'000'000'000) {
+          sample.second *= 1.0 + slip;
+        }
+      }
+      return EstimatePriors(data.images, logs, data.calibration, rotations, {})
+          .value();
+    };
+    const auto chi2 = [&](const PriorEstimate& estimate) {
+      return ComputePairErrors(estimate, data.cams_from_world).chi2;
+    };
+    const PriorEstimate healthy = estimate(0.0, vision);
+    EXPECT_TRUE(healthy.summary.warnings.empty());
+    EXPECT_LT(chi2(healthy), 1.25) << "seed " << seed;
+    // As no tyre holds.
+    const PriorEstimate skid = estimate(0.5, {});
+    EXPECT_EQ(skid.summary.warnings.size(), 1);
+    EXPECT_LT(chi2(skid), 1.25) << "seed " << seed;
+    const PriorEstimate seen_skid = estimate(0.5, vision);
+    EXPECT_EQ(seen_skid.summary.warnings.size(), 1);
+    EXPECT_LT(chi2(seen_skid), 1.25) << "seed " << seed;
+    // As only cameras can tell.
+    // At 8 m/s for a second.
+    const double slip_rad = 0.15 * 8.0 / world.track_width_m;
+    EXPECT_GT(SummedYawError(estimate(0.15, {}), data), 0.5 * slip_rad)
+        << "seed " << seed;
+    const PriorEstimate slip = estimate(0.15, vision);
+    EXPECT_EQ(slip.summary.warnings.size(), 1);
+    EXPECT_LT(chi2(slip), 1.25) << "seed " << seed;
+    EXPECT_LT(slip.priors.size(), healthy.priors.size());
+    // Where rotations of three images agree they take the wheels' place.
+    const PriorEstimate turned =
+        estimate(0.15, SimulateVision(world, seed, {5e-3, 2}));
+    EXPECT_EQ(turned.priors.size(), healthy.priors.size()) << "seed " << seed;
+    EXPECT_LT(chi2(turned), 1.25) << "seed " << seed;
+    EXPECT_LT(SummedYawError(turned, data),
+              3.0 * SummedYawSigma(5e-3, world, data))
+        << "seed " << seed;
+    // A wrong rotation costs a prior, no more.
+    for (const double ratio : {0.15, 0.5}) {
+      EXPECT_LT(
+          chi2(estimate(ratio, SimulateVision(world, seed, {5e-3, 1, 0.05}))),
+          1.25)
+          << "seed " << seed;
+    }
+  }
+}
+
+// Wheels that differ by 1 % turn by 0.009 rad a metre, all of them alike.
+TEST(SeenWheelYaw, CamerasSeeWhatWheelsTurnAlike) {
+  for (const uint64_t seed : {1, 2, 3}) {
+    const SyntheticWorld world = BuildSyntheticWorld(SmallWorld(seed, 200));
+    Dataset data = WheelsAlone(world);
+    for (WheelSample& sample : data.logs.wheel) sample.second *= 1.01;
+    const PriorEstimate alone =
+        EstimatePriors(data.images, data.logs, data.calibration, {}, {})
+            .value();
+    const PriorEstimate seen =
+        EstimatePriors(data.images, data.logs, data.calibration,
+                       SimulateVision(world, seed, {3e-3, 1, 0.02}), {})
+            .value();
+    const auto sigma_rad = [&](const PriorEstimate& estimate) {
+      return Duration(data) *
+             std::sqrt(estimate.summary.gyroscope_bias_covariance.trace());
+    };
+    EXPECT_GT(SummedYawError(alone, data), 0.5) << "seed " << seed;
+    EXPECT_LT(SummedYawError(seen, data),
+              3.0 * SummedYawSigma(3e-3, world, data))
+        << "seed " << seed;
+    // Both say what they err by alike.
+    for (const PriorEstimate* estimate : {&alone, &seen}) {
+      EXPECT_LT(SummedYawError(*estimate, data),
+                3.0 * std::hypot(sigma_rad(*estimate),
+                                 SummedYawSigma(0.0, world, data)))
+          << "seed " << seed;
+    }
+  }
+}
+
+// An image whose pairs err alike closes every triple, and yet wheels that turn
+// as cameras saw from the image before to the one after did not slip.
+TEST(SeenWheelYaw, AnImageWithWrongPairsIsNoSlip) {
+  for (const uint64_t seed : {1, 2, 3}) {
+    const SyntheticWorld world = BuildSyntheticWorld(SmallWorld(seed));
+    const Dataset data = WheelsAlone(world);
+    std::vector<VisualRotation> vision = SimulateVision(world, seed, {5e-3, 2});
+    const image_t wrong = data.images[40].image_id;
+    const Eigen::Quaterniond error = ExpSo3(Eigen::Vector3d(0.0, 0.1, 0.0));
+    for (VisualRotation& rotation : vision) {
+      Eigen::Quaterniond& cam2_from_cam1 = rotation.cam2_from_cam1;
+      if (rotation.image_id1 == wrong) cam2_from_cam1 *= error.conjugate();
+      if (rotation.image_id2 == wrong) cam2_from_cam1 = error * cam2_from_cam1;
+    }
+    const PriorEstimate estimate =
+        EstimatePriors(data.images, data.logs, data.calibration, vision, {})
+            .value();
+    EXPECT_TRUE(estimate.summary.warnings.empty()) << "seed " << seed;
+    EXPECT_EQ(estimate.priors.size(), data.images.size() - 1);
+    EXPECT_LT(ComputePairErrors(estimate, data.cams_from_world).chi2, 1.25)
+        << "seed " << seed;
+  }
+}
+
+}  // namespace
+}  // namespace adasfm
