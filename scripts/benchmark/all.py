@@ -220,6 +220,10 @@ STEPS = {
     'estimator_seeds': lambda args: run_script(args, 'estimator_seeds',
                                                'estimator_seeds.py'),
     'kinds': lambda args: Benchmark(args).kinds(),
+    'verdicts': lambda args: run_script(args, 'verdicts', 'verdict_table.py'),
+    'growth': lambda args: run_script(
+        args, 'growth', 'growth.py', '--limits', '4000,10000', '--plot_path',
+        os.path.join(args.docs_root, 'docs', 'images', 'growth.svg')),
 }
 QUICK_STEPS = ['readme']
 

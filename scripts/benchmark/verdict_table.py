@@ -3,7 +3,7 @@
 """Verdict against error: is a model that is called good a good one?
 
 Runs the chain on synthetic worlds, as they are, hard, and spoilt in ways that
-users spoil them, and prints a table of the verdict of adasfm_mapper beside the
+users spoil them, and writes a table of the verdict of adasfm_mapper beside the
 model's error and two limits, each the error of the mapper from the true poses:
 with the run's own imported data and priors, and with the unspoilt data. Errors
 are in metres where the model claims metres, of the shape (after a similarity)
@@ -21,6 +21,7 @@ Needs only Python's standard library.
 
 import argparse
 import collections
+import functools
 import json
 import os
 import random
@@ -30,6 +31,7 @@ import sqlite3
 import subprocess
 import sys
 
+from benchmarking.figures import add_arguments, run_table
 from benchmarking.limit import write_true_poses
 from benchmarking.spoil import edit_rows, scale_wheels, shift_clocks, turn_camera
 from benchmarking.spoil import cut_logs, scale_focal_length
@@ -256,59 +258,85 @@ def judge(run):
   return Judgement(own, shape, sigmas, unspoilt, wrong)
 
 
-def table_row(name, seed, run, judgement):
+def to_record(name, seed, run, folder):
+  """For a file that may be read elsewhere: without this machine's paths."""
+  said = (run.said.strip().splitlines() or [''])[-1]
+  return dict(name=name, seed=seed, result=run.result,
+              said=said.replace(folder + '/', ''), **{
+      part: errors and errors._asdict()
+      for part, errors in (('errors', run.errors), ('own', run.own),
+                           ('unspoilt', run.unspoilt))})
+
+
+def from_record(record):
+  return Run(record['result'], record['said'],
+             *(record[part] and Errors(**record[part])
+               for part in ('errors', 'own', 'unspoilt')))
+
+
+def table_row(record, run, judgement):
   numbers = ['-' if value is None else '%.3g' % value for value in (
       run.errors and run.errors.metric_m, run.own and run.own.metric_m,
       judgement.own, judgement.shape, judgement.sigmas,
       run.unspoilt and run.unspoilt.metric_m, judgement.unspoilt)]
-  return '| %s | %d | %s%s | %s | %s |' % (
-      name, seed, run.result, ' (WRONG)' if judgement.wrong else '',
-      ' | '.join(numbers), run.said.strip().replace('|', '/')[:300])
+  return '| %s | %d | %s%s | %s |' % (
+      record['name'], record['seed'], run.result,
+      ' (WRONG)' if judgement.wrong else '', ' | '.join(numbers))
 
 
-def print_summary(rows):
+def summary(rows):
   """How many verdicts of each kind err by how much of their own limit."""
+  lines = ['%d runs; wrong: %d; without a model: %d.' % (
+      len(rows), sum(judgement.wrong for _, judgement in rows),
+      sum(run.errors is None for run, _ in rows)), '',
+           '| verdict | up to 1.5 own limits | 1.5 to 3 | above 3 |',
+           '|---|---|---|---|']
   bounds = [(0.0, 1.5), (1.5, MAX_RATIO), (MAX_RATIO, float('inf'))]
-  print('\n| verdict | up to 1.5 own limits | 1.5 to 3 | above 3 |\n'
-        '|---|---|---|---|')
   for result in ('good', 'doubtful', 'failed'):
     ratios = [judgement.own for run, judgement in rows
               if run.result == result and judgement.own is not None]
-    print('| %s | %s |' % (result, ' | '.join(
+    lines.append('| %s | %s |' % (result, ' | '.join(
         str(sum(low < value <= high for value in ratios))
         for low, high in bounds)))
-  print('\n%d runs, %d without a model, %d wrong; good ones above %g unspoilt '
-        'limits: %d' % (
-            len(rows), sum(run.errors is None for run, _ in rows),
-            sum(judgement.wrong for _, judgement in rows), MAX_RATIO,
-            sum(run.result == 'good' and (judgement.unspoilt or 0) > MAX_RATIO
-                for run, judgement in rows)))
+  return lines + ['', 'Good ones above %g unspoilt limits in metres: %d.' % (
+      MAX_RATIO, sum(run.result == 'good' and
+                     (judgement.unspoilt or 0) > MAX_RATIO
+                     for run, judgement in rows))]
+
+
+def report(records, args):
+  runs = [from_record(record) for record in records]
+  rows = [(run, judge(run)) for run in runs]
+  args.num_wrong = sum(judgement.wrong for _, judgement in rows)
+  return '\n'.join(summary(rows) + [
+      '', '| world | seed | verdict | error [m] | own limit [m] | ratio | '
+      'shape: ratio | metres: sigmas off | unspoilt limit [m] | ratio |',
+      '|---|---|---|---|---|---|---|---|---|---|',
+      *(table_row(record, *row) for record, row in zip(records, rows))]) + '\n'
 
 
 def main():
-  parser = argparse.ArgumentParser(description=__doc__)
-  parser.add_argument('colmap', help='our colmap')
-  parser.add_argument('folder', help='for the worlds; removed one by one')
-  parser.add_argument('--images', type=int, default=100)
-  parser.add_argument('--seeds', type=int, nargs='+', default=[1])
+  parser = argparse.ArgumentParser(
+      description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+  add_arguments(parser, __file__, 'verdicts', 'adasfm-verdicts')
+  parser.add_argument('--images', type=int, default=60)
+  parser.add_argument('--seeds', type=int, nargs='+', default=[1, 2, 3])
   parser.add_argument('--only', default='', help='rows with this in the name')
   args = parser.parse_args()
   colmap = os.path.abspath(args.colmap)
-  rows = []
-  print('| world | seed | verdict | error [m] | own limit [m] | ratio | '
-        'shape: ratio | metres: sigmas off | unspoilt limit [m] | ratio | said |')
-  print('|---|---|---|---|---|---|---|---|---|---|---|')
-  for name, options in {**WORLDS, **WRONG}.items():
-    if args.only not in name:
-      continue
-    for seed in args.seeds:
-      folder = os.path.join(os.path.abspath(args.folder), 'world')
-      run = run_world(colmap, folder, options, args.images, seed)
-      judgement = judge(run)
-      rows.append((run, judgement))
-      print(table_row(name, seed, run, judgement), flush=True)
-  print_summary(rows)
-  return 1 if any(judgement.wrong for _, judgement in rows) else 0
+  folder = os.path.join(os.path.abspath(args.output_path), 'world')
+
+  def run(name, options, seed):
+    result = run_world(colmap, folder, options, args.images, seed)
+    shutil.rmtree(folder, ignore_errors=True)
+    return to_record(name, seed, result, folder)
+
+  run_table({'%s %d' % (name, seed): ([args.images],
+                                      functools.partial(run, name, options,
+                                                        seed))
+             for name, options in {**WORLDS, **WRONG}.items()
+             if args.only in name for seed in args.seeds}, report, args)
+  return 1 if args.num_wrong else 0
 
 
 if __name__ == '__main__':
