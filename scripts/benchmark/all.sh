@@ -6,8 +6,8 @@
 # Interrupted, it goes on where it was. What is missing (the recordings, another
 # COLMAP) is left out with one line.
 #
-#   scripts/benchmark/all.sh --quick    README's table and COLMAP 4 beside it: some
-#                                       36 minutes on two idle cores
+#   scripts/benchmark/all.sh --quick    README's table and COLMAP 4 beside it: 20 to
+#                                       40 minutes on two idle cores
 #   scripts/benchmark/all.sh            everything: several hours
 #   scripts/benchmark/all.sh -h         all options
 set -euo pipefail
