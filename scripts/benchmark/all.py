@@ -44,6 +44,10 @@ CLEANER_SETS = ['world-alias-300', 'world-hard-400', 'world-clean-300',
 # Look-alikes, nothing hard, few good matches, and two real motions.
 ABLATION_SETS = ['alias-300', 'clean-500', 'noisy-500', 'outliers-500',
                  'world-hard-400', 'kitti07-160', 'world-kitti10-592']
+# Worlds full of look-alikes that forty seeds can be made of.
+ALIKE_DIALS = ['parallel streets', 'parallel streets, half of the pairs false',
+               'parallel streets, three blackouts',
+               'half of the pairs spurious', '62 % of the pairs false']
 # The commands of COLMAP 4, and the names of the benchmark's methods for them.
 PEER_COMMANDS = {'mapper': 'colmap4_mapper',
                  'global_mapper': 'colmap4_global_mapper'}
@@ -189,6 +193,11 @@ def run_script(args, step, script, *options):
                 os.path.join(args.figures_path, step + '.json')])
 
 
+def photos(args):
+  run_script(args, 'photos', 'photo_tables.py', '--data_path', args.data_path,
+             '--colmap4', find_colmap4(args))
+
+
 # The steps, in the order in which they are run.
 STEPS = {
     'readme': lambda args: Benchmark(args).readme(),
@@ -207,6 +216,10 @@ STEPS = {
         '--images_path', os.path.join(args.docs_root, 'docs', 'images')),
     'stress_worlds': lambda args: run_script(args, 'stress_worlds',
                                              'stress_worlds.py'),
+    'alike_seeds': lambda args: run_script(
+        args, 'alike_seeds', 'stress_worlds.py', *ALIKE_DIALS, '--seeds',
+        '1-40', '--summary', '1'),
+    'photos': photos,
     'global_results': lambda args: run_script(
         args, 'global_results', 'global_tables.py', '--num_seeds', '5'),
     'global_seeds': lambda args: run_script(
@@ -221,6 +234,9 @@ STEPS = {
                                                'estimator_seeds.py'),
     'kinds': lambda args: Benchmark(args).kinds(),
     'verdicts': lambda args: run_script(args, 'verdicts', 'verdict_table.py'),
+    'faults': lambda args: run_script(
+        args, 'faults', 'fault_tables.py', '--data_path', args.data_path,
+        '--features_path', os.path.join(args.output_path, 'features')),
     'growth': lambda args: run_script(
         args, 'growth', 'growth.py', '--limits', '4000,10000', '--plot_path',
         os.path.join(args.docs_root, 'docs', 'images', 'growth.svg')),

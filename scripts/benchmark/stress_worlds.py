@@ -12,10 +12,12 @@ without a warning is the one thing that must not happen. Needs numpy.
 """
 
 import argparse
+import collections
 import functools
 import json
 import os
 import shutil
+import statistics
 import sys
 
 from benchmarking.dials import DIALS, MAX_DRIFT_WITHOUT_LOGS
@@ -173,6 +175,21 @@ def run_dial(name, seed, args):
   return record
 
 
+def format_figures(record):
+  """What the world has, or why there is none."""
+  world = record.get('world', {})
+  return record.get('error', ', '.join(
+      format_figure(key, world[key]) for key in DIALS[record['dial']]['figures']
+      if key in world))
+
+
+def count_silent(records):
+  outcomes = [r[key] for r in records for key in ('with', 'without')
+              if key in r]
+  return 'Beyond the bar without a word: %d of %d models.' % (
+      sum('SILENT' in o['verdict'] for o in outcomes), len(outcomes))
+
+
 def format_pairs(pairs):
   """Lost of the true ones, of those the ones of right pose; kept false ones."""
   if not pairs:
@@ -216,21 +233,46 @@ def report(records, args):
       'lost, false kept | images, no logs | m | verdict | pairs |',
       '|---|---|---|---|---|---|---|---|---|---|---|']
   for record in records:
-    world = record.get('world', {})
-    figures = ', '.join(format_figure(key, world[key])
-                        for key in DIALS[record['dial']]['figures']
-                        if key in world)
     lines.append('| ' + ' | '.join(
-        [record['dial'], str(record['seed']),
-         record.get('error', figures)] + cells(record.get('with')) +
-        cells(record.get('without'))) + ' |')
-  silent = [(r['dial'], r['seed'], key) for r in records
-            for key in ('with', 'without')
-            if 'SILENT' in r.get(key, {}).get('verdict', '')]
-  lines += ['', 'Beyond the bar without a word: %d of %d models.' % (
-      len(silent), sum(key in r for r in records for key in
-                       ('with', 'without')))]
-  return '\n'.join(lines) + '\n'
+        [record['dial'], str(record['seed']), format_figures(record)] +
+        cells(record.get('with')) + cells(record.get('without'))) + ' |')
+  return '\n'.join(lines + ['', count_silent(records)]) + '\n'
+
+
+def summary_cells(outcomes):
+  """Of all seeds: how many of each verdict, and the errors. A world that could
+  not be made counts as refused."""
+  verdicts = collections.Counter(o.get('verdict', 'not made')
+                                 for o in outcomes)
+  errors = sorted(o['rmse_m'] for o in outcomes if o.get('rmse_m') is not None)
+  counts = [verdicts.pop(name, 0) for name in
+            ('whole', 'right, incomplete', 'beyond the bar, warned',
+             'BEYOND THE BAR, SILENT')]
+  return [str(count) for count in counts] + [
+      str(sum(verdicts.values())),
+      '%.3f, %.3f' % (statistics.median(errors), errors[-1]) if errors else '-']
+
+
+def report_summary(records, args):
+  """A row a dial and kind of run, over the seeds."""
+  lines = ['Written by `scripts/benchmark/stress_worlds.py --summary 1 --seeds '
+           '%s`: worlds whose models are whole, miss images, err by more than '
+           'the bar with a warning about a model or without any word, and those '
+           'refused or not made; then median and largest RMSE of camera centres after a '
+           'similarity. Bars as in [stress_worlds.md](stress_worlds.md).' %
+           args.seeds, '',
+           '| dial | what the first world has | logs | whole | incomplete | '
+           'beyond, warned | beyond, silent | refused | median, worst m |',
+           '|---|---|---|---:|---:|---:|---:|---:|---|']
+  for name in args.dials or DIALS:
+    mine = [r for r in records if r['dial'] == name]
+    for key, logs in (('with', '+'.join(DIALS[name]['logs'])),
+                      ('without', 'none')):
+      if key in args.runs.split(','):
+        outcomes = [r if 'error' in r else r[key] for r in mine]
+        lines.append('| %s |' % ' | '.join(
+            [name, format_figures(mine[0]), logs] + summary_cells(outcomes)))
+  return '\n'.join(lines + ['', count_silent(records)]) + '\n'
 
 
 def parse_arguments():
@@ -241,6 +283,8 @@ def parse_arguments():
   parser.add_argument('--seeds', default='1', help='as 1,2,5-8')
   parser.add_argument('--runs', default='with,without',
                       help='with logs, without, or both')
+  parser.add_argument('--summary', type=int, default=0,
+                      help='1: a row a dial with counts over the seeds')
   parser.add_argument('--run_mapper', type=int, default=1,
                       help='0: coarse models only')
   args = parser.parse_args()
@@ -265,7 +309,8 @@ def main():
              ([DIALS[name], args.runs, args.run_mapper],
               functools.partial(run_dial, name, seed, args))
              for name in args.dials or DIALS
-             for seed in list_seeds(args.seeds)}, report, args)
+             for seed in list_seeds(args.seeds)},
+            report_summary if args.summary else report, args)
 
 
 if __name__ == '__main__':

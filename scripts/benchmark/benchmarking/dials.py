@@ -58,6 +58,9 @@ DIALS = {
     '70 % of the pairs false': dial(
         ('alias_pair_ratio', 'spurious_pair_ratio'), 200, alias_ratio=0.2,
         spurious_ratio=0.5),
+    '62 % of the pairs false': dial(
+        ('alias_pair_ratio', 'spurious_pair_ratio'), 200, alias_ratio=0.12,
+        spurious_ratio=0.5),
     'turns on the spot': dial(('standing_s',), 200, spins=1, spin_duration=4),
     'long standstill': dial(('standing_s',), 200, stops=1, stop_duration=12),
     'wheels on gravel': dial((), wheel_slip_noise=0.03, wheel_slips=4),

@@ -47,7 +47,8 @@ def images_of(folder, source):
   return images if os.path.isdir(images) else folder
 
 
-def run_mapper(command, executable, folder, source, args):
+def run_mapper(command, executable, folder, source, args, fixed=True):
+  """fixed: the database's intrinsics are kept."""
   output = os.path.join(folder, 'model')
   os.makedirs(output)
   arguments = [executable, command, '--database_path',
@@ -55,7 +56,8 @@ def run_mapper(command, executable, folder, source, args):
   if command in ('mapper', 'hierarchical_mapper', 'global_mapper'):
     arguments += ['--image_path', images_of(folder, source)]
     group = 'GlobalMapper' if command == 'global_mapper' else 'Mapper'
-    if has_option(executable, command, group + '.ba_refine_focal_length'):
+    if fixed and has_option(executable, command,
+                            group + '.ba_refine_focal_length'):
       arguments += fixed_intrinsics(group + '.ba_')
   told = os.path.join(folder, 'cleaned.db.options')
   if command == 'mapper' and os.path.isfile(told):
