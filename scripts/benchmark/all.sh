@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: BSD-3-Clause
-# Makes every table of README.md and docs from nothing but those of
-# matching and faults: sets up, builds, runs what is not done yet with
+# Makes every table of README.md and docs that compares from nothing (those of
+# matching.md are experiments of earlier builds): sets up, builds, runs what is not done yet with
 # this version on this machine, and writes the tables into the pages.
 # Interrupted, it goes on where it was. What is missing (the recordings, another
 # COLMAP) is left out with one line.
