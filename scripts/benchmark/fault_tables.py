@@ -121,16 +121,16 @@ def run_campaign(name, folder, args):
   journal = os.path.join(folder, 'journal-%s' % hash_sources(args.root))
   arguments = [sys.executable, FAULTS, args.colmap, '--seed', str(SEED),
                '--journal', journal]
-  for campaign, (_, trials) in CAMPAIGNS.items():
+  for campaign in CAMPAIGNS:
     arguments += ['--' + campaign,
-                  str(trials // args.divide if campaign == name else 0)]
+                  str(getattr(args, name) if campaign == name else 0)]
   done = subprocess.run(arguments, capture_output=True, text=True, check=False)
   print(done.stdout, file=sys.stderr)
   counts = {}
   with open(journal) as file:
     for line in file:
-      _, campaign, _, outcome = line.rstrip('\n').split('\t')
-      if campaign == name:
+      _, campaign, number, outcome = line.rstrip('\n').split('\t')
+      if campaign == name and int(number) < getattr(args, name):
         counts[outcome] = counts.get(outcome, 0) + 1
   return {'campaign': name, 'counts': counts}
 
@@ -229,8 +229,9 @@ def parse_arguments():
   parser.add_argument('--features_path', default='',
                       help="folder of COLMAP's databases of real photos; "
                       'default: features in that of --output_path')
-  parser.add_argument('--divide', type=int, default=1,
-                      help='so many times fewer trials')
+  for name, (_, trials) in CAMPAIGNS.items():
+    parser.add_argument('--' + name, type=int, default=trials, metavar='N',
+                        help='trials, %d unless given' % trials)
   args = parser.parse_args()
   args.features_path = args.features_path or os.path.join(args.output_path,
                                                           'features')
@@ -255,8 +256,8 @@ def main():
       rows['%s %d' % (name, step)] = (
           RATE_DRIVES.get(name), functools.partial(run_rate, name, step, folder,
                                                    args))
-  for name, (_, trials) in CAMPAIGNS.items():
-    rows[name] = ([SEED, trials // args.divide],
+  for name in CAMPAIGNS:
+    rows[name] = ([SEED, getattr(args, name)],
                   functools.partial(run_campaign, name, folder, args))
   run_table(rows, report, args)
 
