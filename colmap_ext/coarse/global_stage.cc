@@ -145,12 +145,9 @@ std::string DescribeMatches(const GlobalStageResult& result) {
 }
 
 void MeasureSizes(const SceneData& scene, GlobalStageResult* result) {
-  const CameraMountReport& mount = result->poses.camera_mount;
-  const Eigen::Quaterniond camera_mount =
-      mount.corrected ? ExpSo3(mount.turn_rad) : Eigen::Quaterniond::Identity();
   for (CoarseModel& model : result->models) {
     const std::vector<InertialLength> lengths =
-        MeasureSize(scene, camera_mount, &model);
+        MeasureSize(scene, result->poses.camera_mount, &model);
     result->inertial_lengths.insert(result->inertial_lengths.end(),
                                     lengths.begin(), lengths.end());
   }
@@ -259,7 +256,8 @@ StatusOr<GlobalStageResult> RunGlobalStage(
                             std::to_string(num_joins) +
                                 " of parts whose points tell their size, " +
                                 std::to_string(num_split) +
-                                " parts taken out that no points tie"});
+                                " parts taken out that no points tie or "
+                                "that the accelerometer puts elsewhere"});
   }
   MeasurePairAgreements(options, scene, correspondences.bearings, &result);
 

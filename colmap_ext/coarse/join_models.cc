@@ -8,10 +8,12 @@
 #include <set>
 #include <utility>
 
+#include "colmap_ext/coarse/measure_size.h"
 #include "colmap_ext/coarse/model_sights.h"
 #include "colmap_ext/coarse/refine_stage_matches.h"
 #include "colmap_ext/host/pose_conversion.h"
 #include "core/so3.h"
+#include "global/odometry/inertial_breaks.h"
 #include "global/structure/join_parts.h"
 
 namespace adasfm {
@@ -217,7 +219,10 @@ bool ModelJoiner::Adjust(const std::set<int>& models,
       BuildCoarseModel(options_.structure, scene_, bearings_, std::move(input));
   if (!model.rounds.back().success ||
       !MeasureModelAgreement(options_, scene_, poses.graph, bearings_, model)
-           .IsSound()) {
+           .IsSound() ||
+      !FindPartsByInertia(MotionsOfCamera(scene_, poses.camera_mount),
+                          poses.priors, CamsFromWorld(model.reconstruction))
+           .empty()) {
     return false;
   }
   for (const int k : models) {

@@ -21,7 +21,7 @@ namespace adasfm {
 // unknown size or as disconnected give place and size (EstimatePartJoin). Joins
 // whose size is known to 5 % are made, the best first, and each new model is
 // adjusted as a whole; it takes the parts' place where the verified pairs agree
-// with it.
+// with it, and the accelerometer.
 // Returns the number of joins made; models that went into another one are left
 // empty. On failure: the models stay apart.
 int JoinModels(const GlobalStageOptions& options, const SceneData& scene,

@@ -8,20 +8,28 @@
 #include "colmap_ext/host/pose_conversion.h"
 #include "colmap_ext/scene/align_to_gravity.h"
 #include "core/sim3d.h"
+#include "core/so3.h"
 #include "global/odometry/inertial_scale.h"
 
 namespace adasfm {
 
+std::vector<InertialMotion> MotionsOfCamera(
+    const SceneData& scene, const CameraMountReport& camera_mount) {
+  std::vector<InertialMotion> motions = scene.inertial_motions;
+  if (camera_mount.corrected) {
+    const Eigen::Quaterniond turn = ExpSo3(camera_mount.turn_rad);
+    for (InertialMotion& motion : motions) TurnInertialMotion(turn, &motion);
+  }
+  return motions;
+}
+
 std::vector<InertialLength> MeasureSize(const SceneData& scene,
-                                        const Eigen::Quaterniond& camera_mount,
+                                        const CameraMountReport& camera_mount,
                                         CoarseModel* model) {
   if (model->metric || scene.inertial_motions.empty()) return {};
-  std::vector<InertialMotion> motions = scene.inertial_motions;
-  for (InertialMotion& motion : motions) {
-    TurnInertialMotion(camera_mount, &motion);
-  }
   const std::optional<InertialScale> scale =
-      EstimateInertialScale(motions, CamsFromWorld(model->reconstruction));
+      EstimateInertialScale(MotionsOfCamera(scene, camera_mount),
+                            CamsFromWorld(model->reconstruction));
   if (!scale) return {};
   model->metric = true;
   model->inertial_scale_sigma = scale->sigma_ratio;

@@ -4,9 +4,11 @@
 #include <set>
 #include <utility>
 
+#include "colmap_ext/coarse/measure_size.h"
 #include "colmap_ext/host/pose_conversion.h"
 #include "colmap_ext/scene/untied_parts.h"
 #include "core/so3.h"
+#include "global/odometry/inertial_breaks.h"
 
 namespace adasfm {
 namespace {
@@ -22,15 +24,27 @@ class ModelSplitter {
         scene_(scene),
         bearings_(bearings),
         matches_(matches),
+        motions_(MotionsOfCamera(scene, result->poses.camera_mount)),
         result_(*result) {}
 
-  // Returns the number of parts taken out of a model.
-  int Split(size_t model) {
+  // These return the number of parts taken out of a model.
+  int SplitUntied(size_t model) {
     std::vector<RelativePosePrior> priors = result_.poses.priors;
     priors.insert(priors.end(), scene_.frame_priors.begin(),
                   scene_.frame_priors.end());
-    std::vector<std::set<image_t>> groups =
-        FindUntiedParts(priors, result_.models[model].reconstruction);
+    return TakeOut(
+        FindUntiedParts(priors, result_.models[model].reconstruction), model);
+  }
+
+  int SplitByInertia(size_t model) {
+    return TakeOut(
+        FindPartsByInertia(motions_, result_.poses.priors,
+                           CamsFromWorld(result_.models[model].reconstruction)),
+        model);
+  }
+
+ private:
+  int TakeOut(const std::vector<std::set<image_t>>& groups, size_t model) {
     if (groups.empty()) return 0;
     const std::map<image_t, Rigid3d> poses =
         CamsFromWorld(result_.models[model].reconstruction);
@@ -50,7 +64,6 @@ class ModelSplitter {
     return static_cast<int>(groups.size());
   }
 
- private:
   void RemovePairsAcross(const std::vector<std::set<image_t>>& groups,
                          const std::set<image_t>& rest) {
     std::map<image_t, int> group_of;
@@ -105,6 +118,7 @@ class ModelSplitter {
   const SceneData& scene_;
   const std::map<image_t, std::vector<Bearing>>& bearings_;
   const Matches& matches_;
+  const std::vector<InertialMotion> motions_;
   GlobalStageResult& result_;
 };
 
@@ -114,14 +128,17 @@ int SplitModels(const GlobalStageOptions& options, const SceneData& scene,
                 const std::map<image_t, std::vector<Bearing>>& bearings,
                 const Matches& matches, GlobalStageResult* result) {
   ModelSplitter splitter(options, scene, bearings, matches, result);
-  const size_t num_models = result->models.size();
+  // Positions tie each image by itself.
+  const auto may_split = [result](size_t k) {
+    return !result->models[k].metric && !result->models[k].positions.success;
+  };
   int num_parts = 0;
-  for (size_t k = 0; k < num_models; ++k) {
-    // Positions tie each image by itself.
-    if (result->models[k].metric || result->models[k].positions.success) {
-      continue;
+  for (const auto split :
+       {&ModelSplitter::SplitUntied, &ModelSplitter::SplitByInertia}) {
+    const size_t num_models = result->models.size();
+    for (size_t k = 0; k < num_models; ++k) {
+      if (may_split(k)) num_parts += (splitter.*split)(k);
     }
-    num_parts += splitter.Split(k);
   }
   return num_parts;
 }

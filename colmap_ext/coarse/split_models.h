@@ -13,7 +13,8 @@ namespace adasfm {
 
 // What: takes adjusted coarse models without metres apart where nothing tells
 // the place of one part against the rest (FindUntiedParts): pairs held the
-// model together before the adjustment, which found their matches wrong.
+// model together before the adjustment, which found their matches wrong. And
+// where an accelerometer puts a part elsewhere (FindPartsByInertia).
 // Inputs: the stage's models and components, in the same order; the verified
 // matches of the pairs that the view graph keeps.
 // Method. Each part is adjusted by itself, from its present poses; pairs

@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <set>
 
 #include "colmap_ext/coarse/join_models.h"
@@ -17,14 +18,20 @@ namespace {
 // adjustment that found the matches between them wrong.
 class SplitModelsTest : public testing::Test {
  protected:
-  SplitModelsTest()
-      : world_(BuildSyntheticWorld(SmallWorld())),
+  explicit SplitModelsTest(int num_images = 60)
+      : world_(BuildSyntheticWorld(WorldOf(num_images))),
         scene_(BuildSyntheticScene(world_, NoPriors())),
         result_(RunStage(scene_)) {
     bearings_ = ComputeSceneBearings(scene_, 1);
     for (const ScenePair& pair : scene_.pairs) {
       matches_[ImagePair(pair.image_id1, pair.image_id2)] = pair.inlier_matches;
     }
+  }
+
+  static SyntheticWorldOptions WorldOf(int num_images) {
+    SyntheticWorldOptions options;
+    options.num_images = num_images;
+    return options;
   }
 
   static SyntheticPriorOptions NoPriors() {
@@ -60,7 +67,7 @@ class SplitModelsTest : public testing::Test {
   int Split() { return SplitModels({}, scene_, bearings_, matches_, &result_); }
 
   const SyntheticWorld world_;
-  const SceneData scene_;
+  SceneData scene_;
   GlobalStageResult result_;
   std::map<image_t, std::vector<Bearing>> bearings_;
   std::map<ImagePair, std::vector<FeatureMatch>> matches_;
@@ -100,6 +107,89 @@ TEST_F(SplitModelsTest, ModelsInMetresStayWhole) {
   result_.models[0].metric = true;
   EXPECT_EQ(Split(), 0);
   EXPECT_EQ(result_.models.size(), 1);
+}
+
+// Long enough for metres from an accelerometer.
+class SplitByInertiaTest : public SplitModelsTest {
+ protected:
+  SplitByInertiaTest() : SplitModelsTest(150) {}
+
+  // Moves the first 20 images aside, by so many metres.
+  void MoveFirst(double way_m) {
+    colmap::Reconstruction& model = result_.models[0].reconstruction;
+    const double units_per_metre =
+        1.0 / ComputeAlignedErrors(CamsFromWorld(model), TruePoses(), {}).scale;
+    std::map<image_t, Rigid3d> poses = CamsFromWorld(model);
+    for (auto& [image_id, pose] : poses) {
+      if (!IsFirst(image_id)) continue;
+      pose.translation -=
+          pose.rotation * Eigen::Vector3d(way_m * units_per_metre, 0.0, 0.0);
+      SetCamFromWorld(pose, &model.Image(image_id));
+    }
+  }
+
+  // What an IMU in the camera's place integrated without errors.
+  void AddInertialMotions() {
+    const Eigen::Vector3d gravity(0.0, 0.0, -9.81);
+    const std::vector<SyntheticImage>& images = world_.images;
+    const auto position = [&images](size_t i) {
+      return images[i].cam_from_world.TargetOriginInSource();
+    };
+    const auto seconds = [&images](size_t i) {
+      return 1e-9 * static_cast<double>(images[i].timestamp_ns);
+    };
+    const auto velocity = [&](size_t i) -> Eigen::Vector3d {
+      const size_t first = i > 0 ? i - 1 : 0;
+      const size_t last = std::min(i + 1, images.size() - 1);
+      return (position(last) - position(first)) /
+             (seconds(last) - seconds(first));
+    };
+    for (size_t i = 0; i + 1 < images.size(); ++i) {
+      const Eigen::Quaterniond& cam_from_world =
+          images[i].cam_from_world.rotation;
+      InertialMotion motion;
+      motion.image_id1 = images[i].image_id;
+      motion.image_id2 = images[i + 1].image_id;
+      const double dt = motion.dt_s = seconds(i + 1) - seconds(i);
+      motion.delta_velocity =
+          cam_from_world * (velocity(i + 1) - velocity(i) - gravity * dt);
+      motion.delta_position =
+          cam_from_world * (position(i + 1) - position(i) - velocity(i) * dt -
+                            0.5 * dt * dt * gravity);
+      motion.velocity_by_bias = -dt * Eigen::Matrix3d::Identity();
+      motion.position_by_bias = -0.5 * dt * dt * Eigen::Matrix3d::Identity();
+      scene_.inertial_motions.push_back(motion);
+    }
+  }
+};
+
+TEST_F(SplitByInertiaTest, TakesAPartOutThatStandsElsewhere) {
+  AddInertialMotions();
+  EXPECT_EQ(Split(), 0);
+  MoveFirst(10.0);
+  EXPECT_EQ(Split(), 1);
+  ASSERT_EQ(result_.models.size(), 2);
+  EXPECT_EQ(result_.models[0].reconstruction.NumRegImages(), 130);
+  EXPECT_EQ(result_.models[1].reconstruction.NumRegImages(), 20);
+  for (const ViewGraphEdge& edge : result_.poses.graph.edges) {
+    EXPECT_FALSE(edge.IsKept() &&
+                 IsFirst(edge.image_id1) != IsFirst(edge.image_id2));
+  }
+  // Its matches are right here: they give its true place, which the
+  // accelerometer does not deny.
+  EXPECT_EQ(JoinModels({}, scene_, bearings_, matches_, &result_), 1);
+  SortModels(&result_);
+  ASSERT_EQ(result_.models.size(), 1);
+  EXPECT_LT(
+      ComputeAlignedErrors(CamsFromWorld(result_.models[0].reconstruction),
+                           TruePoses(), {})
+          .rmse_m,
+      0.1);
+}
+
+TEST_F(SplitByInertiaTest, LeavesItWithoutAnAccelerometer) {
+  MoveFirst(10.0);
+  EXPECT_EQ(Split(), 0);
 }
 
 }  // namespace
