@@ -92,6 +92,13 @@ StatusOr<MergeCheckpoint> ReadRound(const std::string& path,
   return MergeCheckpoint{num_rounds, std::move(*model)};
 }
 
+void RemoveEarlierRounds(const std::string& checkpoint_path, int num_rounds) {
+  for (int round = 0; round < num_rounds; ++round) {
+    std::error_code ignored;
+    std::filesystem::remove_all(RoundPath(checkpoint_path, round), ignored);
+  }
+}
+
 }  // namespace
 
 Status WriteMergeCheckpoint(const std::string& checkpoint_path,
@@ -103,11 +110,7 @@ Status WriteMergeCheckpoint(const std::string& checkpoint_path,
   const Status status =
       WriteModelCheckpoint(RoundPath(checkpoint_path, num_rounds), fingerprint,
                            std::move(state), &scene.reconstruction);
-  if (!status.ok()) return status;
-  for (int round = 0; round < num_rounds; ++round) {
-    std::error_code ignored;
-    std::filesystem::remove_all(RoundPath(checkpoint_path, round), ignored);
-  }
+  if (status.ok()) RemoveEarlierRounds(checkpoint_path, num_rounds);
   return status;
 }
 
@@ -120,7 +123,11 @@ StatusOr<MergeCheckpoint> ReadMergeCheckpoint(
     if (!std::filesystem::exists(path)) continue;
     StatusOr<MergeCheckpoint> read =
         ReadRound(path, fingerprint, num_rounds, summary);
-    if (read.ok()) return read;
+    if (read.ok()) {
+      // A kill may have left half of them.
+      RemoveEarlierRounds(checkpoint_path, num_rounds);
+      return read;
+    }
     problems += (problems.empty() ? "" : "; ") + read.status().message();
   }
   return Status::Error(

@@ -22,9 +22,9 @@ struct MergeCheckpoint {
   colmap::Reconstruction model;
 };
 
-// Reads the checkpoint of most rounds, with the summary. An error when there is
-// none of this fingerprint that is sound; it says what is wrong with those that
-// are there.
+// Reads the checkpoint of most rounds, with the summary, and removes what is
+// left of those of fewer. An error when there is none of this fingerprint that
+// is sound; it says what is wrong with those that are there.
 StatusOr<MergeCheckpoint> ReadMergeCheckpoint(
     const std::string& checkpoint_path, const std::string& fingerprint,
     MapperStageSummary* summary);

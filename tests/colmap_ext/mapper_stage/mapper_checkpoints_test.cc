@@ -167,10 +167,13 @@ TEST_F(MapperCheckpointsTest, ContinuesInsideTheRefinement) {
   const std::string saved = folder_ + "/checkpoints/refine_";
   EXPECT_FALSE(fs::exists(saved + "0"));
   EXPECT_TRUE(fs::exists(saved + "1"));
-  // Twice: the rest of the rounds, then nothing but reading.
+  // Twice: the rest of the rounds, then nothing but reading, of a folder where
+  // a kill has left half of an earlier round.
   for (int run = 0; run < 2; ++run) {
+    if (run == 1) fs::create_directory(saved + "2");
     const auto continued = Run(world);
     EXPECT_TRUE(fs::exists(saved + "3"));
+    EXPECT_FALSE(fs::exists(saved + "2"));
     ASSERT_EQ(undisturbed.size(), continued.size());
     for (const auto& [image_id, pose] : undisturbed) {
       EXPECT_TRUE(PosesNear(pose, continued.at(image_id), 1e-12, 1e-12));
