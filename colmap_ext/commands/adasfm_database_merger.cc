@@ -7,6 +7,7 @@
 
 #include "colmap_ext/commands/registry.h"
 #include "colmap_ext/database/merge_databases.h"
+#include "core/strict_stream.h"
 
 namespace adasfm {
 namespace {
@@ -25,6 +26,7 @@ StatusOr<std::vector<std::string>> ReadPathList(const std::string& path) {
   if (!file) {
     return Status::Error("cannot read " + path + "; check --input_list_path");
   }
+  ThrowOnFailure(&file);
   std::vector<std::string> paths;
   std::string line;
   while (std::getline(file, line)) {

@@ -7,6 +7,7 @@
 #include "colmap_ext/host/frame_files.h"
 #include "colmap_ext/host/model.h"
 #include "colmap_ext/host/model_folder.h"
+#include "colmap_ext/io/folder_lock.h"
 #include "colmap_ext/io/georeference_file.h"
 #include "colmap_ext/io/output_files.h"
 #include "colmap_ext/scene/align_to_gravity.h"
@@ -40,7 +41,11 @@ Status WriteInFrame(const GeoreferencerOptions& options) {
     camera.cam_from_rig->translation *= target->target_from_enu.scale;
   }
   Status status = PrepareOutputFolder(options.output_path);
-  if (status.ok()) status = CheckModelFolder(options.output_path);
+  if (!status.ok()) return status;
+  const auto lock =
+      FolderLock::Acquire(options.output_path, FolderLock::Mode::kExclusive);
+  if (!lock.ok()) return lock.status();
+  status = CheckModelFolder(options.output_path);
   if (status.ok()) {
     status = WriteBinaryModel(*model, options.output_path, *frames);
   }

@@ -46,12 +46,19 @@ void PrintError(const std::string& message) {
   std::cerr << "ERROR: " << OneLine(message) << std::endl;
 }
 
+// Whatever std::cerr writes to at that time, as a log of a library's work.
+void WriteToStderr(const char* text) {
+  const ssize_t ignored = write(STDERR_FILENO, text, std::strlen(text));
+  static_cast<void>(ignored);
+}
+
 // A failed CHECK of the host would abort with a core dump; glog has already
 // written the check itself to standard error.
 [[noreturn]] void ExitOnFailedCheck() {
-  PrintError(
-      "COLMAP stopped at the check above; look at the input that it names");
   std::fflush(nullptr);
+  WriteToStderr(
+      "ERROR: COLMAP stopped at the check above; look at the input that it "
+      "names\n");
   _exit(EXIT_FAILURE);
 }
 
@@ -66,21 +73,16 @@ void ReportExitOfLibrary() {
     may_exit_go_on = true;
     return;
   }
-  PrintError(
-      "a library stopped at the error above; mend its cause (space, memory or "
-      "threads that are short), then give the same command again");
   std::fflush(nullptr);
+  WriteToStderr(
+      "ERROR: a library stopped at the error above; mend its cause (space, "
+      "memory or threads that are short), then give the same command again\n");
   _exit(EXIT_FAILURE);
 }
 
 // A second thread passes over the handler that the first one is in.
 void WaitForReportOfExit() {
   while (!may_exit_go_on) std::this_thread::yield();
-}
-
-void WriteToStderr(const char* text) {
-  const ssize_t ignored = write(STDERR_FILENO, text, std::strlen(text));
-  static_cast<void>(ignored);
 }
 
 // An exception that nobody could catch: in a thread of a library, or where

@@ -10,6 +10,8 @@
 #include <sstream>
 #include <stdexcept>
 
+#include "core/strict_stream.h"
+
 namespace adasfm {
 namespace {
 
@@ -50,6 +52,7 @@ std::string ReadText(const std::string& path) {
 std::vector<double> NumbersFromText(const std::string& text,
                                     const std::string& path) {
   std::istringstream words(text);
+  ThrowOnFailure(&words);
   std::vector<double> numbers;
   for (std::string word; words >> word;) {
     double value = 0.0;
@@ -64,6 +67,7 @@ std::vector<double> NumbersFromText(const std::string& text,
 std::map<std::string, std::vector<double>> ReadKeyedNumbers(
     const std::string& path) {
   std::istringstream lines(ReadText(path));
+  ThrowOnFailure(&lines);
   std::map<std::string, std::vector<double>> values;
   for (std::string line; std::getline(lines, line);) {
     const size_t colon = line.find(':');

@@ -12,6 +12,7 @@
 
 #include "colmap_ext/datasets/dataset_files.h"
 #include "colmap_ext/datasets/dataset_layout.h"
+#include "core/strict_stream.h"
 #include "core/types.h"
 
 namespace adasfm {
@@ -91,6 +92,7 @@ timestamp_t ParseTime(const std::string& line, const std::string& path) {
 
 std::vector<timestamp_t> ReadTimes(const std::string& path) {
   std::istringstream lines(ReadText(path));
+  ThrowOnFailure(&lines);
   std::vector<timestamp_t> times;
   for (std::string line; std::getline(lines, line);) {
     if (line.size() > 1) times.push_back(ParseTime(line, path));

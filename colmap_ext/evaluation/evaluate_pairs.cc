@@ -9,6 +9,7 @@
 
 #include "colmap_ext/host/camera.h"
 #include "colmap_ext/scene/two_view_poses.h"
+#include "core/strict_stream.h"
 
 namespace adasfm {
 namespace {
@@ -118,11 +119,13 @@ StatusOr<KeypointLandmarks> ReadKeypointLandmarks(const std::string& path) {
   if (!file) {
     return Status::Error("cannot read " + path + "; check --landmarks_path");
   }
+  ThrowOnFailure(&file);
   KeypointLandmarks landmarks;
   int line_number = 0;
   for (std::string line; std::getline(file, line);) {
     ++line_number;
     std::istringstream words(line);
+    ThrowOnFailure(&words);
     std::string name;
     if (!(words >> name) || name[0] == '#') continue;
     std::vector<int>& ids = landmarks[name];

@@ -10,6 +10,7 @@
 #include "core/interpolate_pose.h"
 #include "core/option_checker.h"
 #include "core/sensor_log.h"
+#include "core/strict_stream.h"
 #include "sensors/io/log_file.h"
 #include "sensors/io/read_image_times.h"
 #include "sensors/io/read_wheel.h"
@@ -27,10 +28,12 @@ bool IsNumber(const std::string& word) {
 // not an image name.
 bool IsTrajectory(const std::string& path) {
   std::ifstream file(path);
+  ThrowOnFailure(&file);
   SkipByteOrderMark(&file);
   std::string line;
   while (std::getline(file, line)) {
     std::istringstream words(line);
+    ThrowOnFailure(&words);
     std::string first;
     if (!(words >> first) || first[0] == '#') continue;
     return IsNumber(first);
@@ -44,11 +47,13 @@ StatusOr<NamedPoses> ReadPoseLines(const std::string& path) {
     return Status::Error("cannot read the ground truth " + path +
                          "; check --ground_truth_path");
   }
+  ThrowOnFailure(&file);
   SkipByteOrderMark(&file);
   NamedPoses poses;
   std::string line;
   for (int number = 1; std::getline(file, line); ++number) {
     std::istringstream words(line);
+    ThrowOnFailure(&words);
     std::string name;
     if (!(words >> name) || name[0] == '#') continue;
     Eigen::Quaterniond rotation;

@@ -6,6 +6,7 @@
 #include <fstream>
 
 #include "colmap_ext/host/model.h"
+#include "colmap_ext/io/folder_lock.h"
 #include "colmap_ext/io/output_files.h"
 
 namespace adasfm {
@@ -17,9 +18,9 @@ constexpr char kTemporaryName[] = ".models.tmp";
 
 bool IsModelFile(const std::string& name) {
   static const std::vector<std::string> names = {
-      "cameras.bin",  "cameras.txt",  "images.bin", "images.txt",
-      "points3D.bin", "points3D.txt", "rigs.bin",   "rigs.txt",
-      "frames.bin",   "frames.txt",   "project.ini"};
+      "cameras.bin",  "cameras.txt",  "images.bin",  "images.txt",
+      "points3D.bin", "points3D.txt", "rigs.bin",    "rigs.txt",
+      "frames.bin",   "frames.txt",   "project.ini", kFolderLockName};
   return std::find(names.begin(), names.end(), name) != names.end();
 }
 

@@ -8,6 +8,8 @@
 
 namespace adasfm {
 
+inline constexpr char kFolderLockName[] = ".adasfm.lock";
+
 // Keeps a second run out of a folder while this one writes to it.
 //
 // Method: flock on a hidden file in the folder, which the system gives up when
@@ -24,7 +26,7 @@ class FolderLock {
   // at once, when another run has the lock; it says which.
   static StatusOr<std::shared_ptr<FolderLock>> Acquire(
       const std::string& folder, Mode mode,
-      const std::string& name = ".adasfm.lock");
+      const std::string& name = kFolderLockName);
 
   ~FolderLock();
   FolderLock(const FolderLock&) = delete;

@@ -7,6 +7,7 @@
 
 #include "colmap_ext/host/database.h"
 #include "colmap_ext/pairs/global_descriptors.h"
+#include "core/strict_stream.h"
 
 namespace adasfm {
 namespace {
@@ -21,11 +22,13 @@ StatusOr<std::map<std::string, std::vector<float>>> ReadVectors(
     const std::string& path) {
   std::ifstream file(path);
   if (!file) return Status::Error("cannot read " + path + "; check the path");
+  ThrowOnFailure(&file);
   std::map<std::string, std::vector<float>> vectors;
   size_t num_dimensions = 0;
   std::string text;
   for (int line = 1; std::getline(file, text); ++line) {
     std::istringstream words(text);
+    ThrowOnFailure(&words);
     std::string name;
     if (!(words >> name) || name[0] == '#') continue;
     std::vector<float> vector;

@@ -9,6 +9,7 @@
 #include "colmap_ext/database/two_view_geometry_backup.h"
 #include "colmap_ext/host/database.h"
 #include "colmap_ext/report/report_html.h"
+#include "core/strict_stream.h"
 
 namespace adasfm {
 namespace {
@@ -132,6 +133,7 @@ RemovedPairs ReadRemovedPairs(const std::string& path,
                               const ReportScene& scene) {
   RemovedPairs removed;
   std::ifstream file(path);
+  ThrowOnFailure(&file);
   std::string line;
   while (std::getline(file, line)) {
     line = line.substr(0, line.find('\t'));  // what follows says why

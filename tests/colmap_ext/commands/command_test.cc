@@ -5,6 +5,7 @@
 
 #include <atomic>
 #include <cstdlib>
+#include <iostream>
 #include <new>
 #include <thread>
 #include <vector>
@@ -49,6 +50,16 @@ TEST(RunCommandDeathTest, TheLineIsThereWhenTwoThreadsEndTheProcess) {
     EXPECT_EXIT(RunThat(ExitInTwoThreads), testing::ExitedWithCode(1),
                 "ERROR: a library stopped");
   }
+}
+
+// As while a library's words go to a log.
+TEST(RunCommandDeathTest, TheLineIsThereWhereCerrIsRedirected) {
+  EXPECT_EXIT(RunThat([](int, char**) -> Status {
+                std::cerr.rdbuf(std::cout.rdbuf());
+                std::cout.rdbuf(nullptr);
+                std::exit(EXIT_FAILURE);
+              }),
+              testing::ExitedWithCode(1), "ERROR: a library stopped");
 }
 
 }  // namespace
