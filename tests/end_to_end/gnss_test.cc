@@ -13,6 +13,7 @@
 #include "colmap_ext/host/model.h"
 #include "colmap_ext/host/model_folder.h"
 #include "colmap_ext/host/pose_conversion.h"
+#include "colmap_ext/io/folder_lock.h"
 #include "colmap_ext/io/georeference_file.h"
 #include "core/geodesy.h"
 #include "core/random.h"
@@ -160,6 +161,13 @@ TEST_F(GnssTest, PositionsAlone) {
   EXPECT_EQ(kept->frames.begin()->second.frame_id,
             frames.frames.begin()->second.frame_id);
   EXPECT_EQ(kept->frames.begin()->second.rig_id, 7);
+  // Not while another run writes there.
+  const auto lock =
+      FolderLock::Acquire(folder_.File("ecef"), FolderLock::Mode::kExclusive);
+  ASSERT_TRUE(lock.ok());
+  ExpectError("adasfm_georeferencer --input_path " + folder_.File("sparse/0") +
+                  " --output_path " + folder_.File("ecef"),
+              "is in use by");
 }
 
 // Those that COLMAP 3.8 takes from EXIF.
