@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "core/interpolate_pose.h"
 
-#include "core/first_not_before.h"
-
 namespace adasfm {
 
 std::optional<Rigid3d> InterpolatePose(

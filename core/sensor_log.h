@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <algorithm>
 #include <string>
 #include <vector>
 
@@ -54,6 +55,17 @@ struct ImageTime {
   timestamp_t timestamp_ns = 0;
   std::string name;
 };
+
+// The first sample at time_ns or later, of samples sorted by timestamp_ns;
+// their end when there is none.
+template <typename Sample>
+typename std::vector<Sample>::const_iterator FirstNotBefore(
+    const std::vector<Sample>& samples, timestamp_t time_ns) {
+  return std::lower_bound(samples.begin(), samples.end(), time_ns,
+                          [](const Sample& sample, timestamp_t time) {
+                            return sample.timestamp_ns < time;
+                          });
+}
 
 // White noise densities and bias random walks, continuous time.
 struct ImuNoise {

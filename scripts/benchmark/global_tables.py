@@ -17,7 +17,7 @@ import shutil
 import statistics
 
 from benchmarking.figures import add_arguments, run_table
-from benchmarking.methods import evaluate
+from benchmarking.methods import evaluate, log_options
 from benchmarking.process import Failed, run
 
 # Options of adasfm_global for each ablation.
@@ -66,12 +66,8 @@ def make_world(num_images, seed, args):
   imported = os.path.join(folder, 'imported.db')
   if not os.path.exists(imported):
     shutil.copy(database, imported + '.part')
-    arguments = [args.colmap, 'adasfm_prior_importer', '--database_path',
-                 imported + '.part']
-    for option, file in (('image_times', 'times.csv'), ('imu', 'imu.csv'),
-                         ('wheel', 'wheel.csv'), ('sensors', 'sensors.yaml')):
-      arguments += ['--%s_path' % option, os.path.join(folder, file)]
-    run(arguments, log_path)
+    run([args.colmap, 'adasfm_prior_importer', '--database_path',
+         imported + '.part'] + log_options(folder), log_path)
     os.rename(imported + '.part', imported)
   return folder
 

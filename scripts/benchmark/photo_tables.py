@@ -19,7 +19,7 @@ import sys
 
 from benchmarking.figures import add_arguments, measure, run_table
 from benchmarking.host_options import version_of
-from benchmarking.methods import run_mapper
+from benchmarking.methods import SMALL_PARTS, log_options, run_mapper
 from benchmarking.process import Failed, run
 from benchmarking.sets import camera_params
 
@@ -38,8 +38,6 @@ VARIANTS = {
     '`--extractor opencv`': ['--extractor', 'opencv'],
     '`--first_octave 0`': ['--first_octave', '0'],
 }
-PARTS = ['--AdaSfmPartition.max_num_images_undivided', '50',
-         '--AdaSfmPartition.max_part_size', '50']
 PARTS_NAME = 'mapper alone, parts of 50'
 
 
@@ -49,10 +47,8 @@ def options_of(name, args):
   options = PHOTOS[name]
   if options is None:
     options = ['--camera_model', 'PINHOLE', '--camera_params',
-               camera_params(os.path.join(source, 'sensors.yaml'))]
-    for option, file in (('image_times', 'times.csv'), ('imu', 'imu.csv'),
-                         ('wheel', 'wheel.csv'), ('sensors', 'sensors.yaml')):
-      options += ['--%s_path' % option, os.path.join(source, file)]
+               camera_params(os.path.join(source, 'sensors.yaml')),
+               *log_options(source)]
   return options
 
 
@@ -103,7 +99,7 @@ def run_parts(name, workspace, folder, args):
   output = os.path.join(folder, 'sparse')
   usage = run([args.colmap, 'adasfm_mapper', '--database_path', database,
                '--input_path', os.path.join(workspace, 'coarse'),
-               '--output_path', output, *PARTS], log_path)
+               '--output_path', output, *SMALL_PARTS], log_path)
   with open(os.path.join(output, 'summary.json')) as file:
     num_parts = len(json.load(file)['parts'])
   return dict(outcome(output, source, usage, args, log_path), parts=num_parts)
@@ -208,7 +204,7 @@ def parse_arguments():
 
 def main():
   args = parse_arguments()
-  spec = [VARIANTS, PARTS, list(peers_of(args))]
+  spec = [VARIANTS, SMALL_PARTS, list(peers_of(args))]
   run_table({name: ([PHOTOS[name], *spec], functools.partial(run_set, name,
                                                              args))
              for name in args.sets}, report, args)

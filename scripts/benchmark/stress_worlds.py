@@ -258,8 +258,8 @@ def report_summary(records, args):
   lines = ['Written by `scripts/benchmark/stress_worlds.py --summary 1 --seeds '
            '%s`: worlds whose models are whole, miss images, err by more than '
            'the bar with a warning about a model or without any word, and those '
-           'refused or not made; then median and largest RMSE of camera centres after a '
-           'similarity. Bars as in [stress_worlds.md](stress_worlds.md).' %
+           'refused or not made; then median and largest RMSE of camera centres '
+           'after a similarity. Bars as in [stress_worlds.md](stress_worlds.md).' %
            args.seeds, '',
            '| dial | what the first world has | logs | whole | incomplete | '
            'beyond, warned | beyond, silent | refused | median, worst m |',

@@ -7,9 +7,7 @@ users spoil them, and writes a table of the verdict of adasfm_mapper beside the
 model's error and two limits, each the error of the mapper from the true poses:
 with the run's own imported data and priors, and with the unspoilt data. Errors
 are in metres where the model claims metres, of the shape (after a similarity)
-otherwise. The mapper alone has no metres of an accelerometer, which
-adasfm_global finds: there shapes are compared with the limits, and metres judged
-by their sigma. Fails when a model is called good that errs
+otherwise. Fails when a model is called good that errs
 - by more than MAX_RATIO times its own limit, or
 - by more than MAX_RATIO times the unspoilt limit in its shape: what spoilt data
   do to a limit, too, excuses nothing, or
@@ -233,8 +231,8 @@ def ratio(error_m, limit_m):
 
 
 def error_ratio(errors, limit):
-  """In metres where model and limit claim them, of the shapes otherwise."""
-  if errors.scale is None or limit.scale is None:
+  """In metres where the model claims them, of the shapes otherwise."""
+  if errors.scale is None:
     return ratio(errors.shape_m, limit.shape_m)
   return ratio(errors.metric_m, limit.metric_m)
 

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "core/first_not_before.h"
+#include "core/sensor_log.h"
 #include "core/so3.h"
 #include "sensors/io/log_checks.h"
 #include "sensors/smoother/standstill.h"

@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "core/first_not_before.h"
 #include "core/median.h"
 #include "core/so3.h"
 #include "sensors/io/log_checks.h"

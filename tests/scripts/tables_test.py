@@ -79,16 +79,17 @@ class SeedsTest(unittest.TestCase):
 
 class VerdictsTest(unittest.TestCase):
 
-  def judge(self, scale, shape_m=0.01):
-    """A good model with metres to 2 % whose limit has none."""
+  def judge(self, metric_m, scale=1.0, shape_m=0.01):
+    """A good model with metres to 2 %, whose limit errs by 1 cm."""
     limit = Errors(0.01, 0.01, None, None)
     return verdict_table.judge(Run('good', '', Errors(
-        shape_m, 0.5, scale, 0.02), limit, limit))
+        shape_m, metric_m, scale, 0.02), limit, limit))
 
-  def test_metres_without_a_limit_are_judged_by_their_sigma(self):
-    self.assertFalse(self.judge(1.02).wrong)
-    self.assertTrue(self.judge(1.08).wrong)
-    self.assertTrue(self.judge(1.0, shape_m=0.05).wrong)
+  def test_good_is_wrong_by_metres_shape_or_sigmas(self):
+    self.assertFalse(self.judge(0.029).wrong)
+    self.assertTrue(self.judge(0.031).wrong)
+    self.assertTrue(self.judge(0.029, shape_m=0.031).wrong)
+    self.assertTrue(self.judge(0.029, scale=1.08).wrong)
 
 
 if __name__ == '__main__':

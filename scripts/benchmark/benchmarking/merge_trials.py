@@ -8,7 +8,7 @@ import shutil
 
 import numpy as np
 
-from benchmarking.methods import evaluate
+from benchmarking.methods import SMALL_PARTS, evaluate
 from benchmarking.models import centre_of, read_model, replace_poses
 from benchmarking.pair_counts import rotation_matrix
 from benchmarking.process import Failed, run
@@ -17,8 +17,6 @@ from benchmarking.process import Failed, run
 LEVELS_M = (0.2, 0.5, 1.0, 2.0)
 SEEDS = (1, 2, 3)
 THRESHOLDS = ('0.1', '1', '10', 'adaptive')
-PART_OPTIONS = ['--AdaSfmPartition.max_num_images_undivided', '50',
-                '--AdaSfmPartition.max_part_size', '50']
 # Runs of images that lie beside the way, and a bend's period, in images.
 RUN_IMAGES = 4
 BEND_IMAGES = 60
@@ -59,7 +57,7 @@ def disturb(poses, sigma_m, seed):
 def describe_disturbance():
   """What a row depends on besides level and seed."""
   return [RUN_IMAGES, BEND_IMAGES, OUTLIER_SHARE, OUTLIER_FACTOR, DEG_PER_M,
-          PART_OPTIONS, list(THRESHOLDS)]
+          SMALL_PARTS, list(THRESHOLDS)]
 
 
 def options_of(threshold, with_priors):
@@ -68,7 +66,7 @@ def options_of(threshold, with_priors):
   if threshold != 'adaptive':
     options += ['--AdaSfmAlign.adapt_threshold', '0',
                 '--AdaSfmAlign.initial_threshold', threshold]
-  return PART_OPTIONS + options
+  return SMALL_PARTS + options
 
 
 def summarise(output, world, args, log_path):

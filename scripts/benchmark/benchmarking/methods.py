@@ -37,6 +37,19 @@ ABLATIONS.update({
     for metres in ('0.1', '1', '10')})
 
 
+# So that small sets have parts.
+SMALL_PARTS = ['--AdaSfmPartition.max_num_images_undivided', '50',
+               '--AdaSfmPartition.max_part_size', '50']
+
+
+def log_options(source):
+  """Of the importer and the one command, for the logs of a set."""
+  return [word for option, file in (
+      ('image_times', 'times.csv'), ('imu', 'imu.csv'), ('wheel', 'wheel.csv'),
+      ('sensors', 'sensors.yaml'))
+          for word in ('--%s_path' % option, os.path.join(source, file))]
+
+
 def fixed_intrinsics(prefix):
   return ['--%srefine_focal_length' % prefix, '0',
           '--%srefine_extra_params' % prefix, '0']
@@ -86,13 +99,10 @@ def make_coarse_model(folder, source, args, sensors, options):
   log_path = os.path.join(folder, 'run.log')
   steps = {}
   if sensors:
-    arguments = [args.colmap, 'adasfm_prior_importer', '--database_path',
-                 database]
-    for option, file in (('image_times', 'times.csv'), ('imu', 'imu.csv'),
-                         ('wheel', 'wheel.csv'), ('sensors', 'sensors.yaml')):
-      arguments += ['--%s_path' % option, os.path.join(source, file)]
-    steps['import'] = run(arguments + options.get('import', []), log_path,
-                          args.timeout)
+    steps['import'] = run(
+        [args.colmap, 'adasfm_prior_importer', '--database_path', database] +
+        log_options(source) + options.get('import', []), log_path,
+        args.timeout)
   steps['global'] = run([args.colmap, 'adasfm_global', '--database_path',
                          database, '--output_path',
                          os.path.join(folder, 'global')] +

@@ -42,6 +42,17 @@ Eigen::Vector3d Way(uint64_t seed, double length_m) {
   return length_m * random.GaussianVector(1.0).normalized();
 }
 
+// Images that are moved are found, all of them and no other.
+void ExpectFound(image_t first, image_t last) {
+  for (uint64_t seed = 1; seed <= kNumSeeds; ++seed) {
+    WalkData walk = Walk(seed);
+    const std::set<image_t> moved =
+        MoveImages(first, last, Way(seed, 3.0), &walk);
+    EXPECT_EQ(Find(walk), std::vector<std::set<image_t>>{moved})
+        << "seed " << seed;
+  }
+}
+
 TEST(FindPartsByInertia, AWholeWalkIsOnePart) {
   for (uint64_t seed = 1; seed <= kNumSeeds; ++seed) {
     EXPECT_TRUE(Find(Walk(seed)).empty()) << "seed " << seed;
@@ -49,12 +60,7 @@ TEST(FindPartsByInertia, AWholeWalkIsOnePart) {
 }
 
 TEST(FindPartsByInertia, FindsABeginningThatLiesElsewhere) {
-  for (uint64_t seed = 1; seed <= kNumSeeds; ++seed) {
-    WalkData walk = Walk(seed);
-    const std::set<image_t> moved = MoveImages(1, 60, Way(seed, 3.0), &walk);
-    EXPECT_EQ(Find(walk), std::vector<std::set<image_t>>{moved})
-        << "seed " << seed;
-  }
+  ExpectFound(1, 60);
 }
 
 TEST(FindPartsByInertia, FindsItAcrossImagesWithoutPoses) {
@@ -71,12 +77,7 @@ TEST(FindPartsByInertia, FindsItAcrossImagesWithoutPoses) {
 }
 
 TEST(FindPartsByInertia, WhatLiesBeforeAndAfterStaysTogether) {
-  for (uint64_t seed = 1; seed <= kNumSeeds; ++seed) {
-    WalkData walk = Walk(seed);
-    const std::set<image_t> moved = MoveImages(81, 110, Way(seed, 3.0), &walk);
-    EXPECT_EQ(Find(walk), std::vector<std::set<image_t>>{moved})
-        << "seed " << seed;
-  }
+  ExpectFound(81, 110);
 }
 
 TEST(FindPartsByInertia, AnImageThatIsWrongByItselfIsNoPart) {
