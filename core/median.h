@@ -12,6 +12,9 @@ double Median(std::vector<double> values);
 // values: for inner loops.
 double UpperMedian(std::vector<double>* values);
 
+// Of the norm of three standard normal variables.
+inline constexpr double kMedianNorm3 = 1.538;
+
 struct WeightedValue {
   double value = 0.0;
   double weight = 0.0;

@@ -24,8 +24,6 @@ constexpr double kSigmaFactor = 1.5;
 constexpr double kMinSeenMotionRad = 5e-3;
 // Of the turn: a slightly turned T_cam_imu moves whole bends.
 constexpr double kTurnShare = 0.05;
-// The median of a three-dimensional normal vector's length.
-constexpr double kMedianNorm = 1.538;
 
 // Vision against the gyroscope over the links: the errors' sigma per axis.
 double EstimateSigma(const std::vector<OdometryLink>& links,
@@ -46,7 +44,7 @@ double EstimateSigma(const std::vector<OdometryLink>& links,
   for (size_t i = 0; i < indices.size(); ++i) {
     values[i] = (errors[i] - rate * links[indices[i]].dt_s).norm();
   }
-  return UpperMedian(&values) / kMedianNorm;
+  return UpperMedian(&values) / kMedianNorm3;
 }
 
 }  // namespace

@@ -47,4 +47,10 @@ struct AdjustedPose {
   }
 };
 
+// d (R^T x) / d w.
+inline Eigen::Matrix3d RotatedBackJacobian(const AdjustedPose& pose,
+                                           const Eigen::Vector3d& x) {
+  return pose.rotation.transpose() * Hat(x) * pose.left_jacobian;
+}
+
 }  // namespace adasfm

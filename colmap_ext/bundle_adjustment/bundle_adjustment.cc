@@ -8,6 +8,7 @@
 
 #include "colmap_ext/bundle_adjustment/block_ordering.h"
 #include "colmap_ext/bundle_adjustment/bundle_problem.h"
+#include "colmap_ext/bundle_adjustment/inertial_factors.h"
 #include "colmap_ext/bundle_adjustment/minimize_bundle.h"
 #include "colmap_ext/bundle_adjustment/position_priors.h"
 #include "colmap_ext/bundle_adjustment/reduced_system.h"
@@ -246,7 +247,8 @@ bool PriorBundleAdjustmentOptions::IsValid(std::string* error) const {
                       "reproj_loss_scale_px", reproj_loss_scale_px,
                       "must be finite")
              .AtLeast(1, "max_num_iterations", max_num_iterations)
-             .NotNegative({{"function_tolerance", function_tolerance}})
+             .NotNegative({{"function_tolerance", function_tolerance},
+                           {"accelerometer_noise", accelerometer_noise}})
              .AtLeast(max_num_images_dense, "max_num_images_sparse",
                       max_num_images_sparse)
              .AllHold() &&
@@ -273,6 +275,8 @@ PriorBundleAdjustmentSummary AdjustBundle(
                        /*may_keep_points_apart=*/plan.is_small,
                        plan.cut ? &*plan.cut : nullptr);
   plan.cut.reset();
+  summary.accelerometer_noise =
+      AddInertialFactors(options, problem.inertial_motions, &bundle);
   summary.num_images = bundle.NumImages();
   summary.num_points = bundle.NumPoints();
   summary.num_residuals = bundle.NumResiduals();

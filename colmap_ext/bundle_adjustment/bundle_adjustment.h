@@ -12,6 +12,7 @@
 #include "colmap_ext/bundle_adjustment/shared_errors.h"
 #include "colmap_ext/host/colmap.h"
 #include "core/camera_rig.h"
+#include "core/inertial_motion.h"
 #include "core/position_prior.h"
 #include "core/relative_pose_prior.h"
 #include "core/rigid3d.h"
@@ -19,11 +20,19 @@
 
 namespace adasfm {
 
-enum class PriorTerm { kRotation, kDirection, kLength, kTranslation };
-inline constexpr int kNumPriorTerms = 4;
+enum class PriorTerm {
+  kRotation,
+  kDirection,
+  kLength,
+  kTranslation,
+  kVelocity
+};
+inline constexpr int kNumPriorTerms = 5;
 
 // What the sigmas that sensors state are multiplied by, by PriorTerm.
 using PriorSigmaFactors = std::array<double, kNumPriorTerms>;
+inline constexpr PriorSigmaFactors kStatedPriorSigmas = {1.0, 1.0, 1.0, 1.0,
+                                                         1.0};
 
 // A relative-pose term of the adjustment for one edge of the augmented graph
 // (paper, eq. 8; docs/reference/math.md). With P = P_j P_i^-1 of the current
@@ -32,7 +41,8 @@ using PriorSigmaFactors = std::array<double, kNumPriorTerms>;
 //   direction  angle between t and t^ / direction_sigma_rad 2 residuals
 //   length     (|t| - |t^|) / length_sigma_m                1 residual
 //   translation  (t - t^) / translation_sigma_m             3 residuals
-// A term with an infinite sigma is left out.
+// A term with an infinite sigma is left out. What an accelerometer says of
+// three images (kVelocity) is no edge's (inertial_factors.h).
 struct PosePriorEdge {
   image_t image_id1 = kInvalidImageId;
   image_t image_id2 = kInvalidImageId;
@@ -59,7 +69,8 @@ struct PosePriorEdge {
   double SigmaOf(PriorTerm term) const {
     return std::array<double, kNumPriorTerms>{
         rotation_sigma_rad, direction_sigma_rad, length_sigma_m,
-        translation_sigma_m}[static_cast<size_t>(term)];
+        translation_sigma_m,
+        std::numeric_limits<double>::infinity()}[static_cast<size_t>(term)];
   }
 };
 
@@ -90,7 +101,10 @@ struct PriorBundleAdjustmentOptions {
   // are what variance_components.h is for.
   double prior_loss_scale = 3.0;
   // Of the priors' sigmas alone: what is believed of the shared errors stays.
-  PriorSigmaFactors prior_sigma_factors = {1.0, 1.0, 1.0, 1.0};
+  PriorSigmaFactors prior_sigma_factors = kStatedPriorSigmas;
+  // 1 sigma of the inertial motions, m/s^2 sqrt(s), before the factor of
+  // kVelocity; 0: of what the poses at the start leave.
+  double accelerometer_noise = 0.0;
 
   // Where the robust loss (Cauchy) on whitened positions takes over, in sigmas.
   // Larger while the model is still bent.
@@ -135,6 +149,9 @@ struct PriorBundleAdjustmentProblem {
   // Positions in the reconstruction's world, which then has no free degrees of
   // freedom; those of images that do not take part are passed over.
   std::vector<PositionPrior> positions;
+  // Of consecutive images in order of time, for a model whose unit is about the
+  // metre (inertial_factors.h).
+  std::vector<InertialMotion> inertial_motions;
   // Unit vectors towards the ground (-z of the world) in the cameras' frames,
   // together one measurement of the vertical with this 1 sigma. Used with
   // positions only.
@@ -159,7 +176,9 @@ struct PriorBundleAdjustmentSummary {
   // The sigmas that were used.
   double keypoint_sigma_px = 0.0;
   std::map<camera_t, double> keypoint_sigma_ratios;
-  PriorSigmaFactors prior_sigma_factors = {1.0, 1.0, 1.0, 1.0};
+  PriorSigmaFactors prior_sigma_factors = kStatedPriorSigmas;
+  // 0 without inertial motions.
+  double accelerometer_noise = 0.0;
   std::string message;
   // Of the priors, where AdjustBundleWithVarianceComponents made the
   // adjustment: the largest chi-square per degree of freedom of a kind of term

@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "colmap_ext/bundle_adjustment/create_reprojection_cost.h"
+#include "colmap_ext/bundle_adjustment/prior_components.h"
 #include "colmap_ext/host/pose_conversion.h"
 
 namespace adasfm {
@@ -297,7 +298,8 @@ void BundleProblem::AddPriors(const std::vector<PosePriorEdge>& edges) {
       prior_blocks_.push_back(
           {AddPrior(edge, term, &image1->second, &image2->second,
                     edge.is_held_by_points ? prior_loss_.get() : nullptr),
-           static_cast<size_t>(&edge - edges.data()), term});
+           term, edge.dt_s >= 0.0, edge.is_held_by_points,
+           IsTestedMeasurement(edge, term)});
     }
   }
 }
@@ -387,6 +389,9 @@ std::shared_ptr<ceres::ParameterBlockOrdering> BundleProblem::Ordering() {
     if (problem_->HasParameterBlock(mount.parameters)) {
       ordering->AddElementToGroup(mount.parameters, 3);
     }
+  }
+  for (std::vector<double>& values : other_parameters_) {
+    ordering->AddElementToGroup(values.data(), 4);
   }
   return ordering;
 }

@@ -56,16 +56,30 @@ class BundleProblem final : private ceres::EvaluationCallback {
   // The pose of an image that has part in a residual already; null for others.
   const AdjustedPose* UsedPose(image_t image_id) const;
   bool IsConstant(image_t image_id) const;
-  // Adds a residual on such poses and takes both over.
-  void AddResidual(std::unique_ptr<ceres::CostFunction> cost,
-                   std::unique_ptr<ceres::LossFunction> loss,
-                   const std::vector<image_t>& image_ids);
+  // Parameters of the caller's own.
+  double* AddParameters(std::vector<double> values);
+  // Adds a residual on such poses and parameters and takes both over.
+  ceres::ResidualBlockId AddResidual(
+      std::unique_ptr<ceres::CostFunction> cost,
+      std::unique_ptr<ceres::LossFunction> loss,
+      const std::vector<image_t>& image_ids,
+      const std::vector<double*>& parameters = {});
+  // The same for a term of priors, with a Huber loss: it pulls at what is far
+  // off, too.
+  void AddVelocityTerm(std::unique_ptr<ceres::CostFunction> cost,
+                       const std::vector<image_t>& image_ids,
+                       const std::vector<double*>& parameters);
 
   // The residual block of one term of a prior.
   struct PriorBlock {
     ceres::ResidualBlockId residual = nullptr;
-    size_t prior = 0;  // In the problem's priors.
     PriorTerm term = PriorTerm::kRotation;
+    // Whether the term's factor of the sigmas counts for it,
+    bool has_factor = true;
+    // it has a robust loss,
+    bool is_robust = true;
+    // and keypoints test it (IsTestedMeasurement).
+    bool is_tested = true;
   };
   // In the order in which they were added.
   const std::vector<PriorBlock>& PriorBlocks() const { return prior_blocks_; }
@@ -198,6 +212,7 @@ class BundleProblem final : private ceres::EvaluationCallback {
   std::vector<SharedBlock> shared_;
   // Where the windows of the direction's drift begin in it.
   size_t direction_drift_ = kGyroscopeBias;
+  std::deque<std::vector<double>> other_parameters_;
   std::deque<ReprojectionCost> reprojection_costs_;
   std::vector<std::unique_ptr<ceres::CostFunction>> other_costs_;
   std::vector<std::unique_ptr<ceres::LossFunction>> other_losses_;

@@ -8,37 +8,6 @@
 #include "colmap_ext/bundle_adjustment/bundle_problem.h"
 
 namespace adasfm {
-namespace {
-
-// (second - decay * first) / sigma, 3 residuals.
-class DifferenceCost final : public ceres::SizedCostFunction<3, 3, 3> {
- public:
-  DifferenceCost(double sigma, double decay)
-      : inverse_sigma_(1.0 / sigma), decay_(decay) {}
-
-  bool Evaluate(double const* const* parameters, double* residuals,
-                double** jacobians) const final {
-    using Jacobian = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
-    for (int i = 0; i < 3; ++i) {
-      residuals[i] =
-          inverse_sigma_ * (parameters[1][i] - decay_ * parameters[0][i]);
-    }
-    for (int block = 0; jacobians != nullptr && block < 2; ++block) {
-      if (jacobians[block] == nullptr) continue;
-      Eigen::Map<Jacobian> jacobian(jacobians[block]);
-      jacobian = Jacobian::Identity() *
-                 (block == 0 ? -decay_ * inverse_sigma_ : inverse_sigma_);
-    }
-    return true;
-  }
-
- private:
-  double inverse_sigma_;
-  double decay_;
-};
-
-}  // namespace
-
 std::vector<double*> BundleProblem::SharedParameters(const PosePriorEdge& edge,
                                                      const PosePriorCost& cost,
                                                      PosePriorCost::Term term) {

@@ -227,8 +227,7 @@ void BundleReducer::EliminateListedPoint() {
 ReducedPriorRows BundleReducer::PriorRows(
     const BundleProblem::PriorBlock& prior) const {
   ReducedPriorRows rows;
-  rows.prior = prior.prior;
-  rows.term = prior.term;
+  rows.block = prior;
   rows.residuals = residuals_;
   for (const JacobianBlock& block : blocks_) {
     for (int col = 0; col < block.values.cols(); ++col) {

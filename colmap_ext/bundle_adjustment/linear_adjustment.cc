@@ -18,10 +18,8 @@ constexpr double kMinShare = 0.005;
 struct LinearAdjustment::Factorization : OrderedCholesky {};
 
 LinearAdjustment::LinearAdjustment(ReducedSystem* system,
-                                   const std::vector<PosePriorEdge>& priors,
                                    double prior_loss_scale)
     : system_(*system),
-      priors_(priors),
       loss_scale_(prior_loss_scale),
       factorization_(std::make_unique<Factorization>()) {
   factorization_->analyzePattern(system_.rest);
@@ -34,20 +32,16 @@ LinearAdjustment::LinearAdjustment(ReducedSystem* system,
 
 LinearAdjustment::~LinearAdjustment() = default;
 
-bool LinearAdjustment::IsTested(size_t i) const {
-  const ReducedPriorRows& rows = system_.priors[i];
-  return IsTestedMeasurement(priors_[rows.prior], rows.term);
-}
-
 void LinearAdjustment::ComputeWeights(const PriorSigmaFactors& factors) {
   for (size_t i = 0; i < weights_.size(); ++i) {
-    const ReducedPriorRows& rows = system_.priors[i];
-    const PosePriorEdge& edge = priors_[rows.prior];
+    const BundleProblem::PriorBlock& block = system_.priors[i].block;
     weights_[i] =
-        edge.dt_s < 0.0 ? 1.0 : 1.0 / factors[static_cast<size_t>(rows.term)];
-    if (!edge.is_held_by_points) continue;  // Plain squares.
+        block.has_factor ? 1.0 / factors[static_cast<size_t>(block.term)] : 1.0;
+    if (!block.is_robust) continue;  // Plain squares.
     const double num_scales = weights_[i] * residuals_[i].norm() / loss_scale_;
-    weights_[i] /= std::hypot(1.0, num_scales);
+    weights_[i] /= block.term == PriorTerm::kVelocity
+                       ? std::sqrt(std::max(1.0, num_scales))  // Huber
+                       : std::hypot(1.0, num_scales);          // Cauchy
   }
 }
 
@@ -139,9 +133,10 @@ bool LinearAdjustment::Solve(const PriorSigmaFactors& factors,
   for (size_t i = 0; i < weights_.size(); ++i) {
     const ReducedPriorRows& rows = system_.priors[i];
     residuals_[i] = rows.residuals + moved[i] / weights_[i];
-    if (!IsTested(i)) continue;
-    const double factor = factors[static_cast<size_t>(rows.term)];
-    AddPriorTerm(rows.term, (residuals_[i] / factor).squaredNorm(), components);
+    if (!rows.block.is_tested) continue;
+    const double factor = factors[static_cast<size_t>(rows.block.term)];
+    AddPriorTerm(rows.block.term, (residuals_[i] / factor).squaredNorm(),
+                 components);
   }
   FinishPriorComponents(components);
   EstimateRedundancies(components);
@@ -155,15 +150,16 @@ void LinearAdjustment::EstimateRedundancies(PriorComponents* components) const {
     RowValues signs;
     for (size_t i = 0; i < weights_.size(); ++i) {
       signs.push_back(Eigen::VectorXd::Zero(residuals_[i].size()));
-      if (!IsTested(i)) continue;
+      if (!system_.priors[i].block.is_tested) continue;
       for (double& sign : signs.back()) {
         sign = random.UniformInt(0, 1) ? 1.0 : -1.0;
       }
     }
     const RowValues followed = SolveForRows(ToColumns(signs));
     for (size_t i = 0; i < weights_.size(); ++i) {
-      if (!IsTested(i)) continue;
-      const auto k = static_cast<size_t>(system_.priors[i].term);
+      const BundleProblem::PriorBlock& block = system_.priors[i].block;
+      if (!block.is_tested) continue;
+      const auto k = static_cast<size_t>(block.term);
       const Eigen::VectorXd left = signs[i] - followed[i];
       redundancies[k] += signs[i].dot(left);
       own[k] += left.squaredNorm();

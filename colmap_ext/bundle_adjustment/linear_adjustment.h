@@ -22,11 +22,9 @@ class LinearAdjustment {
  public:
   static constexpr int kNumProbes = 4;
 
-  // priors: the adjustment's. Both are kept by reference; the system holds the
-  // priors' information while it is factorised.
-  LinearAdjustment(ReducedSystem* system,
-                   const std::vector<PosePriorEdge>& priors,
-                   double prior_loss_scale);
+  // Kept by reference; it holds the priors' information while it is
+  // factorised.
+  LinearAdjustment(ReducedSystem* system, double prior_loss_scale);
   ~LinearAdjustment();
 
   // Steps to the optimum with the priors' sigmas times these factors (on top of
@@ -43,7 +41,6 @@ class LinearAdjustment {
   template <typename Function>
   void ForEachValueOf(size_t i, const Function& function) const;
   void FindChangedValues();
-  bool IsTested(size_t i) const;
   void ComputeWeights(const PriorSigmaFactors& factors);
   bool Factorize();
   // sum of J^T w values over the rows.
@@ -53,7 +50,6 @@ class LinearAdjustment {
   void EstimateRedundancies(PriorComponents* components) const;
 
   ReducedSystem& system_;
-  const std::vector<PosePriorEdge>& priors_;
   const double loss_scale_;
   // In the adjustment's sigmas.
   RowValues residuals_;

@@ -218,4 +218,20 @@ void PosePriorCost::EvaluateTranslation(double* residuals,
   }
 }
 
+bool DifferenceCost::Evaluate(double const* const* parameters,
+                              double* residuals, double** jacobians) const {
+  using Jacobian = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
+  for (int i = 0; i < 3; ++i) {
+    residuals[i] =
+        inverse_sigma_ * (parameters[1][i] - decay_ * parameters[0][i]);
+  }
+  for (int block = 0; jacobians != nullptr && block < 2; ++block) {
+    if (jacobians[block] == nullptr) continue;
+    Eigen::Map<Jacobian> jacobian(jacobians[block]);
+    jacobian = Jacobian::Identity() *
+               (block == 0 ? -decay_ * inverse_sigma_ : inverse_sigma_);
+  }
+  return true;
+}
+
 }  // namespace adasfm

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <ceres/cost_function.h>
+#include <ceres/sized_cost_function.h>
 
 #include <Eigen/Core>
 #include <vector>
@@ -64,6 +65,20 @@ class PosePriorCost final : public ceres::CostFunction {
   double inverse_sigma_ = 1.0;
   // Of the residuals, by the shared parameters; as many rows as residuals.
   std::vector<Eigen::Matrix3d> from_shared_;
+};
+
+// (second - decay * first) / sigma, 3 residuals. Parameters: 3 and 3.
+class DifferenceCost final : public ceres::SizedCostFunction<3, 3, 3> {
+ public:
+  DifferenceCost(double sigma, double decay)
+      : inverse_sigma_(1.0 / sigma), decay_(decay) {}
+
+  bool Evaluate(double const* const* parameters, double* residuals,
+                double** jacobians) const final;
+
+ private:
+  double inverse_sigma_;
+  double decay_;
 };
 
 }  // namespace adasfm

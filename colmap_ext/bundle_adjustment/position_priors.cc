@@ -15,18 +15,10 @@
 namespace adasfm {
 namespace {
 
-// Of the norm of three standard normal variables.
-constexpr double kNormalMedian = 1.538;
 // Beyond so many loss scales a position is left out.
 constexpr double kMaxDistance = 2.0;
 
 using PoseJacobian = Eigen::Matrix<double, 3, 6, Eigen::RowMajor>;
-
-// d (R^T x) / d w, with R = Exp(w) R_0.
-Eigen::Matrix3d RotatedBackJacobian(const AdjustedPose& pose,
-                                    const Eigen::Vector3d& x) {
-  return pose.rotation.transpose() * Hat(x) * pose.left_jacobian;
-}
 
 bool TakesPart(const PositionPrior& prior, const BundleProblem& bundle) {
   return bundle.UsedPose(prior.image_id1) != nullptr &&
@@ -139,7 +131,7 @@ std::vector<PositionPrior> SelectPositions(
     selected.push_back(prior);
     distances.push_back(WhitenedDistance(prior, bundle));
   }
-  const double factor = std::max(1.0, Median(distances) / kNormalMedian);
+  const double factor = std::max(1.0, Median(distances) / kMedianNorm3);
   const double max_distance = kMaxDistance * loss_scale * factor;
   std::vector<PositionPrior> near;
   for (size_t i = 0; i < selected.size(); ++i) {
@@ -179,16 +171,36 @@ bool BundleProblem::IsConstant(image_t image_id) const {
   return images_.at(image_id).is_constant;
 }
 
-void BundleProblem::AddResidual(std::unique_ptr<ceres::CostFunction> cost,
-                                std::unique_ptr<ceres::LossFunction> loss,
-                                const std::vector<image_t>& image_ids) {
+double* BundleProblem::AddParameters(std::vector<double> values) {
+  other_parameters_.push_back(std::move(values));
+  return other_parameters_.back().data();
+}
+
+ceres::ResidualBlockId BundleProblem::AddResidual(
+    std::unique_ptr<ceres::CostFunction> cost,
+    std::unique_ptr<ceres::LossFunction> loss,
+    const std::vector<image_t>& image_ids,
+    const std::vector<double*>& parameters) {
   std::vector<const ImageBlock*> images;
   for (const image_t image_id : image_ids) {
     images.push_back(&images_.at(image_id));
   }
   other_costs_.push_back(std::move(cost));
-  AddCost(other_costs_.back().get(), loss.get(), images);
-  if (loss != nullptr) other_losses_.push_back(std::move(loss));
+  other_losses_.push_back(std::move(loss));
+  return AddCost(other_costs_.back().get(), other_losses_.back().get(), images,
+                 parameters);
+}
+
+void BundleProblem::AddVelocityTerm(std::unique_ptr<ceres::CostFunction> cost,
+                                    const std::vector<image_t>& image_ids,
+                                    const std::vector<double*>& parameters) {
+  PriorBlock block;
+  block.residual =
+      AddResidual(std::move(cost),
+                  std::make_unique<ceres::HuberLoss>(options_.prior_loss_scale),
+                  image_ids, parameters);
+  block.term = PriorTerm::kVelocity;
+  prior_blocks_.push_back(block);
 }
 
 }  // namespace adasfm

@@ -20,7 +20,7 @@ constexpr double kMeanSquareTolerance = 1e-3;
 // Fewer terms of a kind than this are no statistic.
 constexpr int kMinNumTerms = 10;
 
-constexpr std::array<int, kNumPriorTerms> kNumDof = {3, 2, 1, 3};
+constexpr std::array<int, kNumPriorTerms> kNumDof = {3, 2, 1, 3, 3};
 
 // Huber's estimate of a scale, with its cap: the mean m of the squares, each at
 // most 3^2 max(1, m). The search begins at the plain mean and only falls, so
@@ -49,7 +49,7 @@ Eigen::Vector3d RotationBetween(const Eigen::Vector3d& from,
 }
 
 TermErrors ErrorsOf(const Rigid3d& motion, const Rigid3d& prior) {
-  TermErrors errors;
+  TermErrors errors = {};
   errors[0] = LogSo3(motion.rotation * prior.rotation.conjugate());
   errors[1] = RotationBetween(prior.translation, motion.translation);
   errors[2] = Eigen::Vector3d(
@@ -72,6 +72,11 @@ std::optional<TermErrors> ErrorsAt(
 }
 
 }  // namespace
+
+double PriorComponent::ScoringStep() const {
+  constexpr double kMinStep = 0.25;
+  return std::max(kMinStep, 1.0 + (mean_square - redundancy_share) / own_share);
+}
 
 double PriorComponent::Chi2Sigma() const {
   return num_residuals == 0 ? 0.0

@@ -30,6 +30,9 @@ struct PriorComponent {
 
   // The variance of the priors' errors as a share of the stated one.
   double Chi2PerDof() const { return mean_square / redundancy_share; }
+  // The same where the redundancy changes with the sigma, as it does where
+  // vision's noise is much larger: a step of Fisher scoring.
+  double ScoringStep() const;
   // 1 sigma of that variance, where it is 1, of independent errors.
   double Chi2Sigma() const;
 };

@@ -6,17 +6,13 @@
 #include <memory>
 #include <vector>
 
-#include "colmap_ext/bundle_adjustment/bundle_adjustment.h"
+#include "colmap_ext/bundle_adjustment/bundle_problem.h"
 
 namespace adasfm {
 
-class BundleProblem;
-
 // The rows of one term of a prior, in the adjustment's sigmas.
 struct ReducedPriorRows {
-  // In the problem's priors.
-  size_t prior = 0;
-  PriorTerm term = PriorTerm::kRotation;
+  BundleProblem::PriorBlock block;
   Eigen::VectorXd residuals;
   // One column for each entry of `columns`.
   Eigen::MatrixXd jacobian;

@@ -27,21 +27,24 @@ constexpr double kMaxStep = 2.0;
 // Where the priors' sigmas are found the model is as good as in its last
 // adjustment; the linear step does the rest.
 constexpr int kNumIterationsBeforeSigmas = 1;
-// Sigmas of priors are lowered to this share at most: the importer grants noise
-// figures the same factor.
-constexpr double kMinSigmaFactor = 0.2;
+// Sigmas of priors are lowered to this share at most, as the importer grants
+// noise figures that factor, and not raised. That of velocities begins as a
+// guess, with vision's noise.
+constexpr PriorSigmaFactors kMinSigmaFactors = {0.2, 0.2, 0.2, 0.2, 0.02};
+constexpr PriorSigmaFactors kMaxSigmaFactors = {1.0, 1.0, 1.0, 1.0, 10.0};
 // The search for them, each step a linear one, ends when none changes by more.
 constexpr double kMaxSigmaChange = 1.03;
 constexpr int kMaxNumSigmaSteps = 20;
 
 struct PriorSigmaEstimate {
-  PriorSigmaFactors factors = {1.0, 1.0, 1.0, 1.0};
+  PriorSigmaFactors factors = kStatedPriorSigmas;
   // At these sigmas.
   PriorComponents components;
 };
 
 // Lowers the sigmas that the residuals refute as too large, as far as one
-// standard deviation of the estimate goes. None when the system is singular.
+// standard deviation of the estimate goes, and finds those of velocities. None
+// when the system is singular.
 std::optional<PriorSigmaEstimate> EstimatePriorSigmas(
     LinearAdjustment* linear) {
   PriorSigmaEstimate estimate;
@@ -54,16 +57,20 @@ std::optional<PriorSigmaEstimate> EstimatePriorSigmas(
     change = 1.0;
     for (int k = 0; k < kNumPriorTerms; ++k) {
       if (components[k].num_residuals == 0) continue;
+      const double step = static_cast<PriorTerm>(k) == PriorTerm::kVelocity
+                              ? components[k].ScoringStep()
+                              : components[k].Chi2PerDof();
       const double factor =
-          std::clamp(factors[k] * std::sqrt(components[k].Chi2PerDof()),
-                     kMinSigmaFactor, 1.0);
+          std::clamp(factors[k] * std::sqrt(step), kMinSigmaFactors[k],
+                     kMaxSigmaFactors[k]);
       change = std::max({change, factor / factors[k], factors[k] / factor});
       factors[k] = factor;
     }
   }
   for (int k = 0; k < kNumPriorTerms; ++k) {
     factors[k] =
-        std::min(1.0, factors[k] * std::sqrt(1.0 + components[k].Chi2Sigma()));
+        std::min(kMaxSigmaFactors[k],
+                 factors[k] * std::sqrt(1.0 + components[k].Chi2Sigma()));
   }
   if (!linear->Solve(factors, &components)) return std::nullopt;
   return estimate;
@@ -161,8 +168,8 @@ class VarianceComponentAdjustment {
     options.max_num_iterations = kNumIterationsBeforeSigmas;
     Add(AdjustBundle(options, problem_, &reconstruction_, &system_));
     if (!summary_.success) return;
-    LinearAdjustment linear(system_.get(), problem_.priors,
-                            options.prior_loss_scale);
+    options_.accelerometer_noise = summary_.accelerometer_noise;
+    LinearAdjustment linear(system_.get(), options.prior_loss_scale);
     const std::optional<PriorSigmaEstimate> estimate =
         EstimatePriorSigmas(&linear);
     if (!estimate) return;
@@ -202,9 +209,8 @@ class VarianceComponentAdjustment {
     summary_.priors_agree =
         LargestMeanSquare(Components()) <= balance_.max_mean_square;
     if (system_) {
-      LinearAdjustment linear(system_.get(), problem_.priors,
-                              options_.prior_loss_scale);
-      linear.Solve({1.0, 1.0, 1.0, 1.0}, &components_);
+      LinearAdjustment linear(system_.get(), options_.prior_loss_scale);
+      linear.Solve(kStatedPriorSigmas, &components_);
     }
     summary_.prior_chi2_per_dof = LargestChi2PerDof(Components());
   }
@@ -240,7 +246,7 @@ bool VarianceComponentOptions::IsValid(std::string* error) const {
 double ComputePriorMeanSquare(const std::vector<PosePriorEdge>& priors,
                               const colmap::Reconstruction& reconstruction) {
   return LargestMeanSquare(
-      ComputePriorComponents({1.0, 1.0, 1.0, 1.0}, priors, reconstruction));
+      ComputePriorComponents(kStatedPriorSigmas, priors, reconstruction));
 }
 
 PriorBundleAdjustmentSummary AdjustBundleWithVarianceComponents(

@@ -25,7 +25,8 @@ struct VarianceComponentOptions {
   // (estimate_keypoint_sigma.h), where there are enough.
   bool estimate_keypoint_sigma = true;
   // The adjustment also lowers the priors' sigmas that its residuals refute as
-  // too large, each kind of term by itself (prior_components.h). Together with
+  // too large, each kind of term by itself (prior_components.h), and finds the
+  // accelerometer's noise. Together with
   // estimate_keypoint_sigma only, since both need poses near the optimum.
   bool estimate_prior_sigmas = true;
   // The keypoint sigma is raised by at most this factor, so that priors of a

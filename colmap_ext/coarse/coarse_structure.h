@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "colmap_ext/bundle_adjustment/bundle_adjustment.h"
-#include "colmap_ext/bundle_adjustment/find_focal_length_error.h"
 #include "colmap_ext/bundle_adjustment/variance_components.h"
+#include "colmap_ext/coarse/find_focal_length_error.h"
 #include "colmap_ext/coarse/mapper_start.h"
 #include "colmap_ext/coarse/pair_agreement.h"
 #include "colmap_ext/host/colmap.h"

@@ -182,6 +182,9 @@ class ModelRefiner {
       options.position_loss_scale = options_.initial_position_loss_scale;
     }
     AddPositions(&problem);
+    if (local_.use_priors_in_adjustment) {
+      problem.inertial_motions = scene_.data->inertial_motions;
+    }
     problem.constant_cameras = options_.constant_cameras;
     options.refine_focal_length = options_.refine_focal_length;
     options.refine_principal_point = options_.refine_principal_point;

@@ -53,6 +53,16 @@ void AddScene(const SceneData& data, Hash* hash) {
       hash->Add(prior.flags);
     }
   }
+  for (const InertialMotion& motion : data.inertial_motions) {
+    hash->Add(motion.image_id1);
+    hash->Add(motion.image_id2);
+    hash->Add(motion.dt_s);
+    for (int i = 0; i < 3; ++i) {
+      hash->Add(motion.delta_velocity(i));
+      hash->Add(motion.delta_position(i));
+      hash->Add(motion.camera_from_imu_origin(i));
+    }
+  }
   for (const PositionPrior& prior : data.positions) {
     hash->Add(prior.image_id1);
     hash->Add(prior.image_id2);

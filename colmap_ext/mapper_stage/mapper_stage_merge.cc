@@ -5,6 +5,7 @@
 #include <optional>
 #include <utility>
 
+#include "colmap_ext/host/pose_conversion.h"
 #include "colmap_ext/mapper/prior_support.h"
 #include "colmap_ext/mapper_stage/mapper_fingerprint.h"
 #include "colmap_ext/mapper_stage/mapper_stage.h"
@@ -13,7 +14,9 @@
 #include "colmap_ext/scene/keep_inertial_unit.h"
 #include "core/median.h"
 #include "core/release_memory.h"
+#include "core/sim3d.h"
 #include "core/stopwatch.h"
+#include "global/odometry/inertial_scale.h"
 
 namespace adasfm {
 namespace {
@@ -184,6 +187,22 @@ Status MapperStage::RefineMerged(const std::string& fingerprint,
   return Status::Ok();
 }
 
+// The accelerometer, which has part in the final shape, tells its size better
+// than that of the coarse model, whose metres stay where it does not.
+void MapperStage::SetInertialUnit(colmap::Reconstruction* model) {
+  summary_.inertial_scale_sigma = data_.inertial_scale_sigma;
+  if (!(data_.inertial_scale_sigma > 0.0)) return;
+  KeepInertialUnit(data_.priors, model);
+  const std::optional<InertialScale> scale =
+      EstimateInertialScale(data_.inertial_motions, CamsFromWorld(*model));
+  if (!scale || scale->sigma_ratio >= data_.inertial_scale_sigma) return;
+  TransformReconstruction(
+      Sim3d(scale->metres_per_unit, Eigen::Quaterniond::Identity(),
+            Eigen::Vector3d::Zero()),
+      model);
+  summary_.inertial_scale_sigma = scale->sigma_ratio;
+}
+
 StatusOr<colmap::Reconstruction> MapperStage::Merge(bool require_all_parts) {
   const Stopwatch watch;
   if (summary_.plan.parts.empty()) {
@@ -210,7 +229,7 @@ StatusOr<colmap::Reconstruction> MapperStage::Merge(bool require_all_parts) {
   const Stopwatch refine_watch;
   status = RefineMerged(fingerprint, &*merged);
   if (!status.ok()) return status;
-  KeepInertialUnit(data_.priors, &model);
+  SetInertialUnit(&model);
   summary_.is_level =
       summary_.is_georeferenced || AlignToGravity(data_, &model);
   summary_.refine_seconds = refine_watch.Seconds();

@@ -87,6 +87,11 @@ SplitSceneData SplitScene(const std::vector<CoarsePoseMap>& coarse_models,
     if (component != component_of(prior.image_id2)) continue;
     scene_of(component)->priors.push_back(prior);
   }
+  for (const InertialMotion& motion : scene.inertial_motions) {
+    const int component = component_of(motion.image_id1);
+    if (component != component_of(motion.image_id2)) continue;
+    scene_of(component)->inertial_motions.push_back(motion);
+  }
   for (const auto& [image_id, image] : scene.rigs.images) {
     scene_of(component_of(image_id))->rigs.images[image_id] = image;
   }

@@ -61,8 +61,13 @@ void ReadScenePriors(SqliteConnection* database,
     scene->inertial_scale_sigma =
         ApplyPriorCorrections(database, &scene->priors);
     camera_mount = ReadCameraMount(database).value_or(camera_mount);
-  } else {
+  }
+  if (options.use_original_two_view_geometries ||
+      scene->inertial_scale_sigma > 0.0) {
     scene->inertial_motions = std::move(loaded.tables.inertial_motions);
+    for (InertialMotion& motion : scene->inertial_motions) {
+      TurnInertialMotion(camera_mount, &motion);
+    }
   }
   for (const GravityRow& row : loaded.tables.gravity) {
     scene->images.at(row.image_id).gravity_in_cam =

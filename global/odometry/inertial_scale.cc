@@ -24,6 +24,8 @@ constexpr double kGravity = 9.81;
 // By which share gravity and the rest of what was measured may be of two sizes.
 constexpr double kMaxGravityError = 0.1;
 constexpr double kMaxSigmaRatio = 0.2;
+// Of the scales of an accelerometer's axes, which nothing here sees.
+constexpr double kScaleFactorSigma = 0.002;
 // A straight line through p0 and v0 takes two images, a curve with the size and
 // something left over some more.
 constexpr int kMinNumImages = 5;
@@ -313,7 +315,8 @@ std::optional<InertialScale> EstimateInertialScale(
     if (solver.Solve()) scales.push_back(solver.Scale());
   }
   if (scales.empty()) return std::nullopt;
-  const InertialScale scale = CombineScales(scales);
+  InertialScale scale = CombineScales(scales);
+  scale.sigma_ratio = std::hypot(scale.sigma_ratio, kScaleFactorSigma);
   if (!(scale.sigma_ratio <= kMaxSigmaRatio)) return std::nullopt;
   return scale;
 }

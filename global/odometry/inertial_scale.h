@@ -31,7 +31,8 @@ struct InertialScale {
 // covers. d, about 0.6 deg of g, is what rotations drift and err; windows lose
 // weight by their residuals. The jackknife counts windows as independent.
 // The estimate is the mean over windows of 1, 2, ... 16 s, of which there are
-// at least eight. Returns nothing where the size is not known to 20 %: without
+// at least eight; its sigma has 0.2 % for the scales of the accelerometer's
+// axes. Returns nothing where the size is not known to 20 %: without
 // enough images, where the machine hardly changed its speed, and where gravity
 // comes out of another size.
 std::optional<InertialScale> EstimateInertialScale(

@@ -169,17 +169,21 @@ bool VisionComparer::IsWorseThanNone() const {
          search_.Evidence(as_is_, none) >= kMinEvidence;
 }
 
+// Without a shift, too: rotations of another size fit a wrong clock better than
+// the right one where the drive is short.
 void VisionComparer::CheckTurnScale(VisionCheck* check) const {
-  const RotationComparison shifted = search_.Compare(calibrated().shift_s);
   Explanation best = calibrated();
   double best_scale = 1.0;
-  for (const double scale : kTurnScales) {
-    Explanation scaled = calibrated();
-    scaled.mistake.map *= scale;
-    scaled.fit = ComputeRotationFit(shifted, scaled.mistake.map);
-    if (scaled.fit.cost >= best.fit.cost) continue;
-    best = scaled;
-    best_scale = scale;
+  for (const Explanation* unscaled : {&calibrated(), &as_is_}) {
+    const RotationComparison shifted = search_.Compare(unscaled->shift_s);
+    for (const double scale : kTurnScales) {
+      Explanation scaled = *unscaled;
+      scaled.mistake.map *= scale;
+      scaled.fit = ComputeRotationFit(shifted, scaled.mistake.map);
+      if (scaled.fit.cost >= best.fit.cost) continue;
+      best = scaled;
+      best_scale = scale;
+    }
   }
   if (best_scale == 1.0 ||
       best.fit.cost > kClearlyBetter * calibrated().fit.cost ||

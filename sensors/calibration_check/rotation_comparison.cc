@@ -117,7 +117,7 @@ double ComputeEvidence(const std::vector<double>& worse,
   if (worse.empty()) return 0.0;
   std::vector<double> sorted = worse;
   // The median of a three-dimensional normal vector's length.
-  const double sigma = UpperMedian(&sorted) / 1.538;
+  const double sigma = UpperMedian(&sorted) / kMedianNorm3;
   if (sigma <= 0.0) return 0.0;
   constexpr double kFreedom = 3.0;
   double sum = 0.0;

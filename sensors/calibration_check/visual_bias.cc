@@ -18,8 +18,6 @@ constexpr double kOffsetSigma = 0.0035;
 constexpr double kMinScale = 1e-6;
 constexpr double kBlockS = 2.0;
 constexpr int kNumRounds = 20;
-// The median of a three-dimensional normal vector's length.
-constexpr double kMedianNorm = 1.538;
 
 // Rows: rate and offset; columns: axes.
 using Unknowns = Eigen::Matrix<double, 2, 3>;
@@ -65,7 +63,7 @@ class VisualBiasFit {
       lengths.push_back(Residual(i).norm());
     }
     std::vector<double> sorted = lengths;
-    scale_ = std::max(kMinScale, UpperMedian(&sorted) / kMedianNorm);
+    scale_ = std::max(kMinScale, UpperMedian(&sorted) / kMedianNorm3);
     for (size_t i = 0; i < weights_.size(); ++i) {
       weights_[i] =
           1.0 / (1.0 + std::pow(lengths[i] / (kLossScale * scale_), 2));

@@ -13,8 +13,6 @@
 namespace adasfm {
 namespace {
 
-constexpr PriorSigmaFactors kStated = {1.0, 1.0, 1.0, 1.0};
-
 PriorComponent LengthsOf(int num_honest, double honest, int num_wild) {
   PriorComponents components;
   for (int i = 0; i < num_honest; ++i) {
@@ -47,7 +45,7 @@ TEST(PriorComponents, LengthsOfVisionSayNothing) {
   PriorBundleAdjustmentProblem problem = ProblemOf(world, model, 1.0);
   const auto num_lengths = [&] {
     return ComputePriorComponents(
-               kStated, problem.priors,
+               kStatedPriorSigmas, problem.priors,
                model)[static_cast<size_t>(PriorTerm::kLength)]
         .num_residuals;
   };
@@ -82,9 +80,8 @@ TEST(PriorComponents, RedundancyIsWhatMeasurementsTestOfEachOther) {
     std::unique_ptr<ReducedSystem> system;
     ASSERT_TRUE(AdjustBundle(options, repeated, &adjusted, &system).success);
     PriorComponents components;
-    ASSERT_TRUE(LinearAdjustment(system.get(), repeated.priors,
-                                 options.prior_loss_scale)
-                    .Solve(kStated, &components));
+    ASSERT_TRUE(LinearAdjustment(system.get(), options.prior_loss_scale)
+                    .Solve(kStatedPriorSigmas, &components));
     const double share = 1.0 - 1.0 / num_measurements;
     for (int k = 0; k < 3; ++k) {
       EXPECT_GT(components[k].num_residuals, 100 * num_measurements);
@@ -109,9 +106,8 @@ TEST(LinearAdjustment, ForeseesAnAdjustmentWithOtherSigmas) {
   options.reproj_loss_scale_px = 0.0;
   std::unique_ptr<ReducedSystem> system;
   ASSERT_TRUE(AdjustBundle(options, problem, &model, &system).success);
-  LinearAdjustment linear(system.get(), problem.priors,
-                          options.prior_loss_scale);
-  options.prior_sigma_factors = {0.5, 2.0, 0.3, 1.0};
+  LinearAdjustment linear(system.get(), options.prior_loss_scale);
+  options.prior_sigma_factors = {0.5, 2.0, 0.3, 1.0, 1.0};
   PriorComponents foreseen;
   ASSERT_TRUE(linear.Solve(options.prior_sigma_factors, &foreseen));
   const PriorBundleAdjustmentSummary summary =
@@ -185,7 +181,7 @@ TEST(AdjustBundleWithVarianceComponents, LowersSigmasThatResidualsRefute) {
     EXPECT_LT(kept.prior_chi2_per_dof, 0.3) << "seed " << seed;
     EXPECT_GT(large.prior_chi2_per_dof, 0.7) << "seed " << seed;
     EXPECT_LT(large.prior_chi2_per_dof, 1.3) << "seed " << seed;
-    EXPECT_EQ(kept.prior_sigma_factors, kStated);
+    EXPECT_EQ(kept.prior_sigma_factors, kStatedPriorSigmas);
     for (const PriorTerm term : {PriorTerm::kRotation, PriorTerm::kDirection}) {
       const auto k = static_cast<size_t>(term);
       EXPECT_NEAR(large.prior_sigma_factors[k], 1.0 / 3.0, 0.13)

@@ -45,6 +45,14 @@ class SplitSceneTest : public testing::Test {
     scene_.position_origin = GeodeticPosition();
     scene_.length_drift_ratio = 0.01;
     scene_.inertial_scale_sigma = 0.02;
+    for (const auto& [image_id1, image_id2] :
+         std::vector<std::pair<image_t, image_t>>{
+             {1, 2}, {2, 3}, {3, 5}, {5, 6}}) {
+      InertialMotion motion;
+      motion.image_id1 = image_id1;
+      motion.image_id2 = image_id2;
+      scene_.inertial_motions.push_back(motion);
+    }
     coarse_ = {{{1, {}}, {2, {}}, {3, {}}}, {{5, {}}, {6, {}}}};
   }
 
@@ -88,6 +96,10 @@ TEST_F(SplitSceneTest, EveryImageHasOneComponent) {
   EXPECT_TRUE(split.components[1].position_origin.has_value());
   EXPECT_EQ(split.components[1].length_drift_ratio, 0.01);
   EXPECT_EQ(split.components[1].inertial_scale_sigma, 0.02);
+  ASSERT_EQ(split.components[0].inertial_motions.size(), 2);
+  EXPECT_EQ(split.components[0].inertial_motions[1].image_id2, 3);
+  ASSERT_EQ(split.components[1].inertial_motions.size(), 1);
+  EXPECT_EQ(split.components[1].inertial_motions[0].image_id1, 5);
   EXPECT_EQ(split.components[0].cameras.size(), 1);
 }
 

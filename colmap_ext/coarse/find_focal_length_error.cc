@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "colmap_ext/bundle_adjustment/find_focal_length_error.h"
+#include "colmap_ext/coarse/find_focal_length_error.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,0 +1,63 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <ceres/cost_function.h>
+
+#include <Eigen/Core>
+#include <vector>
+
+#include "colmap_ext/bundle_adjustment/adjusted_pose.h"
+#include "core/inertial_motion.h"
+
+namespace adasfm {
+
+class BundleProblem;
+struct PriorBundleAdjustmentOptions;
+
+// What an accelerometer says of three images in a row, whatever the velocity
+// was (core/inertial_motion.h; the velocities of two motions, eliminated). With
+// the motions 1 from image 1 to 2 and 2 from 2 to 3, Q the rotations
+// world_from_cam, p = C - u Q camera_from_imu_origin the IMU's positions and u
+// the model's units a metre, 3 residuals:
+//   ((p3 - p2) / dt2 - (p2 - p1) / dt1 - (dt1 + dt2) / 2 g
+//    - Q1 (dv1 - dp1 / dt1) - Q2 dp2 / dt2) / sigma
+// where dv = u delta_velocity + velocity_by_bias b, and so for dp.
+// Parameters: AdjustedPose::parameters of the images (6 each), g (3) and b (3)
+// in units / s^2, u (1). The poses are read from the objects, which must be up
+// to date.
+class InertialCost final : public ceres::CostFunction {
+ public:
+  // sigma in units / s.
+  InertialCost(const InertialMotion& motion1, const InertialMotion& motion2,
+               double sigma, const AdjustedPose* pose1,
+               const AdjustedPose* pose2, const AdjustedPose* pose3);
+
+  bool Evaluate(double const* const* parameters, double* residuals,
+                double** jacobians) const final;
+
+ private:
+  static constexpr int kNumPoses = 3;
+
+  const AdjustedPose* poses_[kNumPoses];
+  double mean_dt_s_;
+  double inverse_sigma_;
+  // What the position of each image counts.
+  double by_center_[kNumPoses];
+  // What its rotation turns into the world, for each u and for each b.
+  Eigen::Vector3d in_cam_[kNumPoses];
+  Eigen::Matrix3d by_bias_[kNumPoses];
+};
+
+// Adds those of motions that follow each other and whose images all take part,
+// in a model whose unit is about the metre. Gravity and the unit are unknowns,
+// the bias is one for each of some seconds and walks.
+//
+// Their noise is the options' accelerometer_noise times the factor of kVelocity
+// or, without it, what the poses at the start leave, which has vision's noise
+// in it, too, and so is an upper bound. Returns the noise before the factor; 0
+// where too few images take part and nothing is added.
+double AddInertialFactors(const PriorBundleAdjustmentOptions& options,
+                          const std::vector<InertialMotion>& motions,
+                          BundleProblem* bundle);
+
+}  // namespace adasfm

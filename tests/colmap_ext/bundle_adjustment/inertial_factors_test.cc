@@ -1,0 +1,220 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "colmap_ext/bundle_adjustment/inertial_factors.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <map>
+#include <vector>
+
+#include "colmap_ext/bundle_adjustment/variance_components.h"
+#include "colmap_ext/host/pose_conversion.h"
+#include "core/random.h"
+#include "tests/testing/colmap_ext/mapper_drive.h"
+#include "tests/testing/matchers.h"
+
+namespace adasfm {
+namespace {
+
+struct Parameters {
+  std::array<AdjustedPose, 3> poses;
+  Eigen::Vector3d gravity = Eigen::Vector3d(0.0, 0.0, -9.81);
+  Eigen::Vector3d bias = Eigen::Vector3d::Zero();
+  double unit = 1.0;
+
+  std::vector<double*> Blocks() {
+    return {poses[0].parameters, poses[1].parameters, poses[2].parameters,
+            gravity.data(),      bias.data(),         &unit};
+  }
+  Eigen::Vector3d Residuals(const InertialCost& cost,
+                            double** jacobians = nullptr) {
+    for (AdjustedPose& pose : poses) pose.Update();
+    Eigen::Vector3d residuals;
+    EXPECT_TRUE(cost.Evaluate(Blocks().data(), residuals.data(), jacobians));
+    return residuals;
+  }
+};
+
+// The drive's motions from the second image on, and the true poses of three.
+struct ThreeImages {
+  InertialMotion motion1, motion2;
+  Parameters parameters;
+
+  InertialCost Cost(double sigma) {
+    return InertialCost(motion1, motion2, sigma, &parameters.poses[0],
+                        &parameters.poses[1], &parameters.poses[2]);
+  }
+};
+
+ThreeImages BuildThreeImages(uint64_t seed) {
+  const MapperWorld world = BuildDrive(seed);
+  InertialDriveOptions drive;
+  drive.bias = Eigen::Vector3d(0.05, -0.1, 0.2);
+  drive.lever = Eigen::Vector3d(0.3, -0.2, 1.0);
+  const std::vector<InertialMotion> motions = IntegrateDrive(world, drive);
+  const size_t k = 10 * seed;
+  ThreeImages images;
+  images.motion1 = motions[k];
+  images.motion2 = motions[k + 1];
+  images.parameters.bias = drive.bias;
+  const std::array<image_t, 3> ids = {
+      motions[k].image_id1, motions[k].image_id2, motions[k + 1].image_id2};
+  for (int i = 0; i < 3; ++i) {
+    images.parameters.poses[i] = AdjustedPose(world.true_poses.at(ids[i]));
+  }
+  return images;
+}
+
+TEST(InertialCost, IsZeroAtTheTruthInAnyUnit) {
+  for (uint64_t seed = 1; seed <= 3; ++seed) {
+    ThreeImages images = BuildThreeImages(seed);
+    EXPECT_LT(images.parameters.Residuals(images.Cost(1.0)).norm(), 1e-6)
+        << "seed " << seed;
+    const double unit = images.parameters.unit = 2.5;
+    images.parameters.gravity *= unit;
+    images.parameters.bias *= unit;
+    for (AdjustedPose& pose : images.parameters.poses) {
+      pose.initial_center *= unit;
+    }
+    EXPECT_LT(images.parameters.Residuals(images.Cost(1.0)).norm(), 1e-6)
+        << "seed " << seed;
+  }
+}
+
+TEST(InertialCost, DerivativesAreThoseOfDifferences) {
+  for (uint64_t seed = 1; seed <= 3; ++seed) {
+    ThreeImages images = BuildThreeImages(seed);
+    const InertialCost cost = images.Cost(0.1);
+    Parameters& parameters = images.parameters;
+    Random random(seed);
+    const std::vector<int> sizes = {6, 6, 6, 3, 3, 1};
+    const std::vector<double*> blocks = parameters.Blocks();
+    for (size_t k = 0; k < blocks.size(); ++k) {
+      for (int i = 0; i < sizes[k]; ++i) blocks[k][i] += random.Gaussian(0.1);
+    }
+    for (size_t k = 0; k < blocks.size(); ++k) {
+      std::vector<double> jacobian(3 * sizes[k]);
+      std::vector<double*> jacobians(blocks.size(), nullptr);
+      jacobians[k] = jacobian.data();
+      parameters.Residuals(cost, jacobians.data());
+      for (int i = 0; i < sizes[k]; ++i) {
+        constexpr double kStep = 1e-5;
+        const double value = blocks[k][i];
+        blocks[k][i] = value + kStep;
+        const Eigen::Vector3d above = parameters.Residuals(cost);
+        blocks[k][i] = value - kStep;
+        const Eigen::Vector3d below = parameters.Residuals(cost);
+        blocks[k][i] = value;
+        for (int row = 0; row < 3; ++row) {
+          const double numeric = (above - below)[row] / (2.0 * kStep);
+          EXPECT_NEAR(jacobian[row * sizes[k] + i], numeric,
+                      1e-5 * (1.0 + std::abs(numeric)))
+              << "block " << k << ", column " << i;
+        }
+      }
+    }
+  }
+}
+
+// A drive without wheels: of the priors rotations are left.
+PriorBundleAdjustmentProblem ProblemWithoutWheels(
+    const MapperWorld& world, const colmap::Reconstruction& model) {
+  PriorBundleAdjustmentProblem problem = ProblemOf(world, model);
+  problem.priors.clear();
+  for (RelativePosePrior prior : world.data.priors) {
+    prior.flags &= kPriorRotation;
+    problem.priors.push_back(PosePriorEdgeFromPrior(prior));
+  }
+  return problem;
+}
+
+// Leaves a few of the points that images on both sides of `last` see.
+void TearAt(image_t last, colmap::Reconstruction* model) {
+  const auto ids = model->Point3DIds();
+  std::vector<colmap::point3D_t> point_ids(ids.begin(), ids.end());
+  std::sort(point_ids.begin(), point_ids.end());
+  int num_kept = 8;
+  for (const colmap::point3D_t point_id : point_ids) {
+    bool is_before = false, is_behind = false;
+    for (const auto& element : model->Point3D(point_id).Track().Elements()) {
+      (element.image_id <= last ? is_before : is_behind) = true;
+    }
+    if (is_before && is_behind && --num_kept < 0) {
+      model->DeletePoint3D(point_id);
+    }
+  }
+}
+
+double RmseM(const MapperWorld& world, const colmap::Reconstruction& model) {
+  return ComputeAlignedErrors(CamsFromWorld(model), world.true_poses, {})
+      .rmse_m;
+}
+
+PriorBundleAdjustmentSummary Adjust(const PriorBundleAdjustmentProblem& problem,
+                                    colmap::Reconstruction* model) {
+  PriorBundleAdjustmentOptions options;
+  options.function_tolerance = 1e-6;
+  double factor = 1.0;
+  return AdjustBundleWithVarianceComponents({}, options, problem, model,
+                                            &factor);
+}
+
+// The residuals tell the accelerometer's noise, though vision's is several
+// times larger. Some 60 of 350 residuals are the accelerometer's own: 1 sigma
+// of the noise is 0.1 of it, and so much is added to be on the safe side.
+TEST(InertialFactors, FindTheNoiseOfTheAccelerometer) {
+  for (uint64_t seed = 1; seed <= 3; ++seed) {
+    const MapperWorld world = BuildDrive(seed);
+    const colmap::Reconstruction start = Reconstruct(world);
+    for (const double noise : {0.01, 0.03}) {
+      PriorBundleAdjustmentProblem problem = ProblemWithoutWheels(world, start);
+      InertialDriveOptions drive;
+      drive.noise = noise;
+      drive.bias = Eigen::Vector3d(0.05, -0.1, 0.2);
+      drive.seed = seed;
+      problem.inertial_motions = IntegrateDrive(world, drive);
+      colmap::Reconstruction model = start;
+      const PriorBundleAdjustmentSummary summary = Adjust(problem, &model);
+      ASSERT_TRUE(summary.success);
+      const double found =
+          summary.accelerometer_noise *
+          summary
+              .prior_sigma_factors[static_cast<size_t>(PriorTerm::kVelocity)];
+      EXPECT_GT(found, 0.8 * noise) << "seed " << seed;
+      EXPECT_LT(found, 1.5 * noise) << "seed " << seed;
+    }
+  }
+}
+
+// Where few points tie two halves of a drive they end apart; the accelerometer
+// knows better, and its noise does not matter to a model that holds.
+TEST(InertialFactors, CloseATearAndLeaveTheRest) {
+  double torn = 0.0, mended = 0.0, sound = 0.0, sound_mended = 0.0;
+  for (uint64_t seed = 1; seed <= 5; ++seed) {
+    const MapperWorld world = BuildDrive(seed);
+    const colmap::Reconstruction whole = Reconstruct(world);
+    InertialDriveOptions drive;
+    drive.noise = 0.01;
+    drive.seed = seed;
+    const std::vector<InertialMotion> motions = IntegrateDrive(world, drive);
+    for (const bool is_torn : {false, true}) {
+      colmap::Reconstruction start = whole;
+      if (is_torn) TearAt(60, &start);
+      PriorBundleAdjustmentProblem problem = ProblemWithoutWheels(world, start);
+      colmap::Reconstruction without = start;
+      ASSERT_TRUE(Adjust(problem, &without).success);
+      problem.inertial_motions = motions;
+      colmap::Reconstruction with = start;
+      ASSERT_TRUE(Adjust(problem, &with).success);
+      (is_torn ? torn : sound) += RmseM(world, without);
+      (is_torn ? mended : sound_mended) += RmseM(world, with);
+    }
+  }
+  EXPECT_LT(mended, 0.5 * torn);
+  EXPECT_LT(sound_mended, 1.05 * sound);
+}
+
+}  // namespace
+}  // namespace adasfm
