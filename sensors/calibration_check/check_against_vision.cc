@@ -190,6 +190,8 @@ void VisionComparer::CheckTurnScale(VisionCheck* check) const {
       search_.Evidence(calibrated(), best) < kMinEvidence) {
     return;
   }
+  check->shifted_correlation = ComputeRotationCorrelation(
+      search_.Compare(best.shift_s), best.mistake.map, nullptr);
   check->contradiction =
       FormatFigures(
           "the gyroscope turns %.2g times as much as the cameras: check the "
