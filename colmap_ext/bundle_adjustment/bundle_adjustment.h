@@ -179,6 +179,9 @@ struct PriorBundleAdjustmentSummary {
   PriorSigmaFactors prior_sigma_factors = kStatedPriorSigmas;
   // 0 without inertial motions.
   double accelerometer_noise = 0.0;
+  // 1 sigma of the metre that they tell, as a ratio, where
+  // AdjustBundleWithVarianceComponents found their noise; else 0.
+  double unit_sigma = 0.0;
   std::string message;
   // Of the priors, where AdjustBundleWithVarianceComponents made the
   // adjustment: the largest chi-square per degree of freedom of a kind of term

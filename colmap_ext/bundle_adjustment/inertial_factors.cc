@@ -6,7 +6,6 @@
 
 #include <Eigen/Cholesky>
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <memory>
 #include <utility>
@@ -220,6 +219,7 @@ double AddInertialFactors(const PriorBundleAdjustmentOptions& options,
       options.prior_sigma_factors[static_cast<size_t>(PriorTerm::kVelocity)];
   double* gravity = bundle->AddParameters(shared.gravity);
   double* unit = bundle->AddParameters(shared.unit);
+  bundle->SetUnit(unit);
   AddNormalPrior(kUnitSigma, {1.0}, unit, bundle);
   double* bias = bundle->AddParameters(shared.bias);
   AddNormalPrior(kBiasSigmaMps2, {0.0, 0.0, 0.0}, bias, bundle);

@@ -119,6 +119,13 @@ LinearAdjustment::RowValues LinearAdjustment::SolveForRows(
   return values;
 }
 
+double LinearAdjustment::UnitVariance() const {
+  if (system_.unit_column < 0) return 0.0;
+  const Eigen::VectorXd unit =
+      Eigen::VectorXd::Unit(system_.rest.rows(), system_.unit_column);
+  return factorization_->solve(unit)[system_.unit_column];
+}
+
 bool LinearAdjustment::Solve(const PriorSigmaFactors& factors,
                              PriorComponents* components) {
   ComputeWeights(factors);

@@ -31,6 +31,9 @@ class LinearAdjustment {
   // those of the adjustment), and fills in the components there, with their
   // redundancies. False when the equations are not positive definite.
   bool Solve(const PriorSigmaFactors& factors, PriorComponents* components);
+  // Of the unit that an accelerometer tells, at the factors of the last Solve;
+  // 0 where none does.
+  double UnitVariance() const;
 
  private:
   // One vector for each of the system's prior rows.

@@ -11,6 +11,13 @@ std::unique_ptr<ReducedSystem> BuildReducedSystem(BundleProblem* bundle) {
   auto system = std::make_unique<ReducedSystem>();
   BundleReducer reducer(bundle, 1);
   reducer.Linearize(/*inverse_radius=*/0.0, &system->priors);
+  const std::vector<double*>& parameters = reducer.Parameters();
+  for (size_t block = 0; block < parameters.size(); ++block) {
+    if (parameters[block] == bundle->Unit()) {
+      system->unit_column =
+          reducer.Matrix().FirstColumnOf(static_cast<int>(block));
+    }
+  }
   system->rest.swap(reducer.Matrix().Matrix());
   system->rest_gradient = reducer.Gradient();
   return system;

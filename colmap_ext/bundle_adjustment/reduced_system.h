@@ -31,6 +31,8 @@ struct ReducedSystem {
   Eigen::SparseMatrix<double> rest;
   Eigen::VectorXd rest_gradient;
   std::vector<ReducedPriorRows> priors;
+  // Of the units a metre as an accelerometer tells them; -1 where none does.
+  int unit_column = -1;
 };
 
 // With the robust weights of all but the priors as they are; priors have none.

@@ -113,6 +113,7 @@ class VarianceComponentAdjustment {
     if (has_priors && balance_.enabled) RaiseKeypointSigma();
     if (!is_final_) Adjust(given_.function_tolerance);
     if (summary_.success && has_priors) DescribePriors();
+    summary_.unit_sigma = unit_sigma_;
     return summary_;
   }
 
@@ -173,6 +174,7 @@ class VarianceComponentAdjustment {
     const std::optional<PriorSigmaEstimate> estimate =
         EstimatePriorSigmas(&linear);
     if (!estimate) return;
+    unit_sigma_ = std::sqrt(linear.UnitVariance());
     options_.prior_sigma_factors = estimate->factors;
     components_ = estimate->components;
     redundancies_factor_ = factor_;
@@ -229,6 +231,7 @@ class VarianceComponentAdjustment {
   // redundancies were found.
   PriorComponents components_;
   double redundancies_factor_ = 0.0;
+  double unit_sigma_ = 0.0;
   // The last adjustment was with the sigmas in use and the tolerance given.
   bool is_final_ = false;
 };

@@ -200,6 +200,7 @@ class ModelRefiner {
     summary_.keypoint_sigma_px = adjustment.keypoint_sigma_px;
     summary_.keypoint_sigma_ratios = adjustment.keypoint_sigma_ratios;
     summary_.prior_chi2_per_dof = adjustment.prior_chi2_per_dof;
+    summary_.unit_sigma = adjustment.unit_sigma;
   }
 
   // The coarse model, and so this one, is in the frame of the positions.

@@ -39,6 +39,9 @@ struct RefineModelSummary {
   std::map<camera_t, double> keypoint_sigma_ratios;
   // Squared whitened residual of the priors per degree of freedom at the end.
   double prior_chi2_per_dof = 0.0;
+  // 1 sigma of the accelerometer's metre in the last adjustment, as a ratio; 0
+  // without.
+  double unit_sigma = 0.0;
   // Images that the priors contradict and that were put back.
   int num_images_put_back = 0;
   // Images that end with too few points for a pose and that no known motions

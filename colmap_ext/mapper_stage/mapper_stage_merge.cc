@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Steps 3.3 and 3.4 of the mapper stage.
 #include <algorithm>
+#include <cmath>
 #include <map>
 #include <optional>
 #include <utility>
@@ -188,19 +189,24 @@ Status MapperStage::RefineMerged(const std::string& fingerprint,
 }
 
 // The accelerometer, which has part in the final shape, tells its size better
-// than that of the coarse model, whose metres stay where it does not.
+// than that of the coarse model, whose metres stay where it does not. What that
+// shape and the accelerometer differ by does not tell how well: the adjustment
+// does.
 void MapperStage::SetInertialUnit(colmap::Reconstruction* model) {
   summary_.inertial_scale_sigma = data_.inertial_scale_sigma;
   if (!(data_.inertial_scale_sigma > 0.0)) return;
   KeepInertialUnit(data_.priors, model);
   const std::optional<InertialScale> scale =
       EstimateInertialScale(data_.inertial_motions, CamsFromWorld(*model));
-  if (!scale || scale->sigma_ratio >= data_.inertial_scale_sigma) return;
+  if (!scale || !(summary_.refine.unit_sigma > 0.0)) return;
+  const double sigma =
+      std::hypot(scale->sigma_ratio, summary_.refine.unit_sigma);
+  if (sigma >= data_.inertial_scale_sigma) return;
   TransformReconstruction(
       Sim3d(scale->metres_per_unit, Eigen::Quaterniond::Identity(),
             Eigen::Vector3d::Zero()),
       model);
-  summary_.inertial_scale_sigma = scale->sigma_ratio;
+  summary_.inertial_scale_sigma = sigma;
 }
 
 StatusOr<colmap::Reconstruction> MapperStage::Merge(bool require_all_parts) {

@@ -40,6 +40,7 @@ void VisitSummary(Summary& summary, const Visit& visit) {
   visit("keypoint_sigma_px", summary.refine.keypoint_sigma_px);
   visit("keypoint_sigma_ratios", summary.refine.keypoint_sigma_ratios);
   visit("prior_chi2_per_dof", summary.refine.prior_chi2_per_dof);
+  visit("unit_sigma", summary.refine.unit_sigma);
   visit("num_images_put_back", summary.refine.num_images_put_back);
   visit("num_images_left_out", summary.refine.num_images_left_out);
   visit("started_from_coarse_poses", summary.started_from_coarse_poses);
