@@ -275,8 +275,9 @@ PriorBundleAdjustmentSummary AdjustBundle(
                        /*may_keep_points_apart=*/plan.is_small,
                        plan.cut ? &*plan.cut : nullptr);
   plan.cut.reset();
-  summary.accelerometer_noise =
+  const InertialTerms inertial =
       AddInertialFactors(options, problem.inertial_motions, &bundle);
+  summary.accelerometer_noise = inertial.noise;
   summary.num_images = bundle.NumImages();
   summary.num_points = bundle.NumPoints();
   summary.num_residuals = bundle.NumResiduals();
@@ -302,7 +303,7 @@ PriorBundleAdjustmentSummary AdjustBundle(
     bundle.UpdatePoses();  // The last step may have been taken back.
     bundle.WriteTo(reconstruction);
     summary.shared_errors = bundle.EstimatedSharedErrors();
-    if (system != nullptr) *system = BuildReducedSystem(&bundle);
+    if (system != nullptr) *system = BuildReducedSystem(&bundle, inertial.unit);
   }
   return summary;
 }

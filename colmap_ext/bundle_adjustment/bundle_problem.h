@@ -58,9 +58,6 @@ class BundleProblem final : private ceres::EvaluationCallback {
   bool IsConstant(image_t image_id) const;
   // Parameters of the caller's own.
   double* AddParameters(std::vector<double> values);
-  // The units a metre as an accelerometer tells them; null where none does.
-  const double* Unit() const { return unit_; }
-  void SetUnit(const double* unit) { unit_ = unit; }
   // Adds a residual on such poses and parameters and takes both over.
   ceres::ResidualBlockId AddResidual(
       std::unique_ptr<ceres::CostFunction> cost,
@@ -216,7 +213,6 @@ class BundleProblem final : private ceres::EvaluationCallback {
   // Where the windows of the direction's drift begin in it.
   size_t direction_drift_ = kGyroscopeBias;
   std::deque<std::vector<double>> other_parameters_;
-  const double* unit_ = nullptr;
   std::deque<ReprojectionCost> reprojection_costs_;
   std::vector<std::unique_ptr<ceres::CostFunction>> other_costs_;
   std::vector<std::unique_ptr<ceres::LossFunction>> other_losses_;

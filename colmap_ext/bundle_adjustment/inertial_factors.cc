@@ -205,11 +205,23 @@ bool InertialCost::Evaluate(double const* const* parameters, double* residuals,
   return true;
 }
 
-double AddInertialFactors(const PriorBundleAdjustmentOptions& options,
-                          const std::vector<InertialMotion>& motions,
-                          BundleProblem* bundle) {
+void BundleProblem::AddVelocityTerm(std::unique_ptr<ceres::CostFunction> cost,
+                                    const std::vector<image_t>& image_ids,
+                                    const std::vector<double*>& parameters) {
+  PriorBlock block;
+  block.residual =
+      AddResidual(std::move(cost),
+                  std::make_unique<ceres::HuberLoss>(options_.prior_loss_scale),
+                  image_ids, parameters);
+  block.term = PriorTerm::kVelocity;
+  prior_blocks_.push_back(block);
+}
+
+InertialTerms AddInertialFactors(const PriorBundleAdjustmentOptions& options,
+                                 const std::vector<InertialMotion>& motions,
+                                 BundleProblem* bundle) {
   const std::vector<Factor> factors = FindFactors(motions, *bundle);
-  if (factors.size() < kMinNumFactors) return 0.0;
+  if (factors.size() < kMinNumFactors) return {};
   SharedMotion shared;
   const double noise_at_start = FitSharedMotion(factors, &shared);
   const double noise = options.accelerometer_noise > 0.0
@@ -219,7 +231,6 @@ double AddInertialFactors(const PriorBundleAdjustmentOptions& options,
       options.prior_sigma_factors[static_cast<size_t>(PriorTerm::kVelocity)];
   double* gravity = bundle->AddParameters(shared.gravity);
   double* unit = bundle->AddParameters(shared.unit);
-  bundle->SetUnit(unit);
   AddNormalPrior(kUnitSigma, {1.0}, unit, bundle);
   double* bias = bundle->AddParameters(shared.bias);
   AddNormalPrior(kBiasSigmaMps2, {0.0, 0.0, 0.0}, bias, bundle);
@@ -237,7 +248,7 @@ double AddInertialFactors(const PriorBundleAdjustmentOptions& options,
     bundle->AddVelocityTerm(factor.Cost(sigma_factor * noise), factor.images,
                             {gravity, bias, unit});
   }
-  return noise;
+  return {noise, unit};
 }
 
 }  // namespace adasfm

@@ -48,16 +48,23 @@ class InertialCost final : public ceres::CostFunction {
   Eigen::Matrix3d by_bias_[kNumPoses];
 };
 
+// What was added.
+struct InertialTerms {
+  // 1 sigma, m/s^2 sqrt(s), before the factor; 0: nothing.
+  double noise = 0.0;
+  // The parameter u.
+  const double* unit = nullptr;
+};
+
 // Adds those of motions that follow each other and whose images all take part,
 // in a model whose unit is about the metre. Gravity and the unit are unknowns,
 // the bias is one for each of some seconds and walks.
 //
-// Their noise is the options' accelerometer_noise times the factor of kVelocity
-// or, without it, what the poses at the start leave, which has vision's noise
-// in it, too, and so is an upper bound. Returns the noise before the factor; 0
-// where too few images take part and nothing is added.
-double AddInertialFactors(const PriorBundleAdjustmentOptions& options,
-                          const std::vector<InertialMotion>& motions,
-                          BundleProblem* bundle);
+// Their noise is the options' accelerometer_noise or, without it, a guess: what
+// the poses at the start leave, half of the time. The factor of kVelocity comes
+// on top of it. Where too few images take part nothing is added.
+InertialTerms AddInertialFactors(const PriorBundleAdjustmentOptions& options,
+                                 const std::vector<InertialMotion>& motions,
+                                 BundleProblem* bundle);
 
 }  // namespace adasfm

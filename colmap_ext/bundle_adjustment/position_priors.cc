@@ -191,16 +191,4 @@ ceres::ResidualBlockId BundleProblem::AddResidual(
                  parameters);
 }
 
-void BundleProblem::AddVelocityTerm(std::unique_ptr<ceres::CostFunction> cost,
-                                    const std::vector<image_t>& image_ids,
-                                    const std::vector<double*>& parameters) {
-  PriorBlock block;
-  block.residual =
-      AddResidual(std::move(cost),
-                  std::make_unique<ceres::HuberLoss>(options_.prior_loss_scale),
-                  image_ids, parameters);
-  block.term = PriorTerm::kVelocity;
-  prior_blocks_.push_back(block);
-}
-
 }  // namespace adasfm

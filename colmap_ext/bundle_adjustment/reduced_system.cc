@@ -7,13 +7,14 @@
 
 namespace adasfm {
 
-std::unique_ptr<ReducedSystem> BuildReducedSystem(BundleProblem* bundle) {
+std::unique_ptr<ReducedSystem> BuildReducedSystem(BundleProblem* bundle,
+                                                  const double* unit) {
   auto system = std::make_unique<ReducedSystem>();
   BundleReducer reducer(bundle, 1);
   reducer.Linearize(/*inverse_radius=*/0.0, &system->priors);
   const std::vector<double*>& parameters = reducer.Parameters();
   for (size_t block = 0; block < parameters.size(); ++block) {
-    if (parameters[block] == bundle->Unit()) {
+    if (parameters[block] == unit) {
       system->unit_column =
           reducer.Matrix().FirstColumnOf(static_cast<int>(block));
     }

@@ -36,6 +36,8 @@ struct ReducedSystem {
 };
 
 // With the robust weights of all but the priors as they are; priors have none.
-std::unique_ptr<ReducedSystem> BuildReducedSystem(BundleProblem* bundle);
+// unit: the parameter of unit_column.
+std::unique_ptr<ReducedSystem> BuildReducedSystem(BundleProblem* bundle,
+                                                  const double* unit = nullptr);
 
 }  // namespace adasfm

@@ -9,6 +9,7 @@
 #include "colmap_ext/coarse/join_models.h"
 #include "colmap_ext/scene/scene_bearings.h"
 #include "tests/testing/colmap_ext/global_stage_run.h"
+#include "tests/testing/colmap_ext/inertial_drive.h"
 #include "tests/testing/matchers.h"
 
 namespace adasfm {
@@ -128,38 +129,14 @@ class SplitByInertiaTest : public SplitModelsTest {
     }
   }
 
-  // What an IMU in the camera's place integrated without errors.
+  // Of an IMU in the camera's place, without errors.
   void AddInertialMotions() {
-    const Eigen::Vector3d gravity(0.0, 0.0, -9.81);
-    const std::vector<SyntheticImage>& images = world_.images;
-    const auto position = [&images](size_t i) {
-      return images[i].cam_from_world.TargetOriginInSource();
-    };
-    const auto seconds = [&images](size_t i) {
-      return 1e-9 * static_cast<double>(images[i].timestamp_ns);
-    };
-    const auto velocity = [&](size_t i) -> Eigen::Vector3d {
-      const size_t first = i > 0 ? i - 1 : 0;
-      const size_t last = std::min(i + 1, images.size() - 1);
-      return (position(last) - position(first)) /
-             (seconds(last) - seconds(first));
-    };
-    for (size_t i = 0; i + 1 < images.size(); ++i) {
-      const Eigen::Quaterniond& cam_from_world =
-          images[i].cam_from_world.rotation;
-      InertialMotion motion;
-      motion.image_id1 = images[i].image_id;
-      motion.image_id2 = images[i + 1].image_id;
-      const double dt = motion.dt_s = seconds(i + 1) - seconds(i);
-      motion.delta_velocity =
-          cam_from_world * (velocity(i + 1) - velocity(i) - gravity * dt);
-      motion.delta_position =
-          cam_from_world * (position(i + 1) - position(i) - velocity(i) * dt -
-                            0.5 * dt * dt * gravity);
-      motion.velocity_by_bias = -dt * Eigen::Matrix3d::Identity();
-      motion.position_by_bias = -0.5 * dt * dt * Eigen::Matrix3d::Identity();
-      scene_.inertial_motions.push_back(motion);
+    std::vector<TimedPose> images;
+    for (const SyntheticImage& image : world_.images) {
+      images.push_back(
+          {image.image_id, image.timestamp_ns, image.cam_from_world});
     }
+    scene_.inertial_motions = IntegrateDrive(std::move(images), {});
   }
 };
 

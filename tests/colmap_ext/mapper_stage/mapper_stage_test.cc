@@ -258,6 +258,15 @@ TEST_F(MapperStageTest, UnknownFocalLengthIsRefined) {
   EXPECT_EQ(run(true), 1.02);
 }
 
+// Rotations, and the lengths of the coarse model in metres of an accelerometer.
+void LeaveToAnImu(MapperWorld* world) {
+  for (RelativePosePrior& prior : world->data.priors) {
+    prior.flags = kPriorRotation;
+  }
+  AddInertialLengths(LengthsOf(world->coarse_poses, world->data.priors),
+                     &world->data.priors);
+}
+
 // An IMU without wheels: images on few points whose coarse places are wrong do
 // not take the metres of the accelerometer along.
 TEST_F(MapperStageTest, WrongPlacesLeaveTheUnitOfTheAccelerometer) {
@@ -276,11 +285,7 @@ TEST_F(MapperStageTest, WrongPlacesLeaveTheUnitOfTheAccelerometer) {
       pose.translation += random.GaussianVector(10.0);
     }
     world.data.inertial_scale_sigma = 0.01;
-    for (RelativePosePrior& prior : world.data.priors) {
-      prior.flags = kPriorRotation;
-    }
-    AddInertialLengths(LengthsOf(world.coarse_poses, world.data.priors),
-                       &world.data.priors);
+    LeaveToAnImu(&world);
     std::filesystem::remove_all(folder_);
     const AlignedErrors errors =
         ComputeAlignedErrors(Run(world), world.true_poses, {});
@@ -305,12 +310,8 @@ TEST_F(MapperStageTest, TheAccelerometerTellsTheSizeOfTheFinalModel) {
     drive.seed = seed;
     world.data.inertial_motions = IntegrateDrive(world, drive);
     world.data.inertial_scale_sigma = 0.02;
-    for (RelativePosePrior& prior : world.data.priors) {
-      prior.flags = kPriorRotation;
-    }
     for (auto& [image_id, pose] : world.coarse_poses) pose.translation *= 1.02;
-    AddInertialLengths(LengthsOf(world.coarse_poses, world.data.priors),
-                       &world.data.priors);
+    LeaveToAnImu(&world);
     std::filesystem::remove_all(folder_);
     const AlignedErrors errors =
         ComputeAlignedErrors(Run(world), world.true_poses, {});
