@@ -15,6 +15,10 @@ void TurnInertialMotion(const Eigen::Quaterniond& turned_from_cam,
   motion->velocity_by_bias = turn * motion->velocity_by_bias * turn.transpose();
   motion->position_by_bias = turn * motion->position_by_bias * turn.transpose();
   motion->camera_from_imu_origin = turn * motion->camera_from_imu_origin;
+  if (!motion->by_wheels) return;
+  MeasuredTranslation& by_wheels = *motion->by_wheels;
+  by_wheels.translation = turn * by_wheels.translation;
+  by_wheels.covariance = turn * by_wheels.covariance * turn.transpose();
 }
 
 double AddInertialLengths(const std::vector<InertialLength>& lengths,

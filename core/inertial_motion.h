@@ -3,12 +3,20 @@
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
+#include <optional>
 #include <vector>
 
 #include "core/relative_pose_prior.h"
 #include "core/types.h"
 
 namespace adasfm {
+
+// A translation that was measured, in the axes of one camera, and its
+// covariance (m^2).
+struct MeasuredTranslation {
+  Eigen::Vector3d translation = Eigen::Vector3d::Zero();  // m
+  Eigen::Matrix3d covariance = Eigen::Matrix3d::Identity();
+};
 
 // What an IMU integrated between two images, free of the velocity at the start
 // and of gravity (Forster 2015, eqs. 33-38), seen from the camera of the first
@@ -29,6 +37,10 @@ struct InertialMotion {
   Eigen::Matrix3d position_by_bias = Eigen::Matrix3d::Zero();  // s^2
   // From the IMU's origin to the camera's, in the camera's axes, m.
   Eigen::Vector3d camera_from_imu_origin = Eigen::Vector3d::Zero();
+  // The translation of P_12, in the axes of camera 2, by the wheels without the
+  // accelerometer: what is left of a prior's translation where the rest of this
+  // motion is used beside it. None without wheels, and where they slip.
+  std::optional<MeasuredTranslation> by_wheels;
 };
 
 // The motion as a camera sees it that is turned against the stated one.

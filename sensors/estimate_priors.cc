@@ -7,7 +7,6 @@
 #include <stdexcept>
 
 #include "core/option_checker.h"
-#include "core/prior_lengths.h"
 #include "core/so3.h"
 #include "sensors/build_fusion_problem.h"
 #include "sensors/calibration_check/wheel_clock.h"
@@ -17,6 +16,7 @@
 #include "sensors/select_images.h"
 #include "sensors/smoother/compose_inertial_motion.h"
 #include "sensors/smoother/compose_prior.h"
+#include "sensors/smoother/compose_wheel_translation.h"
 #include "sensors/use_vision.h"
 #include "sensors/visual_links.h"
 #include "sensors/wheel_skids.h"
@@ -232,8 +232,6 @@ void PriorEstimator::BuildPriors() {
 }
 
 void PriorEstimator::BuildInertialMotions() {
-  // The wheels know the metre better.
-  if (HasLengths(estimate_.priors)) return;
   for (size_t i = 0; i + 1 < images_.size(); ++i) {
     std::optional<InertialMotion> motion = ComposeInertialMotion(
         problem_, fused_, timeline_.indices[i], timeline_.indices[i + 1],
@@ -241,6 +239,9 @@ void PriorEstimator::BuildInertialMotions() {
     if (!motion) continue;
     motion->image_id1 = images_[i].image_id;
     motion->image_id2 = images_[i + 1].image_id;
+    motion->by_wheels = ComposeWheelTranslation(
+        problem_, options_.fusion, fused_, timeline_.indices[i],
+        timeline_.indices[i + 1], calibration_.cam_from_imu);
     estimate_.inertial_motions.push_back(*motion);
   }
 }

@@ -56,6 +56,8 @@ class BundleProblem final : private ceres::EvaluationCallback {
   // The pose of an image that has part in a residual already; null for others.
   const AdjustedPose* UsedPose(image_t image_id) const;
   bool IsConstant(image_t image_id) const;
+  // The rotation by which T_cam_imu is wrong (shared_errors.h).
+  double* ExtrinsicRotation();
   // Parameters of the caller's own.
   double* AddParameters(std::vector<double> values);
   // Adds a residual on such poses and parameters and takes both over.

@@ -8,6 +8,7 @@
 #include "colmap_ext/bundle_adjustment/bundle_problem.h"
 
 namespace adasfm {
+
 std::vector<double*> BundleProblem::SharedParameters(const PosePriorEdge& edge,
                                                      const PosePriorCost& cost,
                                                      PosePriorCost::Term term) {
@@ -47,6 +48,17 @@ void BundleProblem::AddSharedErrorStep(double sigma, double decay,
   other_costs_.push_back(std::make_unique<DifferenceCost>(sigma, decay));
   problem_->AddResidualBlock(other_costs_.back().get(), nullptr, before->values,
                              block->values);
+}
+
+double* BundleProblem::ExtrinsicRotation() {
+  SharedBlock& block = shared_[kExtrinsicRotation];
+  if (!block.is_used) {
+    block.is_used = true;
+    problem_->AddParameterBlock(block.values, 3);
+    AddSharedErrorPrior(options_.shared_errors.extrinsic_rotation_sigma_rad,
+                        &block);
+  }
+  return block.values;
 }
 
 void BundleProblem::AddSharedErrorPriors(

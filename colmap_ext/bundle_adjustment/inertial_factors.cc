@@ -7,11 +7,13 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <memory>
 #include <utility>
 
 #include "colmap_ext/bundle_adjustment/bundle_problem.h"
 #include "core/median.h"
+#include "core/so3.h"
 
 namespace adasfm {
 namespace {
@@ -81,7 +83,7 @@ std::vector<Factor> FindFactors(const std::vector<InertialMotion>& motions,
 
 // With the poses held, robust (Cauchy) at the median. Returns the noise.
 double FitSharedMotion(const std::vector<Factor>& factors,
-                       SharedMotion* shared) {
+                       const double* extrinsic_rotation, SharedMotion* shared) {
   constexpr int kNumUnknowns = 7;
   constexpr int kNumIterations = 10;
   using Vector = Eigen::Matrix<double, kNumUnknowns, 1>;
@@ -93,13 +95,15 @@ double FitSharedMotion(const std::vector<Factor>& factors,
     Vector gradient = Vector::Zero();
     std::vector<double> norms;
     for (const Factor& factor : factors) {
-      const double* parameters[] = {nullptr,  nullptr,      nullptr,
-                                    x.data(), x.data() + 3, x.data() + 6};
+      const double* parameters[] = {
+          nullptr,      nullptr,      nullptr,           x.data(),
+          x.data() + 3, x.data() + 6, extrinsic_rotation};
       Eigen::Vector3d residuals;
       Jacobian3 by_gravity, by_bias;
       Eigen::Vector3d by_unit;
-      double* jacobians[] = {nullptr,           nullptr,        nullptr,
-                             by_gravity.data(), by_bias.data(), by_unit.data()};
+      double* jacobians[] = {
+          nullptr,        nullptr,        nullptr, by_gravity.data(),
+          by_bias.data(), by_unit.data(), nullptr};
       factor.Cost(1.0)->Evaluate(parameters, residuals.data(), jacobians);
       norms.push_back(residuals.norm());
       Eigen::Matrix<double, 3, kNumUnknowns> jacobian;
@@ -149,18 +153,18 @@ InertialCost::InertialCost(const InertialMotion& motion1,
       inverse_sigma_(1.0 / sigma),
       by_center_{1.0 / motion1.dt_s, -1.0 / motion1.dt_s - 1.0 / motion2.dt_s,
                  1.0 / motion2.dt_s} {
-  in_cam_[0] = motion1.delta_velocity - motion1.delta_position / motion1.dt_s;
-  in_cam_[1] = motion2.delta_position / motion2.dt_s;
-  in_cam_[2].setZero();
+  measured_[0] = motion1.delta_velocity - motion1.delta_position / motion1.dt_s;
+  measured_[1] = motion2.delta_position / motion2.dt_s;
+  measured_[2].setZero();
   for (int k = 0; k < kNumPoses; ++k) {
-    in_cam_[k] += by_center_[k] * motion1.camera_from_imu_origin;
+    in_cam_[k] = measured_[k] + by_center_[k] * motion1.camera_from_imu_origin;
   }
   by_bias_[0] =
       motion1.velocity_by_bias - motion1.position_by_bias / motion1.dt_s;
   by_bias_[1] = motion2.position_by_bias / motion2.dt_s;
   by_bias_[2].setZero();
   set_num_residuals(3);
-  *mutable_parameter_block_sizes() = {6, 6, 6, 3, 3, 1};
+  *mutable_parameter_block_sizes() = {6, 6, 6, 3, 3, 1, 3};
 }
 
 bool InertialCost::Evaluate(double const* const* parameters, double* residuals,
@@ -168,14 +172,17 @@ bool InertialCost::Evaluate(double const* const* parameters, double* residuals,
   const Eigen::Map<const Eigen::Vector3d> gravity(parameters[kNumPoses]);
   const Eigen::Map<const Eigen::Vector3d> bias(parameters[kNumPoses + 1]);
   const double unit = *parameters[kNumPoses + 2];
+  const Eigen::Map<const Eigen::Vector3d> turn(parameters[kNumPoses + 3]);
   Eigen::Vector3d error = -mean_dt_s_ * gravity;
   Eigen::Matrix3d error_by_bias = Eigen::Matrix3d::Zero();
   Eigen::Vector3d error_by_unit = Eigen::Vector3d::Zero();
+  Eigen::Matrix3d error_by_turn = Eigen::Matrix3d::Zero();
   for (int k = 0; k < kNumPoses; ++k) {
     const Eigen::Matrix3d world_from_cam = poses_[k]->rotation.transpose();
     error += by_center_[k] * poses_[k]->center;
     error_by_bias -= world_from_cam * by_bias_[k];
-    error_by_unit -= world_from_cam * in_cam_[k];
+    error_by_unit -= world_from_cam * (in_cam_[k] + turn.cross(measured_[k]));
+    error_by_turn += unit * world_from_cam * Hat(measured_[k]);
   }
   error += error_by_bias * bias + error_by_unit * unit;
   Eigen::Map<Eigen::Vector3d> whitened(residuals);
@@ -186,7 +193,9 @@ bool InertialCost::Evaluate(double const* const* parameters, double* residuals,
     Eigen::Map<PoseJacobian> jacobian(jacobians[k]);
     jacobian.leftCols<3>() =
         -inverse_sigma_ *
-        RotatedBackJacobian(*poses_[k], unit * in_cam_[k] + by_bias_[k] * bias);
+        RotatedBackJacobian(*poses_[k],
+                            unit * (in_cam_[k] + turn.cross(measured_[k])) +
+                                by_bias_[k] * bias);
     jacobian.rightCols<3>() =
         inverse_sigma_ * by_center_[k] * Eigen::Matrix3d::Identity();
   }
@@ -201,6 +210,10 @@ bool InertialCost::Evaluate(double const* const* parameters, double* residuals,
   if (jacobians[kNumPoses + 2] != nullptr) {
     Eigen::Map<Eigen::Vector3d> jacobian(jacobians[kNumPoses + 2]);
     jacobian = inverse_sigma_ * error_by_unit;
+  }
+  if (jacobians[kNumPoses + 3] != nullptr) {
+    Eigen::Map<Jacobian3> jacobian(jacobians[kNumPoses + 3]);
+    jacobian = inverse_sigma_ * error_by_turn;
   }
   return true;
 }
@@ -217,13 +230,58 @@ void BundleProblem::AddVelocityTerm(std::unique_ptr<ceres::CostFunction> cost,
   prior_blocks_.push_back(block);
 }
 
+std::vector<RelativePosePrior> LeaveAccelerometerToFactors(
+    const std::vector<InertialMotion>& motions, const std::set<image_t>& images,
+    std::vector<RelativePosePrior> priors) {
+  std::map<std::pair<image_t, image_t>, const InertialMotion*> in_factor;
+  size_t num_factors = 0;
+  for (size_t k = 0; k + 1 < motions.size(); ++k) {
+    const InertialMotion& motion1 = motions[k];
+    const InertialMotion& motion2 = motions[k + 1];
+    if (motion1.image_id2 != motion2.image_id1 ||
+        images.count(motion1.image_id1) == 0 ||
+        images.count(motion1.image_id2) == 0 ||
+        images.count(motion2.image_id2) == 0) {
+      continue;
+    }
+    ++num_factors;
+    for (const InertialMotion* motion : {&motion1, &motion2}) {
+      in_factor[{motion->image_id1, motion->image_id2}] = motion;
+    }
+  }
+  if (num_factors < kMinNumFactors) return priors;
+  for (RelativePosePrior& prior : priors) {
+    const auto found = in_factor.find({prior.image_id1, prior.image_id2});
+    if (found == in_factor.end() || !prior.HasLength() ||
+        (prior.flags & kPriorInertialLength)) {
+      continue;
+    }
+    const auto& by_wheels = found->second->by_wheels;
+    if (!by_wheels) {
+      prior.flags &= ~(kPriorDirection | kPriorLength);
+      continue;
+    }
+    prior.cam2_from_cam1.translation = by_wheels->translation;
+    prior.covariance.bottomRows<3>().setZero();
+    prior.covariance.rightCols<3>().setZero();
+    prior.covariance.bottomRightCorner<3, 3>() = by_wheels->covariance;
+  }
+  return priors;
+}
+
 InertialTerms AddInertialFactors(const PriorBundleAdjustmentOptions& options,
                                  const std::vector<InertialMotion>& motions,
                                  BundleProblem* bundle) {
   const std::vector<Factor> factors = FindFactors(motions, *bundle);
   if (factors.size() < kMinNumFactors) return {};
   SharedMotion shared;
-  const double noise_at_start = FitSharedMotion(factors, &shared);
+  // Without lengths the shape would follow it.
+  const bool knows_turn = std::any_of(
+      factors.begin(), factors.end(),
+      [](const Factor& factor) { return factor.motion1->by_wheels; });
+  double* turn = knows_turn ? bundle->ExtrinsicRotation()
+                            : bundle->AddParameters({0.0, 0.0, 0.0});
+  const double noise_at_start = FitSharedMotion(factors, turn, &shared);
   const double noise = options.accelerometer_noise > 0.0
                            ? options.accelerometer_noise
                            : noise_at_start;
@@ -246,8 +304,9 @@ InertialTerms AddInertialFactors(const PriorBundleAdjustmentOptions& options,
     }
     seconds += factor.motion2->dt_s;
     bundle->AddVelocityTerm(factor.Cost(sigma_factor * noise), factor.images,
-                            {gravity, bias, unit});
+                            {gravity, bias, unit, turn});
   }
+  if (!knows_turn) bundle->CeresProblem()->SetParameterBlockConstant(turn);
   return {noise, unit};
 }
 

@@ -4,14 +4,25 @@
 #include <ceres/cost_function.h>
 
 #include <Eigen/Core>
+#include <set>
 #include <vector>
 
 #include "colmap_ext/bundle_adjustment/adjusted_pose.h"
 #include "core/inertial_motion.h"
+#include "core/relative_pose_prior.h"
 
 namespace adasfm {
 
 class BundleProblem;
+
+// The priors beside the factors of these motions among the images: the
+// translations that the accelerometer helped to find become the wheels' own, or
+// unknown where these slip, so that it does not count twice. Those of other
+// motions stay as they are.
+std::vector<RelativePosePrior> LeaveAccelerometerToFactors(
+    const std::vector<InertialMotion>& motions, const std::set<image_t>& images,
+    std::vector<RelativePosePrior> priors);
+
 struct PriorBundleAdjustmentOptions;
 
 // What an accelerometer says of three images in a row, whatever the velocity
@@ -21,10 +32,11 @@ struct PriorBundleAdjustmentOptions;
 // the model's units a metre, 3 residuals:
 //   ((p3 - p2) / dt2 - (p2 - p1) / dt1 - (dt1 + dt2) / 2 g
 //    - Q1 (dv1 - dp1 / dt1) - Q2 dp2 / dt2) / sigma
-// where dv = u delta_velocity + velocity_by_bias b, and so for dp.
+// where dv = u (delta_velocity + e x delta_velocity) + velocity_by_bias b, and
+// so for dp: e is the rotation by which T_cam_imu is wrong (shared_errors.h).
 // Parameters: AdjustedPose::parameters of the images (6 each), g (3) and b (3)
-// in units / s^2, u (1). The poses are read from the objects, which must be up
-// to date.
+// in units / s^2, u (1), e (3). The poses are read from the objects, which must
+// be up to date.
 class InertialCost final : public ceres::CostFunction {
  public:
   // sigma in units / s.
@@ -43,8 +55,10 @@ class InertialCost final : public ceres::CostFunction {
   double inverse_sigma_;
   // What the position of each image counts.
   double by_center_[kNumPoses];
-  // What its rotation turns into the world, for each u and for each b.
+  // What its rotation turns into the world, for each u, the part of it that
+  // the IMU measured, and for each b.
   Eigen::Vector3d in_cam_[kNumPoses];
+  Eigen::Vector3d measured_[kNumPoses];
   Eigen::Matrix3d by_bias_[kNumPoses];
 };
 
@@ -58,7 +72,8 @@ struct InertialTerms {
 
 // Adds those of motions that follow each other and whose images all take part,
 // in a model whose unit is about the metre. Gravity and the unit are unknowns,
-// the bias is one for each of some seconds and walks.
+// the bias is one for each of some seconds and walks; e is that of the rotation
+// priors where motions have wheels, and else zero.
 //
 // Their noise is the options' accelerometer_noise or, without it, a guess: what
 // the poses at the start leave, half of the time. The factor of kVelocity comes

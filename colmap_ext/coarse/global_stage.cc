@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "colmap_ext/coarse/global_stage.h"
 
+#include <algorithm>
 #include <set>
 #include <sstream>
 #include <stdexcept>
@@ -273,7 +274,9 @@ StatusOr<GlobalStageResult> RunGlobalStage(
   }
 
   // 2.9 Metres without wheels.
-  if (!scene.inertial_motions.empty()) {
+  if (!scene.inertial_motions.empty() &&
+      std::any_of(result.models.begin(), result.models.end(),
+                  [](const CoarseModel& model) { return !model.metric; })) {
     watch = begin("metres from the accelerometer", 0.95);
     MeasureSizes(scene, &result);
     result.steps.push_back({"metres from the accelerometer", watch.Seconds(),

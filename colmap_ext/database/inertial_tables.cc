@@ -2,6 +2,7 @@
 #include "colmap_ext/database/inertial_tables.h"
 
 #include <cmath>
+#include <optional>
 #include <string>
 #include <tuple>
 
@@ -13,6 +14,20 @@ namespace {
 std::string RowOf(const std::string& table, const SqliteStatement& statement) {
   return "table " + table + ", images " + statement.Text(0) + " and " +
          statement.Text(1);
+}
+
+// None where the wheels know none.
+std::optional<MeasuredTranslation> WheelTranslationFromRow(
+    const SqliteStatement& statement, const std::string& row) {
+  if (statement.IsNull(8) && statement.IsNull(9)) return std::nullopt;
+  MeasuredTranslation by_wheels;
+  DoublesFromBlob(statement, 8, row, 3, by_wheels.translation.data());
+  DoublesFromBlob(statement, 9, row, 9, by_wheels.covariance.data());
+  if (!by_wheels.translation.allFinite() || !by_wheels.covariance.allFinite() ||
+      !(by_wheels.covariance.diagonal().array() >= 0.0).all()) {
+    throw SqliteError(row + ": values that no wheels measure");
+  }
+  return by_wheels;
 }
 
 bool IsPositive(double value) { return std::isfinite(value) && value > 0.0; }
@@ -29,6 +44,7 @@ InertialMotion MotionFromRow(const SqliteStatement& statement) {
   // Rows first.
   motion.velocity_by_bias.transposeInPlace();
   motion.position_by_bias.transposeInPlace();
+  motion.by_wheels = WheelTranslationFromRow(statement, row);
   if (!IsPositive(motion.dt_s) || !motion.delta_velocity.allFinite() ||
       !motion.delta_position.allFinite() ||
       !motion.velocity_by_bias.allFinite() ||
@@ -44,21 +60,20 @@ InertialMotion MotionFromRow(const SqliteStatement& statement) {
 void WriteInertialMotions(const ImageNames& names,
                           const std::vector<InertialMotion>& motions,
                           SqliteConnection* database) {
-  if (database->HasTable("adasfm_inertial_motions")) {
-    database->Execute("DELETE FROM adasfm_inertial_motions");
-  }
+  database->Execute("DROP TABLE IF EXISTS adasfm_inertial_motions");
   if (motions.empty()) return;
   database->Execute(
-      "CREATE TABLE IF NOT EXISTS adasfm_inertial_motions ("
+      "CREATE TABLE adasfm_inertial_motions ("
       "image_id1 INTEGER NOT NULL, image_id2 INTEGER NOT NULL, "
       "name1 TEXT NOT NULL, name2 TEXT NOT NULL, dt_s REAL NOT NULL, "
       "delta_velocity BLOB NOT NULL, delta_position BLOB NOT NULL, "
       "velocity_by_bias BLOB NOT NULL, position_by_bias BLOB NOT NULL, "
-      "camera_from_imu_origin BLOB NOT NULL, "
+      "camera_from_imu_origin BLOB NOT NULL, wheel_translation BLOB, "
+      "wheel_covariance BLOB, "
       "PRIMARY KEY (image_id1, image_id2))");
   SqliteStatement statement(database,
                             "INSERT INTO adasfm_inertial_motions VALUES "
-                            "(?, ?, ?, ?, ?, ?, ?, ?, ?, ?)");
+                            "(?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)");
   for (const InertialMotion& motion : motions) {
     // Rows first.
     const Eigen::Matrix3d velocity_rows = motion.velocity_by_bias.transpose();
@@ -71,6 +86,10 @@ void WriteInertialMotions(const ImageNames& names,
     BindDoubles(&statement, 8, velocity_rows.data(), 9);
     BindDoubles(&statement, 9, position_rows.data(), 9);
     BindDoubles(&statement, 10, motion.camera_from_imu_origin.data(), 3);
+    if (motion.by_wheels) {
+      BindDoubles(&statement, 11, motion.by_wheels->translation.data(), 3);
+      BindDoubles(&statement, 12, motion.by_wheels->covariance.data(), 9);
+    }
     statement.Step();
   }
 }
@@ -104,11 +123,18 @@ std::vector<InertialMotion> ReadInertialMotions(const ImageNames& names,
                                                 int* num_ignored_rows) {
   std::vector<InertialMotion> motions;
   if (!database->HasTable("adasfm_inertial_motions")) return motions;
+  // Older tables are of drives without wheels.
+  constexpr size_t kNumColumnsWithoutWheels = 10;
+  const bool has_wheels = database->Columns("adasfm_inertial_motions").size() >
+                          kNumColumnsWithoutWheels;
   SqliteStatement statement(
       database,
-      "SELECT name1, name2, dt_s, delta_velocity, delta_position, "
-      "velocity_by_bias, position_by_bias, camera_from_imu_origin "
-      "FROM adasfm_inertial_motions ORDER BY rowid");
+      std::string(
+          "SELECT name1, name2, dt_s, delta_velocity, delta_position, "
+          "velocity_by_bias, position_by_bias, camera_from_imu_origin") +
+          (has_wheels ? ", wheel_translation, wheel_covariance "
+                      : ", NULL, NULL ") +
+          "FROM adasfm_inertial_motions ORDER BY rowid");
   while (statement.Step()) {
     const auto pair = names.Ids(statement);
     if (!pair) {

@@ -25,10 +25,11 @@ constexpr double kMinCoarseLength = 1e-6;
 
 }  // namespace
 
-std::vector<PosePriorEdge> FindPriorEdges(const MapperScene& scene,
-                                          const std::set<image_t>& images) {
+std::vector<PosePriorEdge> FindPriorEdges(
+    const std::vector<RelativePosePrior>& priors,
+    const std::set<image_t>& images) {
   std::vector<PosePriorEdge> edges;
-  for (const RelativePosePrior& prior : scene.priors) {
+  for (const RelativePosePrior& prior : priors) {
     if (images.count(prior.image_id1) && images.count(prior.image_id2)) {
       edges.push_back(PosePriorEdgeFromPrior(prior));
     }
@@ -129,7 +130,7 @@ void PartAdjuster::AdjustImages(const std::set<image_t>& images,
   std::set<image_t> all = images;
   all.insert(constant_images.begin(), constant_images.end());
   if (options_.use_priors_in_adjustment) {
-    problem.priors = FindPriorEdges(scene_, all);
+    problem.priors = FindPriorEdges(scene_.priors, all);
   }
   if (options_.use_coarse_motions_in_parts) {
     const std::vector<PosePriorEdge> coarse = FindCoarseEdges(scene_, all);

@@ -13,8 +13,9 @@
 namespace adasfm {
 
 // The priors among the images, as terms of an adjustment.
-std::vector<PosePriorEdge> FindPriorEdges(const MapperScene& scene,
-                                          const std::set<image_t>& images);
+std::vector<PosePriorEdge> FindPriorEdges(
+    const std::vector<RelativePosePrior>& priors,
+    const std::set<image_t>& images);
 
 // The motion from the first to the second image in the coarse model, as loose
 // terms of rotation and, unless it is too short, direction. None where the

@@ -11,6 +11,7 @@
 
 #include "colmap_ext/bundle_adjustment/bundle_adjustment.h"
 #include "colmap_ext/bundle_adjustment/estimate_keypoint_sigma.h"
+#include "colmap_ext/bundle_adjustment/inertial_factors.h"
 #include "colmap_ext/host/pose_conversion.h"
 #include "colmap_ext/mapper/part_adjuster.h"
 #include "colmap_ext/mapper/prior_support.h"
@@ -18,6 +19,7 @@
 #include "colmap_ext/scene/georeference.h"
 #include "colmap_ext/scene/untied_parts.h"
 #include "core/disjoint_sets.h"
+#include "core/prior_lengths.h"
 #include "core/release_memory.h"
 
 namespace adasfm {
@@ -148,7 +150,18 @@ class ModelRefiner {
 
   std::vector<PosePriorEdge> FindPriors() const {
     if (!local_.use_priors_in_adjustment) return {};
-    return FindPriorEdges(scene_, RegisteredImages(reconstruction_));
+    const std::set<image_t> images = RegisteredImages(reconstruction_);
+    return FindPriorEdges(LeaveAccelerometerToFactors(FindInertialMotions(),
+                                                      images, scene_.priors),
+                          images);
+  }
+
+  // In a model without metres the accelerometer says nothing.
+  std::vector<InertialMotion> FindInertialMotions() const {
+    if (!local_.use_priors_in_adjustment || !HasLengths(scene_.priors)) {
+      return {};
+    }
+    return scene_.data->inertial_motions;
   }
 
   // Until parts and gaps are in place, priors are off for other reasons than
@@ -182,9 +195,7 @@ class ModelRefiner {
       options.position_loss_scale = options_.initial_position_loss_scale;
     }
     AddPositions(&problem);
-    if (local_.use_priors_in_adjustment) {
-      problem.inertial_motions = scene_.data->inertial_motions;
-    }
+    problem.inertial_motions = FindInertialMotions();
     problem.constant_cameras = options_.constant_cameras;
     options.refine_focal_length = options_.refine_focal_length;
     options.refine_principal_point = options_.refine_principal_point;

@@ -62,6 +62,9 @@ void AddScene(const SceneData& data, Hash* hash) {
       hash->Add(motion.delta_position(i));
       hash->Add(motion.camera_from_imu_origin(i));
     }
+    if (!motion.by_wheels) continue;
+    for (int i = 0; i < 3; ++i) hash->Add(motion.by_wheels->translation(i));
+    for (int i = 0; i < 9; ++i) hash->Add(motion.by_wheels->covariance(i));
   }
   for (const PositionPrior& prior : data.positions) {
     hash->Add(prior.image_id1);

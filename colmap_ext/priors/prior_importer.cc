@@ -200,7 +200,9 @@ Status CheckEstimate(const PriorEstimate& estimate,
     if (motion.dt_s > 0.0 && motion.delta_velocity.allFinite() &&
         motion.delta_position.allFinite() &&
         motion.velocity_by_bias.allFinite() &&
-        motion.position_by_bias.allFinite()) {
+        motion.position_by_bias.allFinite() &&
+        (!motion.by_wheels || (motion.by_wheels->translation.allFinite() &&
+                               motion.by_wheels->covariance.allFinite()))) {
       continue;
     }
     return Status::Error("what the IMU integrates between the images " +

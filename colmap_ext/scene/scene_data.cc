@@ -12,6 +12,7 @@
 #include "colmap_ext/host/camera_models.h"
 #include "colmap_ext/host/database.h"
 #include "colmap_ext/scene/raw_matches.h"
+#include "core/prior_lengths.h"
 #include "core/sqlite.h"
 
 namespace adasfm {
@@ -62,8 +63,9 @@ void ReadScenePriors(SqliteConnection* database,
         ApplyPriorCorrections(database, &scene->priors);
     camera_mount = ReadCameraMount(database).value_or(camera_mount);
   }
+  // In a model without metres the accelerometer says nothing.
   if (options.use_original_two_view_geometries ||
-      scene->inertial_scale_sigma > 0.0) {
+      scene->inertial_scale_sigma > 0.0 || HasMeasuredLengths(scene->priors)) {
     scene->inertial_motions = std::move(loaded.tables.inertial_motions);
     for (InertialMotion& motion : scene->inertial_motions) {
       TurnInertialMotion(camera_mount, &motion);

@@ -19,6 +19,9 @@ TEST(TurnInertialMotion, SaysTheSameOfTheWorld) {
     motion.delta_velocity = random.GaussianVector(1.0);
     motion.delta_position = random.GaussianVector(1.0);
     motion.camera_from_imu_origin = random.GaussianVector(1.0);
+    motion.by_wheels = MeasuredTranslation{
+        random.GaussianVector(1.0),
+        random.GaussianVector(1.0).cwiseAbs2().asDiagonal()};
     for (int col = 0; col < 3; ++col) {
       motion.velocity_by_bias.col(col) = random.GaussianVector(1.0);
       motion.position_by_bias.col(col) = random.GaussianVector(1.0);
@@ -38,6 +41,11 @@ TEST(TurnInertialMotion, SaysTheSameOfTheWorld) {
         motion.delta_position + motion.position_by_bias * bias,
         turned.delta_position + turned.position_by_bias * (turn * bias));
     expect_same(motion.camera_from_imu_origin, turned.camera_from_imu_origin);
+    expect_same(motion.by_wheels->translation, turned.by_wheels->translation);
+    const Eigen::Vector3d axis = random.UnitVector();
+    EXPECT_NEAR(axis.dot(motion.by_wheels->covariance * axis),
+                (turn * axis).dot(turned.by_wheels->covariance * (turn * axis)),
+                1e-12);
   }
 }
 

@@ -63,6 +63,12 @@ class PriorTablesTest : public testing::Test {
       motion.velocity_by_bias = root.topRightCorner<3, 3>();
       motion.position_by_bias = root.bottomLeftCorner<3, 3>();
       motion.camera_from_imu_origin = random.GaussianVector(0.2);
+      if (tables.inertial_motions.size() % 2 == 0) {
+        motion.by_wheels =
+            MeasuredTranslation{random.GaussianVector(1.0),
+                                root.topLeftCorner<3, 3>() *
+                                    root.topLeftCorner<3, 3>().transpose()};
+      }
       tables.inertial_motions.push_back(motion);
     }
     tables.position_origin = GeodeticPosition{
@@ -80,6 +86,9 @@ class PriorTablesTest : public testing::Test {
         std::numeric_limits<double>::infinity());
     return tables;
   }
+
+  // What the last tables of MakeTables give, before adasfm_global and behind.
+  void ExpectScene(bool has_lengths);
 
   void Execute(const std::string& sql) {
     SqliteConnection(path_, SqliteConnection::Mode::kWrite).Execute(sql);
@@ -136,6 +145,10 @@ void ExpectEqual(const PriorTables& a, const PriorTables& b) {
     EXPECT_EQ(motion1.velocity_by_bias, motion2.velocity_by_bias);
     EXPECT_EQ(motion1.position_by_bias, motion2.position_by_bias);
     EXPECT_EQ(motion1.camera_from_imu_origin, motion2.camera_from_imu_origin);
+    ASSERT_EQ(motion1.by_wheels.has_value(), motion2.by_wheels.has_value());
+    if (!motion1.by_wheels) continue;
+    EXPECT_EQ(motion1.by_wheels->translation, motion2.by_wheels->translation);
+    EXPECT_EQ(motion1.by_wheels->covariance, motion2.by_wheels->covariance);
   }
   EXPECT_EQ(a.gyroscope_bias_covariance, b.gyroscope_bias_covariance);
   EXPECT_EQ(a.length_drift_ratio, b.length_drift_ratio);
@@ -163,6 +176,16 @@ TEST_F(PriorTablesTest, ReadsWhatWasWrittenLast) {
     EXPECT_EQ(loaded->num_ignored_rows, 0);
     ExpectEqual(loaded->tables, tables);
   }
+  // Behind adasfm_global motions count where a length was measured.
+  for (const bool has_lengths : {true, false}) {
+    if (!has_lengths) {
+      Execute("UPDATE adasfm_relative_pose_priors SET flags = 1");
+    }
+    ExpectScene(has_lengths);
+  }
+}
+
+void PriorTablesTest::ExpectScene(bool has_lengths) {
   for (const bool is_before_global : {false, true}) {
     SceneDataOptions options;
     options.use_original_two_view_geometries = is_before_global;
@@ -173,7 +196,8 @@ TEST_F(PriorTablesTest, ReadsWhatWasWrittenLast) {
     EXPECT_TRUE(scene->images.at(2).gravity_in_cam.has_value());
     EXPECT_TRUE(scene->gyroscope_bias_covariance.has_value());
     EXPECT_GT(scene->length_drift_ratio, 0.0);
-    EXPECT_EQ(scene->inertial_motions.size(), is_before_global ? 5 : 0);
+    EXPECT_EQ(scene->inertial_motions.size(),
+              is_before_global || has_lengths ? 5 : 0);
     EXPECT_EQ(scene->inertial_scale_sigma, 0.0);
   }
 }
@@ -210,6 +234,22 @@ TEST_F(PriorTablesTest, DatabasesWithoutInertialMotionsAreRead) {
   loaded = ReadPriorTables(path_);
   ASSERT_TRUE(loaded.ok());
   ExpectEqual(loaded->tables, tables);
+}
+
+// As written when only drives without wheels had them.
+TEST_F(PriorTablesTest, InertialMotionsWithoutWheelsAreRead) {
+  PriorTables tables = MakeTables(1);
+  ASSERT_TRUE(WritePriorTables(path_, tables).ok());
+  Execute(
+      "ALTER TABLE adasfm_inertial_motions DROP COLUMN wheel_translation;"
+      "ALTER TABLE adasfm_inertial_motions DROP COLUMN wheel_covariance;");
+  for (InertialMotion& motion : tables.inertial_motions) {
+    motion.by_wheels.reset();
+  }
+  const StatusOr<LoadedPriorTables> loaded = ReadPriorTables(path_);
+  ASSERT_TRUE(loaded.ok()) << loaded.status().message();
+  ExpectEqual(loaded->tables, tables);
+  ASSERT_TRUE(WritePriorTables(path_, MakeTables(2)).ok());
 }
 
 // Two robots that drive at the same time: what consecutive motions share is
