@@ -60,7 +60,7 @@ struct SceneData {
   std::optional<Eigen::Matrix3d> gyroscope_bias_covariance;
   double length_drift_ratio = 0.0;
   // As in PriorTables, of the camera as it is mounted; after adasfm_global only
-  // where wheels or it by them found metres.
+  // where wheels measured lengths or it found metres by them.
   std::vector<InertialMotion> inertial_motions;
   // The largest scale_sigma of the InertialLengths that the priors got from
   // adasfm_global; 0 without.
