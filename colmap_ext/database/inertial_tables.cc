@@ -30,6 +30,13 @@ std::optional<MeasuredTranslation> WheelTranslationFromRow(
   return by_wheels;
 }
 
+// Older tables are of drives without wheels.
+bool HasWheelColumns(SqliteConnection* database) {
+  constexpr size_t kNumColumnsWithoutWheels = 10;
+  return database->Columns("adasfm_inertial_motions").size() >
+         kNumColumnsWithoutWheels;
+}
+
 bool IsPositive(double value) { return std::isfinite(value) && value > 0.0; }
 
 InertialMotion MotionFromRow(const SqliteStatement& statement) {
@@ -60,10 +67,14 @@ InertialMotion MotionFromRow(const SqliteStatement& statement) {
 void WriteInertialMotions(const ImageNames& names,
                           const std::vector<InertialMotion>& motions,
                           SqliteConnection* database) {
-  database->Execute("DROP TABLE IF EXISTS adasfm_inertial_motions");
+  if (HasWheelColumns(database)) {
+    database->Execute("DELETE FROM adasfm_inertial_motions");
+  } else {
+    database->Execute("DROP TABLE IF EXISTS adasfm_inertial_motions");
+  }
   if (motions.empty()) return;
   database->Execute(
-      "CREATE TABLE adasfm_inertial_motions ("
+      "CREATE TABLE IF NOT EXISTS adasfm_inertial_motions ("
       "image_id1 INTEGER NOT NULL, image_id2 INTEGER NOT NULL, "
       "name1 TEXT NOT NULL, name2 TEXT NOT NULL, dt_s REAL NOT NULL, "
       "delta_velocity BLOB NOT NULL, delta_position BLOB NOT NULL, "
@@ -123,17 +134,13 @@ std::vector<InertialMotion> ReadInertialMotions(const ImageNames& names,
                                                 int* num_ignored_rows) {
   std::vector<InertialMotion> motions;
   if (!database->HasTable("adasfm_inertial_motions")) return motions;
-  // Older tables are of drives without wheels.
-  constexpr size_t kNumColumnsWithoutWheels = 10;
-  const bool has_wheels = database->Columns("adasfm_inertial_motions").size() >
-                          kNumColumnsWithoutWheels;
   SqliteStatement statement(
       database,
       std::string(
           "SELECT name1, name2, dt_s, delta_velocity, delta_position, "
           "velocity_by_bias, position_by_bias, camera_from_imu_origin") +
-          (has_wheels ? ", wheel_translation, wheel_covariance "
-                      : ", NULL, NULL ") +
+          (HasWheelColumns(database) ? ", wheel_translation, wheel_covariance "
+                                     : ", NULL, NULL ") +
           "FROM adasfm_inertial_motions ORDER BY rowid");
   while (statement.Step()) {
     const auto pair = names.Ids(statement);
