@@ -59,24 +59,39 @@ struct Factor {
   }
 };
 
+// Of motions that follow each other, the first, where has_image holds for all
+// three images.
+template <typename HasImage>
+std::vector<size_t> FindMotionPairs(const std::vector<InertialMotion>& motions,
+                                    const HasImage& has_image) {
+  std::vector<size_t> firsts;
+  for (size_t k = 0; k + 1 < motions.size(); ++k) {
+    if (motions[k].image_id2 == motions[k + 1].image_id1 &&
+        has_image(motions[k].image_id1) && has_image(motions[k].image_id2) &&
+        has_image(motions[k + 1].image_id2)) {
+      firsts.push_back(k);
+    }
+  }
+  return firsts;
+}
+
 std::vector<Factor> FindFactors(const std::vector<InertialMotion>& motions,
                                 const BundleProblem& bundle) {
   std::vector<Factor> factors;
-  for (size_t k = 0; k + 1 < motions.size(); ++k) {
-    if (motions[k].image_id2 != motions[k + 1].image_id1) continue;
+  for (const size_t k : FindMotionPairs(motions, [&bundle](image_t image_id) {
+         return bundle.UsedPose(image_id) != nullptr;
+       })) {
     Factor factor;
     factor.motion1 = &motions[k];
     factor.motion2 = &motions[k + 1];
     factor.images = {motions[k].image_id1, motions[k].image_id2,
                      motions[k + 1].image_id2};
-    bool is_free = false, is_whole = true;
+    bool is_free = false;
     for (size_t i = 0; i < factor.images.size(); ++i) {
       factor.poses[i] = bundle.UsedPose(factor.images[i]);
-      is_whole = is_whole && factor.poses[i] != nullptr;
-      is_free = is_free || (factor.poses[i] != nullptr &&
-                            !bundle.IsConstant(factor.images[i]));
+      is_free = is_free || !bundle.IsConstant(factor.images[i]);
     }
-    if (is_whole && is_free) factors.push_back(std::move(factor));
+    if (is_free) factors.push_back(std::move(factor));
   }
   return factors;
 }
@@ -233,23 +248,16 @@ void BundleProblem::AddVelocityTerm(std::unique_ptr<ceres::CostFunction> cost,
 std::vector<RelativePosePrior> LeaveAccelerometerToFactors(
     const std::vector<InertialMotion>& motions, const std::set<image_t>& images,
     std::vector<RelativePosePrior> priors) {
+  const std::vector<size_t> pairs = FindMotionPairs(
+      motions,
+      [&images](image_t image_id) { return images.count(image_id) > 0; });
+  if (pairs.size() < kMinNumFactors) return priors;
   std::map<std::pair<image_t, image_t>, const InertialMotion*> in_factor;
-  size_t num_factors = 0;
-  for (size_t k = 0; k + 1 < motions.size(); ++k) {
-    const InertialMotion& motion1 = motions[k];
-    const InertialMotion& motion2 = motions[k + 1];
-    if (motion1.image_id2 != motion2.image_id1 ||
-        images.count(motion1.image_id1) == 0 ||
-        images.count(motion1.image_id2) == 0 ||
-        images.count(motion2.image_id2) == 0) {
-      continue;
-    }
-    ++num_factors;
-    for (const InertialMotion* motion : {&motion1, &motion2}) {
+  for (const size_t k : pairs) {
+    for (const InertialMotion* motion : {&motions[k], &motions[k + 1]}) {
       in_factor[{motion->image_id1, motion->image_id2}] = motion;
     }
   }
-  if (num_factors < kMinNumFactors) return priors;
   for (RelativePosePrior& prior : priors) {
     const auto found = in_factor.find({prior.image_id1, prior.image_id2});
     if (found == in_factor.end() || !prior.HasLength() ||

@@ -30,7 +30,7 @@ constexpr int kNumIterationsBeforeSigmas = 1;
 // Sigmas of priors are lowered to this share at most, as the importer grants
 // noise figures that factor, and not raised. That of velocities begins as a
 // guess, with vision's noise.
-constexpr PriorSigmaFactors kMinSigmaFactors = {0.2, 0.1, 0.1, 0.1, 0.02};
+constexpr PriorSigmaFactors kMinSigmaFactors = {0.2, 0.2, 0.2, 0.2, 0.02};
 constexpr PriorSigmaFactors kMaxSigmaFactors = {1.0, 1.0, 1.0, 1.0, 10.0};
 // The search for them, each step a linear one, ends when none changes by more.
 constexpr double kMaxSigmaChange = 1.03;

@@ -3,6 +3,7 @@
 
 #include "core/so3.h"
 #include "sensors/smoother/chain_state.h"
+#include "sensors/smoother/wheel_equation.h"
 
 namespace adasfm {
 namespace {
@@ -19,16 +20,6 @@ ChainGlobals GlobalsOf(const OdometryFusionResult& fused) {
   return globals;
 }
 
-// By how much the wheels' origin goes faster at the link's end.
-double SpeedChange(const OdometryFusionProblem& problem,
-                   const OdometryFusionResult& fused, size_t k) {
-  const Rigid3d& imu_from_wheel = problem.imu_from_wheel;
-  const Eigen::Vector3d change =
-      fused.states[k + 1].velocity_in_imu - fused.states[k].velocity_in_imu +
-      problem.links[k].rate_change.cross(imu_from_wheel.translation);
-  return (imu_from_wheel.rotation * Eigen::Vector3d::UnitX()).dot(change);
-}
-
 Step StepByWheels(const OdometryFusionProblem& problem,
                   const OdometryFusionResult& fused,
                   const ChainGlobals& globals, size_t k) {
@@ -40,15 +31,15 @@ Step StepByWheels(const OdometryFusionProblem& problem,
   const Eigen::Vector3d excess =
       LogSo3(wheel.profile_rotation.conjugate() * first_from_second);
   const Eigen::Matrix3d first_from_wheel =
-      (Eigen::Quaterniond::Identity().slerp(0.5, wheel.profile_rotation) *
-       problem.imu_from_wheel.rotation)
-          .toRotationMatrix();
+      StartFromMiddleWheel(wheel, problem.imu_from_wheel.rotation);
   Eigen::Vector3d logged =
-      (wheel.displacement_map + wheel.rotation_moment * Hat(excess)) *
+      DisplacementMap(wheel, excess) *
       globals.Forward(problem.imu_from_wheel.rotation, nullptr);
   if (link.has_imu) {
     logged += globals.values[ChainGlobals::kWheelDelay] *
-              SpeedChange(problem, fused, k) * first_from_wheel.col(0);
+              WheelSpeedChange(link, problem.imu_from_wheel, fused.states[k],
+                               fused.states[k + 1]) *
+              first_from_wheel.col(0);
   }
   Step step;
   step.translation =

@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "sensors/smoother/link_builder.h"
+#include "sensors/smoother/wheel_equation.h"
 
 namespace adasfm {
 
@@ -15,8 +16,7 @@ void LinkBuilder::AddWheel(double weight) {
   const double logged_per_true = globals_.values[ChainGlobals::kLoggedLength];
   const Eigen::Vector3d phi =
       LogSo3(wheel.profile_rotation.conjugate() * a_rotation_);
-  const Eigen::Matrix3d map =
-      wheel.displacement_map + wheel.rotation_moment * Hat(phi);
+  const Eigen::Matrix3d map = DisplacementMap(wheel, phi);
   // What the wheel frame's origin moves by.
   const Eigen::Vector3d moved = second_.step_in_previous + a_ * lever - lever;
   const int row = num_rows_;
@@ -31,9 +31,7 @@ void LinkBuilder::AddWheel(double weight) {
       -map * forward_by_mount;
   // In the wheel frame in the middle of the turn, the first row is the speed.
   const Eigen::Matrix3d wheel_from_start =
-      (Eigen::Quaterniond::Identity().slerp(0.5, wheel.profile_rotation) *
-       context_.problem->imu_from_wheel.rotation)
-          .toRotationMatrix()
+      StartFromMiddleWheel(wheel, context_.problem->imu_from_wheel.rotation)
           .transpose();
   values_.segment<3>(row) = (wheel_from_start * values_.segment<3>(row)).eval();
   jacobian_.middleRows<3>(row) =
@@ -67,8 +65,7 @@ void LinkBuilder::AddWheelDelay(int forward_row) {
   const Eigen::Vector3d forward =
       imu_from_wheel.rotation * Eigen::Vector3d::UnitX();
   const double speed_change =
-      forward.dot(second_.state.velocity_in_imu - first_.state.velocity_in_imu +
-                  link_.rate_change.cross(imu_from_wheel.translation));
+      WheelSpeedChange(link_, imu_from_wheel, first_.state, second_.state);
   const double delay_s = globals_.values[ChainGlobals::kWheelDelay];
   values_[forward_row] -= delay_s * speed_change;
   jacobian_.block<1, 3>(forward_row, kSecond + ChainState::kVelocity) -=

@@ -11,13 +11,6 @@
 namespace adasfm {
 namespace {
 
-PriorEstimate Estimate(const Dataset& data) {
-  const StatusOr<PriorEstimate> estimate =
-      EstimatePriors(data.images, data.logs, data.calibration, {}, {});
-  if (!estimate.ok()) throw std::runtime_error(estimate.status().message());
-  return *estimate;
-}
-
 void Print(const std::string& name, const PriorEstimate& estimate,
            const Dataset& data) {
   const PairErrors pair = ComputePairErrors(estimate, data.cams_from_world);
@@ -63,7 +56,7 @@ class RealData : public testing::TestWithParam<std::string> {};
 TEST_P(RealData, KittiRotationsAreWithinFiveHundredthsOfADegree) {
   Dataset data;
   if (!ReadDataset(GetParam(), &data)) GTEST_SKIP() << "no shared data";
-  const PriorEstimate estimate = Estimate(data);
+  const PriorEstimate estimate = EstimateOrThrow(data);
   Print(GetParam(), estimate, data);
   const PairErrors errors = ComputePairErrors(estimate, data.cams_from_world);
   EXPECT_LE(errors.rotation_rms_deg, 0.05);
@@ -112,7 +105,7 @@ INSTANTIATE_TEST_SUITE_P(Kitti, RealData,
 TEST(RealRoad, PhoneAndWheelsKeepTheirHeadingAndLength) {
   Dataset data;
   if (!ReadDataset("comma2k19-ex1", &data)) GTEST_SKIP() << "no shared data";
-  const PriorEstimate estimate = Estimate(data);
+  const PriorEstimate estimate = EstimateOrThrow(data);
   Print("comma2k19-ex1", estimate, data);
   const SegmentErrors errors = ComputeSegmentErrors(estimate, data, 100.0);
   EXPECT_LE(errors.rotation_deg_per_m, 0.01);
@@ -124,7 +117,7 @@ TEST(RealRoad, PhoneAndWheelsKeepTheirHeadingAndLength) {
 TEST(SimulatedRoad, SlipsAreFoundAndPriorsStayMetric) {
   Dataset data;
   if (!ReadDataset("world-alias-300", &data)) GTEST_SKIP() << "no shared data";
-  const PriorEstimate estimate = Estimate(data);
+  const PriorEstimate estimate = EstimateOrThrow(data);
   Print("world-alias-300", estimate, data);
   EXPECT_EQ(estimate.summary.wheel_slips.size(), 2u);
   const SegmentErrors errors = ComputeSegmentErrors(estimate, data, 100.0);

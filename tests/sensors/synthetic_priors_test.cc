@@ -11,13 +11,6 @@
 namespace adasfm {
 namespace {
 
-PriorEstimate Estimate(const Dataset& data) {
-  const StatusOr<PriorEstimate> estimate =
-      EstimatePriors(data.images, data.logs, data.calibration, {}, {});
-  if (!estimate.ok()) throw std::runtime_error(estimate.status().message());
-  return *estimate;
-}
-
 TEST(SyntheticPriors, ErrorsMatchTheirCovarianceOverTwentySeeds) {
   double chi2 = 0.0;
   constexpr int kNumSeeds = 20;
@@ -26,7 +19,7 @@ TEST(SyntheticPriors, ErrorsMatchTheirCovarianceOverTwentySeeds) {
     options.wheel_scale = seed % 2 == 0 ? 1.01 : 0.995;
     const SyntheticWorld world = BuildSyntheticWorld(options);
     const Dataset data = ToDataset(world);
-    const PriorEstimate estimate = Estimate(data);
+    const PriorEstimate estimate = EstimateOrThrow(data);
     EXPECT_EQ(estimate.summary.num_priors, options.num_images - 1);
     chi2 += ComputePairErrors(estimate, data.cams_from_world).chi2 / kNumSeeds;
     EXPECT_NEAR(estimate.summary.wheel_scale, options.wheel_scale,
@@ -44,7 +37,7 @@ TEST(SyntheticPriors, LongerDrivesTellTheWheelScale) {
     SyntheticWorldOptions options = SmallWorld(seed, 250);
     options.wheel_scale = 1.02;
     const Dataset data = ToDataset(BuildSyntheticWorld(options));
-    const double error = Estimate(data).summary.wheel_scale - 1.02;
+    const double error = EstimateOrThrow(data).summary.wheel_scale - 1.02;
     squares += error * error / 5.0;
   }
   EXPECT_LT(std::sqrt(squares), 0.003);
@@ -161,7 +154,7 @@ TEST(SyntheticPriors, VisionCanBeSwitchedOff) {
   options.use_visual_rotations = false;
   EXPECT_EQ(estimate().summary.num_visual_links, 0);
   EXPECT_EQ(estimate().priors[40].covariance,
-            Estimate(data).priors[40].covariance);
+            EstimateOrThrow(data).priors[40].covariance);
 }
 
 TEST(SyntheticPriors, SlipsAreFoundAndTheLengthStays) {
@@ -170,7 +163,7 @@ TEST(SyntheticPriors, SlipsAreFoundAndTheLengthStays) {
     options.num_wheel_slips = 2;
     const SyntheticWorld world = BuildSyntheticWorld(options);
     const Dataset data = ToDataset(world);
-    const PriorEstimate estimate = Estimate(data);
+    const PriorEstimate estimate = EstimateOrThrow(data);
     for (const auto& [start, end] : world.wheel_slips) {
       double overlap = 0.0;
       for (const WheelSlip& slip : estimate.summary.wheel_slips) {
@@ -195,7 +188,7 @@ TEST(SyntheticPriors, ASlipUntilTheEndIsFound) {
       sample.first *= 1.5;
       sample.second *= 1.5;
     }
-    const PriorEstimate estimate = Estimate(data);
+    const PriorEstimate estimate = EstimateOrThrow(data);
     ASSERT_FALSE(estimate.summary.wheel_slips.empty()) << "seed " << seed;
     EXPECT_LT(std::abs(SecondsFromNs(
                   estimate.summary.wheel_slips.front().start_ns - begin_ns)),
@@ -209,7 +202,7 @@ TEST(SyntheticPriors, ASlipUntilTheEndIsFound) {
 TEST(SyntheticPriors, GravityPointsDown) {
   const SyntheticWorld world = BuildSyntheticWorld(SmallWorld(6));
   const Dataset data = ToDataset(world);
-  const PriorEstimate estimate = Estimate(data);
+  const PriorEstimate estimate = EstimateOrThrow(data);
   for (const auto& [image_id, gravity] : estimate.gravity_in_cam) {
     const Eigen::Vector3d truth =
         data.cams_from_world.at(image_id).rotation * -Eigen::Vector3d::UnitZ();
@@ -223,7 +216,7 @@ TEST(SyntheticPriors, ImuAloneClaimsRotationOnly) {
   Dataset data = ToDataset(BuildSyntheticWorld(SmallWorld(7)));
   data.calibration.has_wheel = false;
   data.logs.wheel.clear();
-  const PriorEstimate estimate = Estimate(data);
+  const PriorEstimate estimate = EstimateOrThrow(data);
   ASSERT_EQ(estimate.priors.size(), data.images.size() - 1);
   for (const RelativePosePrior& prior : estimate.priors) {
     EXPECT_EQ(prior.flags, static_cast<uint32_t>(kPriorRotation));
@@ -246,7 +239,7 @@ TEST(SyntheticPriors, StoreWhatTheImuIntegrates) {
       data.calibration.has_wheel = false;
       data.logs.wheel.clear();
     }
-    const PriorEstimate estimate = Estimate(data);
+    const PriorEstimate estimate = EstimateOrThrow(data);
     const std::vector<InertialMotion>& motions = estimate.inertial_motions;
     ASSERT_EQ(motions.size(), estimate.priors.size());
     const auto imu_position = [&](image_t image_id, const InertialMotion& m) {
@@ -289,7 +282,7 @@ TEST(SyntheticPriors, SpeedAloneClaimsLengthOnly) {
   for (WheelSample& sample : data.logs.wheel) {
     sample.first = 0.5 * (sample.first + sample.second);
   }
-  const PriorEstimate estimate = Estimate(data);
+  const PriorEstimate estimate = EstimateOrThrow(data);
   ASSERT_EQ(estimate.priors.size(), data.images.size() - 1);
   double length = 0.0, true_length = 0.0;
   for (const RelativePosePrior& prior : estimate.priors) {
@@ -309,7 +302,7 @@ TEST(SyntheticPriors, WheelsAloneGivePlanarMotion) {
   Dataset data = ToDataset(BuildSyntheticWorld(SmallWorld(9)));
   data.calibration.has_imu = false;
   data.logs.imu.clear();
-  const PriorEstimate estimate = Estimate(data);
+  const PriorEstimate estimate = EstimateOrThrow(data);
   for (const RelativePosePrior& prior : estimate.priors) {
     EXPECT_TRUE(prior.HasRotation() && prior.HasDirection() &&
                 prior.HasLength());
@@ -330,7 +323,7 @@ TEST(SyntheticPriors, TrajectoryAloneGivesEverything) {
                                     world.cam_from_imu * world.imu_from_wheel;
     data.logs.odometry.push_back({image.timestamp_ns, world_from_body});
   }
-  const PriorEstimate estimate = Estimate(data);
+  const PriorEstimate estimate = EstimateOrThrow(data);
   const PairErrors errors = ComputePairErrors(estimate, data.cams_from_world);
   EXPECT_EQ(estimate.summary.num_priors, 79);
   EXPECT_LT(errors.rotation_rms_deg, 0.05);
@@ -342,7 +335,7 @@ TEST(SyntheticPriors, ImagesOutsideTheLogsAreCounted) {
   data.images.push_back(
       {1000, "late.png",
        data.images.back().timestamp_ns + timestamp_t{100'000'000'000}});
-  const PriorEstimate estimate = Estimate(data);
+  const PriorEstimate estimate = EstimateOrThrow(data);
   EXPECT_EQ(estimate.summary.num_images, 81);
   EXPECT_EQ(estimate.summary.num_images_in_logs, 80);
   EXPECT_EQ(estimate.summary.num_priors, 79);
@@ -373,7 +366,7 @@ TEST(SyntheticPriors, AGapInTheImuCostsItsPairsOnly) {
     }
   }
   data.logs.imu = kept;
-  const PriorEstimate estimate = Estimate(data);
+  const PriorEstimate estimate = EstimateOrThrow(data);
   EXPECT_EQ(estimate.summary.num_priors, 76);
   EXPECT_EQ(estimate.inertial_motions.size(), 76);
   EXPECT_LT(ComputePairErrors(estimate, data.cams_from_world).rotation_rms_deg,
@@ -382,7 +375,7 @@ TEST(SyntheticPriors, AGapInTheImuCostsItsPairsOnly) {
 
 TEST(SyntheticPriors, SameInputSameResult) {
   const Dataset data = ToDataset(BuildSyntheticWorld(SmallWorld(14)));
-  const PriorEstimate a = Estimate(data), b = Estimate(data);
+  const PriorEstimate a = EstimateOrThrow(data), b = EstimateOrThrow(data);
   for (size_t i = 0; i < a.priors.size(); ++i) {
     EXPECT_EQ(a.priors[i].covariance, b.priors[i].covariance);
     EXPECT_EQ(a.priors[i].cam2_from_cam1.translation,

@@ -5,20 +5,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <stdexcept>
 #include <vector>
 
 #include "tests/testing/sensors/synthetic_dataset.h"
 
 namespace adasfm {
 namespace {
-
-PriorEstimate Estimate(const Dataset& data) {
-  const StatusOr<PriorEstimate> estimate =
-      EstimatePriors(data.images, data.logs, data.calibration, {}, {});
-  if (!estimate.ok()) throw std::runtime_error(estimate.status().message());
-  return *estimate;
-}
 
 Eigen::Vector3d TrueTranslation(const Dataset& data, image_t image_id1,
                                 image_t image_id2) {
@@ -70,7 +62,8 @@ struct ErrorSums {
 };
 
 // 790 lengths tell a chi-square to 0.05 and a correlation to 0.036. What is
-// stated is 20 % too much: readings are interpolated at an interval's ends.
+// stated was measured 20 % too large, of which 5 are the interpolation of
+// readings at an interval's ends.
 // Lengths that the accelerometer smoothed err alike.
 TEST(WheelTranslations, ErrByWhatTheyStateAndIndependently) {
   constexpr int kNumSeeds = 10;
@@ -79,7 +72,7 @@ TEST(WheelTranslations, ErrByWhatTheyStateAndIndependently) {
     SyntheticWorldOptions options = SmallWorld(seed);
     options.wheel_scale = seed % 2 == 0 ? 1.01 : 0.995;
     const Dataset data = ToDataset(BuildSyntheticWorld(options));
-    const PriorEstimate estimate = Estimate(data);
+    const PriorEstimate estimate = EstimateOrThrow(data);
     ASSERT_EQ(estimate.inertial_motions.size(), estimate.priors.size());
     LengthErrors of_wheels, of_priors;
     for (size_t i = 0; i < estimate.priors.size(); ++i) {
@@ -108,7 +101,7 @@ TEST(WheelTranslations, AreUnknownWhereWheelsSlip) {
     SyntheticWorldOptions options = SmallWorld(seed);
     options.num_wheel_slips = 2;
     const PriorEstimate estimate =
-        Estimate(ToDataset(BuildSyntheticWorld(options)));
+        EstimateOrThrow(ToDataset(BuildSyntheticWorld(options)));
     ASSERT_EQ(estimate.inertial_motions.size(), estimate.priors.size());
     int num_slipping = 0;
     for (size_t i = 0; i < estimate.priors.size(); ++i) {
@@ -138,7 +131,7 @@ Dataset BuildDriveFromRest(uint64_t seed) {
 TEST(WheelTranslations, AreZeroAtRest) {
   for (const uint64_t seed : {1, 2, 3}) {
     const Dataset data = BuildDriveFromRest(seed);
-    const PriorEstimate estimate = Estimate(data);
+    const PriorEstimate estimate = EstimateOrThrow(data);
     const auto at_rest = std::find_if(
         estimate.inertial_motions.begin(), estimate.inertial_motions.end(),
         [](const InertialMotion& motion) { return motion.image_id1 == 1001; });
@@ -154,7 +147,7 @@ TEST(WheelTranslations, AreZeroAtRest) {
 TEST(WheelTranslations, NeedWheels) {
   Dataset data = BuildDriveFromRest(1);
   data.logs.wheel.clear();
-  const PriorEstimate estimate = Estimate(data);
+  const PriorEstimate estimate = EstimateOrThrow(data);
   ASSERT_FALSE(estimate.inertial_motions.empty());
   for (const InertialMotion& motion : estimate.inertial_motions) {
     EXPECT_EQ(motion.by_wheels.has_value(), false);

@@ -56,6 +56,13 @@ bool ReadDataset(const std::string& name, Dataset* dataset) {
   return true;
 }
 
+PriorEstimate EstimateOrThrow(const Dataset& dataset) {
+  const StatusOr<PriorEstimate> estimate =
+      EstimatePriors(dataset.images, dataset.logs, dataset.calibration, {}, {});
+  if (!estimate.ok()) throw std::runtime_error(estimate.status().message());
+  return *estimate;
+}
+
 SegmentErrors ComputeSegmentErrors(const PriorEstimate& estimate,
                                    const Dataset& dataset, double length_m) {
   // Chain of poses and the true distance driven.

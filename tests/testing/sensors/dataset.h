@@ -22,6 +22,9 @@ struct Dataset {
 // project). Throws when it is there but cannot be read.
 bool ReadDataset(const std::string& name, Dataset* dataset);
 
+// By logs alone, with default options. Throws what an import would report.
+PriorEstimate EstimateOrThrow(const Dataset& dataset);
+
 // Errors of the chained priors over all stretches of a length (KITTI's
 // measure), relative to it.
 struct SegmentErrors {

@@ -1,0 +1,41 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+
+#include "core/rigid3d.h"
+#include "core/so3.h"
+#include "sensors/smoother/odometry_fusion.h"
+
+namespace adasfm {
+
+// Parts of what wheels say of a link (docs/reference/sensors.md), which the
+// smoother's residual and ComposeWheelTranslation have in common.
+
+// From the direction of driving to the logged displacement, in the body's axes
+// at the start; excess: WheelMotion's phi.
+inline Eigen::Matrix3d DisplacementMap(const WheelMotion& wheel,
+                                       const Eigen::Vector3d& excess) {
+  return wheel.displacement_map + wheel.rotation_moment * Hat(excess);
+}
+
+// From the wheel frame in the middle of the turn to the body at its start.
+inline Eigen::Matrix3d StartFromMiddleWheel(
+    const WheelMotion& wheel, const Eigen::Quaterniond& imu_from_wheel) {
+  return (Eigen::Quaterniond::Identity().slerp(0.5, wheel.profile_rotation) *
+          imu_from_wheel)
+      .toRotationMatrix();
+}
+
+// By how much the wheels' origin drives forward faster at the link's end, m/s.
+inline double WheelSpeedChange(const OdometryLink& link,
+                               const Rigid3d& imu_from_wheel,
+                               const OdometryState& first,
+                               const OdometryState& second) {
+  return (imu_from_wheel.rotation * Eigen::Vector3d::UnitX())
+      .dot(second.velocity_in_imu - first.velocity_in_imu +
+           link.rate_change.cross(imu_from_wheel.translation));
+}
+
+}  // namespace adasfm
