@@ -21,6 +21,14 @@ void TurnInertialMotion(const Eigen::Quaterniond& turned_from_cam,
   by_wheels.covariance = turn * by_wheels.covariance * turn.transpose();
 }
 
+void SetTranslation(const MeasuredTranslation& measured,
+                    RelativePosePrior* prior) {
+  prior->cam2_from_cam1.translation = measured.translation;
+  prior->covariance.bottomRows<3>().setZero();
+  prior->covariance.rightCols<3>().setZero();
+  prior->covariance.bottomRightCorner<3, 3>() = measured.covariance;
+}
+
 double AddInertialLengths(const std::vector<InertialLength>& lengths,
                           std::vector<RelativePosePrior>* priors) {
   std::map<std::pair<image_t, image_t>, const InertialLength*> by_pair;
@@ -33,12 +41,15 @@ double AddInertialLengths(const std::vector<InertialLength>& lengths,
     if (found == by_pair.end() || prior.HasLength()) continue;
     const InertialLength& length = *found->second;
     prior.flags |= kPriorLength | kPriorInertialLength;
-    prior.cam2_from_cam1.translation =
-        length.length_m * Eigen::Vector3d::UnitZ();
-    prior.covariance.bottomRows<3>().setZero();
-    prior.covariance.rightCols<3>().setZero();
-    prior.covariance.diagonal().tail<3>().setConstant(length.sigma_m *
-                                                      length.sigma_m);
+    MeasuredTranslation measured;
+    if (length.bridge) {
+      prior.flags |= kPriorDirection;
+      measured = *length.bridge;
+    } else {
+      measured.translation = length.length_m * Eigen::Vector3d::UnitZ();
+      measured.covariance *= length.sigma_m * length.sigma_m;
+    }
+    SetTranslation(measured, &prior);
     scale_sigma = std::max(scale_sigma, length.scale_sigma);
   }
   return scale_sigma;

@@ -43,6 +43,10 @@ struct InertialMotion {
   std::optional<MeasuredTranslation> by_wheels;
 };
 
+// In place of the prior's; what is known of its rotation stays, and the flags.
+void SetTranslation(const MeasuredTranslation& measured,
+                    RelativePosePrior* prior);
+
 // The motion as a camera sees it that is turned against the stated one.
 void TurnInertialMotion(const Eigen::Quaterniond& turned_from_cam,
                         InertialMotion* motion);
@@ -57,10 +61,14 @@ struct InertialLength {
   double sigma_m = 0.0;
   // 1 sigma of the unit, as a ratio.
   double scale_sigma = 0.0;
+  // Where vision ties the images to nothing, the translation that accelerometer
+  // and the velocities around tell: a measurement of this motion.
+  std::optional<MeasuredTranslation> bridge;
 };
 
 // Gives the priors of the same images that have no length theirs, with the flag
-// kPriorInertialLength; the direction stays unknown. Returns the largest
+// kPriorInertialLength; without a bridge the direction stays unknown. Returns
+// the largest
 // scale_sigma of those given, 0 for none.
 double AddInertialLengths(const std::vector<InertialLength>& lengths,
                           std::vector<RelativePosePrior>* priors);

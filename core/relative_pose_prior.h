@@ -15,8 +15,8 @@ enum PriorFlags : uint32_t {
   kPriorDirection = 1u << 1,  // of the translation
   kPriorLength = 1u << 2,     // of the translation, in metres
   kPriorWheelSlip = 1u << 3,  // wheels contradicted the IMU: weights are low
-  // Its length is vision's, in metres of the accelerometer: no measurement of
-  // this motion alone.
+  // Its length is in metres of the accelerometer. Without a direction it is
+  // vision's: no measurement of this motion alone.
   kPriorInertialLength = 1u << 4,
 };
 
@@ -41,6 +41,10 @@ struct RelativePosePrior {
   bool HasLength() const { return flags & kPriorLength; }
   bool HasTranslation() const { return HasDirection() && HasLength(); }
   bool HasMotion() const { return HasRotation() && HasTranslation(); }
+  // Of this motion alone.
+  bool HasOwnLength() const {
+    return HasTranslation() || (HasLength() && !(flags & kPriorInertialLength));
+  }
 };
 
 }  // namespace adasfm

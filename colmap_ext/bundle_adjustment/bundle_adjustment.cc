@@ -210,8 +210,8 @@ PosePriorEdge PosePriorEdgeFromPrior(const RelativePosePrior& prior) {
   const double variance_along = direction.dot(covariance * direction);
   const double variance_across = (covariance.trace() - variance_along) / 2.0;
   // What the accelerometer tells of the unit is given back to the adjusted
-  // model as a whole (KeepInertialUnit).
-  if (prior.HasLength() && !(prior.flags & kPriorInertialLength)) {
+  // model as a whole (KeepInertialUnit); but across a gap it is a measurement.
+  if (prior.HasOwnLength()) {
     edge.length_sigma_m = sigma_or_infinity(variance_along);
   }
   if (prior.HasDirection()) {

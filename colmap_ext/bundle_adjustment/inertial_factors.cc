@@ -260,19 +260,13 @@ std::vector<RelativePosePrior> LeaveAccelerometerToFactors(
   }
   for (RelativePosePrior& prior : priors) {
     const auto found = in_factor.find({prior.image_id1, prior.image_id2});
-    if (found == in_factor.end() || !prior.HasLength() ||
-        (prior.flags & kPriorInertialLength)) {
-      continue;
-    }
+    if (found == in_factor.end() || !prior.HasOwnLength()) continue;
     const auto& by_wheels = found->second->by_wheels;
     if (!by_wheels) {
-      prior.flags &= ~(kPriorDirection | kPriorLength);
+      prior.flags &= ~(kPriorDirection | kPriorLength | kPriorInertialLength);
       continue;
     }
-    prior.cam2_from_cam1.translation = by_wheels->translation;
-    prior.covariance.bottomRows<3>().setZero();
-    prior.covariance.rightCols<3>().setZero();
-    prior.covariance.bottomRightCorner<3, 3>() = by_wheels->covariance;
+    SetTranslation(*by_wheels, &prior);
   }
   return priors;
 }

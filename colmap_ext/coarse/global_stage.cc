@@ -10,11 +10,14 @@
 #include "colmap_ext/coarse/measure_size.h"
 #include "colmap_ext/coarse/refine_stage_matches.h"
 #include "colmap_ext/coarse/split_models.h"
+#include "colmap_ext/host/pose_conversion.h"
 #include "colmap_ext/scene/scene_bearings.h"
 #include "core/option_checker.h"
+#include "core/prior_lengths.h"
 #include "core/release_memory.h"
 #include "core/so3.h"
 #include "core/stopwatch.h"
+#include "global/odometry/bridge_gaps.h"
 
 namespace adasfm {
 namespace {
@@ -145,15 +148,6 @@ std::string DescribeMatches(const GlobalStageResult& result) {
   return text.str();
 }
 
-void MeasureSizes(const SceneData& scene, GlobalStageResult* result) {
-  for (CoarseModel& model : result->models) {
-    const std::vector<InertialLength> lengths =
-        MeasureSize(scene, result->poses.camera_mount, &model);
-    result->inertial_lengths.insert(result->inertial_lengths.end(),
-                                    lengths.begin(), lengths.end());
-  }
-}
-
 std::string DescribeSizes(const GlobalStageResult& result) {
   std::ostringstream text;
   text.precision(2);
@@ -168,6 +162,202 @@ std::string DescribeSizes(const GlobalStageResult& result) {
   return text.str();
 }
 
+class GlobalStage {
+ public:
+  GlobalStage(const GlobalStageOptions& options, const StageProgress& progress,
+              RawMatchSource raw_matches, SceneData* scene)
+      : options_(options),
+        progress_(progress),
+        raw_matches_(std::move(raw_matches)),
+        scene_(*scene) {}
+
+  StatusOr<GlobalStageResult> Run() {
+    CalibrateLenses();
+    BuildViewGraph();
+    EstimateModels(scene_.priors);
+    if (result_.models.empty()) return NothingHoldsTogether();
+    EstimateModelsAcrossGaps();
+    Join();
+    MeasurePairAgreements(options_, scene_, correspondences_.bearings,
+                          &result_);
+    correspondences_.matches.clear();
+    ReleaseFreedMemory();
+    RefineAllMatches();
+    MeasureSizes();
+    return std::move(result_);
+  }
+
+ private:
+  void Begin(const std::string& name, double share_done) {
+    if (progress_) progress_(name, share_done);
+    watch_ = Stopwatch();
+  }
+
+  void End(const std::string& name, const std::string& summary) {
+    result_.steps.push_back({name, watch_.Seconds(), summary});
+  }
+
+  // 2.0
+  void CalibrateLenses() {
+    Begin("focal lengths", 0.0);
+    result_.focal_lengths =
+        CalibrateFocalLengths(options_.focal_lengths, &scene_);
+    End("focal lengths", std::to_string(result_.focal_lengths.size()) +
+                             " found of " +
+                             std::to_string(scene_.cameras.size()));
+  }
+
+  // 2.1
+  void BuildViewGraph() {
+    Begin("view graph", 0.0);
+    correspondences_ = FindCorrespondences(scene_, options_.num_threads);
+    initial_ = BuildInitialViewGraph(options_.two_view, scene_,
+                                     correspondences_.bearings);
+    End("view graph", DescribeViewGraph(initial_));
+  }
+
+  // 2.1-2.7
+  void EstimateModels(const std::vector<RelativePosePrior>& priors) {
+    Begin("coarse poses", 0.1);
+    CoarsePoseOptions pose_options = options_.poses;
+    pose_options.chain.gyro_bias_covariance = scene_.gyroscope_bias_covariance;
+    result_.poses =
+        EstimateCoarsePoses(pose_options, initial_.graph, correspondences_,
+                            priors, scene_.frame_priors);
+    result_.steps.insert(result_.steps.end(), result_.poses.steps.begin(),
+                         result_.poses.steps.end());
+    ReleaseFreedMemory();
+    const std::vector<CoarseComponent>& components = result_.poses.components;
+    if (components.size() > 1 ||
+        (!components.empty() && !components[0].metric)) {
+      all_matches_ = correspondences_.matches;
+    }
+    for (const CoarseComponent& component : components) BuildModel(component);
+    num_split_ = SplitModels(options_, scene_, correspondences_.bearings,
+                             all_matches_, &result_);
+  }
+
+  // 2.7
+  void BuildModel(const CoarseComponent& component) {
+    CoarseStructureOptions options = options_.structure;
+    options.bundle.shared_errors.length_drift_ratio = scene_.length_drift_ratio;
+    CoarseModelInput input = CreateModelInput(
+        MatchAnew(options_.refinement, scene_, raw_matches_,
+                  correspondences_.bearings, component, result_.poses.graph),
+        component, result_.poses, &correspondences_);
+    input.refine_lenses = options_.structure.refine_unknown_focal_length &&
+                          !result_.focal_lengths.empty();
+    Begin(DescribeTrackMemory(input), 0.5);
+    result_.models.push_back(BuildCoarseModel(
+        options, scene_, correspondences_.bearings, std::move(input)));
+    End("structure", DescribeModel(result_.models.back()));
+  }
+
+  // Once more where the accelerometer tells the way between parts of a drive
+  // without wheels: odometry then tests the loops between them, too.
+  void EstimateModelsAcrossGaps() {
+    if (scene_.inertial_motions.empty() || HasLengths(scene_.priors) ||
+        !scene_.positions.empty()) {
+      return;
+    }
+    Begin("gaps", 0.8);
+    std::vector<std::map<image_t, Rigid3d>> models;
+    for (const CoarseModel& model : result_.models) {
+      models.push_back(CamsFromWorld(model.reconstruction));
+    }
+    InertialOdometry odometry =
+        BridgeGaps(MotionsOfCamera(scene_, result_.poses.camera_mount),
+                   result_.poses.priors, models);
+    End("gaps", std::to_string(odometry.num_gaps) +
+                    " bridged by the accelerometer, over " +
+                    std::to_string(odometry.bridges.size()) + " steps");
+    if (odometry.num_gaps == 0) return;
+    if (result_.poses.camera_mount.corrected) {
+      const Eigen::Quaterniond back =
+          ExpSo3(-result_.poses.camera_mount.turn_rad);
+      for (RelativePosePrior& prior : odometry.priors) TurnPrior(back, &prior);
+    }
+    GlobalStageResult in_parts = std::move(result_);
+    const int num_split = num_split_;
+    result_ = GlobalStageResult();
+    result_.focal_lengths = in_parts.focal_lengths;
+    result_.steps = in_parts.steps;
+    correspondences_.matches = all_matches_;
+    EstimateModels(odometry.priors);
+    if (NumImagesOfLargest(result_) > NumImagesOfLargest(in_parts)) {
+      result_.bridges = std::move(odometry.bridges);
+      return;
+    }
+    in_parts.steps = std::move(result_.steps);
+    result_ = std::move(in_parts);
+    num_split_ = num_split;
+  }
+
+  static size_t NumImagesOfLargest(const GlobalStageResult& result) {
+    size_t num_images = 0;
+    for (const CoarseModel& model : result.models) {
+      num_images =
+          std::max<size_t>(num_images, model.reconstruction.NumRegImages());
+    }
+    return num_images;
+  }
+
+  void Join() {
+    if (result_.models.size() < 2) return;
+    Begin("joins of models", 0.85);
+    const int num_joins = JoinModels(
+        options_, scene_, correspondences_.bearings, all_matches_, &result_);
+    if (num_split_ > 0 || num_joins > 0) SortModels(&result_);
+    End("joins of models",
+        std::to_string(num_joins) + " of parts whose points tell their size, " +
+            std::to_string(num_split_) +
+            " parts taken out that no points tie or that the accelerometer "
+            "puts elsewhere");
+  }
+
+  // 2.8
+  void RefineAllMatches() {
+    if (!options_.refinement.enabled) return;
+    Begin("match refinement", 0.9);
+    RefineStageMatches(options_, scene_, raw_matches_,
+                       correspondences_.bearings, &result_);
+    End("match refinement", DescribeMatches(result_));
+  }
+
+  // 2.9
+  void MeasureSizes() {
+    // Metres that came from the accelerometer are measured again.
+    if (!result_.bridges.empty()) {
+      for (CoarseModel& model : result_.models) model.metric = false;
+    }
+    if (scene_.inertial_motions.empty() ||
+        std::all_of(result_.models.begin(), result_.models.end(),
+                    [](const CoarseModel& model) { return model.metric; })) {
+      return;
+    }
+    Begin("metres from the accelerometer", 0.95);
+    for (CoarseModel& model : result_.models) {
+      const std::vector<InertialLength> lengths = MeasureSize(
+          scene_, result_.poses.camera_mount, result_.bridges, &model);
+      result_.inertial_lengths.insert(result_.inertial_lengths.end(),
+                                      lengths.begin(), lengths.end());
+    }
+    End("metres from the accelerometer", DescribeSizes(result_));
+  }
+
+  const GlobalStageOptions options_;
+  const StageProgress& progress_;
+  const RawMatchSource raw_matches_;
+  SceneData& scene_;
+  Stopwatch watch_;
+  GlobalCorrespondences correspondences_;
+  InitialViewGraph initial_;
+  // Where models may be split or joined, or estimated once more.
+  std::map<ImagePair, std::vector<FeatureMatch>> all_matches_;
+  int num_split_ = 0;
+  GlobalStageResult result_;
+};
+
 }  // namespace
 
 bool GlobalStageOptions::IsValid(std::string* error) const {
@@ -181,108 +371,16 @@ bool GlobalStageOptions::IsValid(std::string* error) const {
          refinement.IsValid(error);
 }
 
-StatusOr<GlobalStageResult> RunGlobalStage(
-    const GlobalStageOptions& requested_options, SceneData* mutable_scene,
-    const StageProgress& progress, RawMatchSource raw_matches) {
-  if (!raw_matches) raw_matches = RawMatchesOfScene(*mutable_scene);
+StatusOr<GlobalStageResult> RunGlobalStage(const GlobalStageOptions& options,
+                                           SceneData* scene,
+                                           const StageProgress& progress,
+                                           RawMatchSource raw_matches) {
   std::string error;
-  if (!requested_options.IsValid(&error)) throw std::invalid_argument(error);
-  const GlobalStageOptions options = WithThreads(requested_options);
-  const auto begin = [&](const std::string& name, double share_done) {
-    if (progress) progress(name, share_done);
-    return Stopwatch();
-  };
-  GlobalStageResult result;
-
-  // 2.0 Focal lengths.
-  Stopwatch watch = begin("focal lengths", 0.0);
-  result.focal_lengths =
-      CalibrateFocalLengths(options.focal_lengths, mutable_scene);
-  const SceneData& scene = *mutable_scene;
-  result.steps.push_back({"focal lengths", watch.Seconds(),
-                          std::to_string(result.focal_lengths.size()) +
-                              " found of " +
-                              std::to_string(scene.cameras.size())});
-
-  // 2.1 View graph.
-  watch = begin("view graph", 0.0);
-  GlobalCorrespondences correspondences =
-      FindCorrespondences(scene, options.num_threads);
-  const InitialViewGraph initial =
-      BuildInitialViewGraph(options.two_view, scene, correspondences.bearings);
-  result.steps.push_back(
-      {"view graph", watch.Seconds(), DescribeViewGraph(initial)});
-
-  // 2.1-2.6 Coarse poses.
-  begin("coarse poses", 0.1);
-  CoarsePoseOptions pose_options = options.poses;
-  pose_options.chain.gyro_bias_covariance = scene.gyroscope_bias_covariance;
-  result.poses =
-      EstimateCoarsePoses(pose_options, initial.graph, correspondences,
-                          scene.priors, scene.frame_priors);
-  result.steps.insert(result.steps.end(), result.poses.steps.begin(),
-                      result.poses.steps.end());
-  if (result.poses.components.empty()) return NothingHoldsTogether();
-  ReleaseFreedMemory();
-
-  // 2.7 Structure and adjustment.
-  CoarseStructureOptions structure_options = options.structure;
-  structure_options.bundle.shared_errors.length_drift_ratio =
-      scene.length_drift_ratio;
-  const std::map<ImagePair, std::vector<FeatureMatch>> all_matches =
-      result.poses.components.size() > 1 || !result.poses.components[0].metric
-          ? correspondences.matches
-          : std::map<ImagePair, std::vector<FeatureMatch>>();
-  for (const CoarseComponent& component : result.poses.components) {
-    CoarseModelInput input = CreateModelInput(
-        MatchAnew(options.refinement, scene, raw_matches,
-                  correspondences.bearings, component, result.poses.graph),
-        component, result.poses, &correspondences);
-    input.refine_lenses = options.structure.refine_unknown_focal_length &&
-                          !result.focal_lengths.empty();
-    watch = begin(DescribeTrackMemory(input), 0.5);
-    result.models.push_back(BuildCoarseModel(
-        structure_options, scene, correspondences.bearings, std::move(input)));
-    result.steps.push_back(
-        {"structure", watch.Seconds(), DescribeModel(result.models.back())});
-  }
-  const int num_split = SplitModels(options, scene, correspondences.bearings,
-                                    all_matches, &result);
-  if (result.models.size() > 1) {
-    watch = begin("joins of models", 0.85);
-    const int num_joins = JoinModels(options, scene, correspondences.bearings,
-                                     all_matches, &result);
-    if (num_split > 0 || num_joins > 0) SortModels(&result);
-    result.steps.push_back({"joins of models", watch.Seconds(),
-                            std::to_string(num_joins) +
-                                " of parts whose points tell their size, " +
-                                std::to_string(num_split) +
-                                " parts taken out that no points tie or "
-                                "that the accelerometer puts elsewhere"});
-  }
-  MeasurePairAgreements(options, scene, correspondences.bearings, &result);
-
-  // 2.8 Match refinement.
-  correspondences.matches.clear();
-  ReleaseFreedMemory();
-  if (options.refinement.enabled) {
-    watch = begin("match refinement", 0.9);
-    RefineStageMatches(options, scene, raw_matches, correspondences.bearings,
-                       &result);
-    result.steps.push_back(
-        {"match refinement", watch.Seconds(), DescribeMatches(result)});
-  }
-
-  // 2.9 Metres without wheels.
-  if (!scene.inertial_motions.empty() &&
-      std::any_of(result.models.begin(), result.models.end(),
-                  [](const CoarseModel& model) { return !model.metric; })) {
-    watch = begin("metres from the accelerometer", 0.95);
-    MeasureSizes(scene, &result);
-    result.steps.push_back({"metres from the accelerometer", watch.Seconds(),
-                            DescribeSizes(result)});
-  }
-  return result;
+  if (!options.IsValid(&error)) throw std::invalid_argument(error);
+  if (!raw_matches) raw_matches = RawMatchesOfScene(*scene);
+  return GlobalStage(WithThreads(options), progress, std::move(raw_matches),
+                     scene)
+      .Run();
 }
 
 }  // namespace adasfm

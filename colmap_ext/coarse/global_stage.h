@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <Eigen/Core>
 #include <functional>
+#include <map>
 #include <string>
 #include <vector>
 
@@ -56,6 +58,8 @@ struct GlobalStageResult {
   std::vector<ImagePair> removed_pairs;
   // Of priors that know none, in models that have metres by the accelerometer.
   std::vector<InertialLength> inertial_lengths;
+  // BridgeGaps: of translations across gaps that had part in the poses.
+  std::map<ImagePair, Eigen::Matrix3d> bridges;
   std::vector<CoarseStep> steps;
 };
 
@@ -69,6 +73,7 @@ using StageProgress = std::function<void(const std::string&, double)>;
 //   2.1-2.6  coarse poses                EstimateCoarsePoses
 //   2.7      tracks, points, adjustment  BuildCoarseModel, per component
 //            parts that nothing ties     SplitModels, JoinModels
+//            gaps, then 2.1 to 2.7 anew  BridgeGaps
 //   2.8      match refinement            RefineMatches
 //   2.9      metres without wheels       MeasureSize, per component
 // The scene is read with original two-view geometries; raw matches, those of

@@ -23,9 +23,9 @@ std::vector<InertialMotion> MotionsOfCamera(
   return motions;
 }
 
-std::vector<InertialLength> MeasureSize(const SceneData& scene,
-                                        const CameraMountReport& camera_mount,
-                                        CoarseModel* model) {
+std::vector<InertialLength> MeasureSize(
+    const SceneData& scene, const CameraMountReport& camera_mount,
+    const std::map<ImagePair, Eigen::Matrix3d>& bridges, CoarseModel* model) {
   if (model->metric || scene.inertial_motions.empty()) return {};
   const std::optional<InertialScale> scale =
       EstimateInertialScale(MotionsOfCamera(scene, camera_mount),
@@ -51,10 +51,15 @@ std::vector<InertialLength> MeasureSize(const SceneData& scene,
     InertialLength length;
     length.image_id1 = prior.image_id1;
     length.image_id2 = prior.image_id2;
-    length.length_m = (pose2->second.TargetOriginInSource() -
-                       pose1->second.TargetOriginInSource())
-                          .norm();
+    const Eigen::Vector3d translation =
+        (pose2->second * pose1->second.Inverse()).translation;
+    length.length_m = translation.norm();
     length.scale_sigma = scale->sigma_ratio;
+    const auto bridge =
+        bridges.find(ImagePair(prior.image_id1, prior.image_id2));
+    if (bridge != bridges.end()) {
+      length.bridge = MeasuredTranslation{translation, bridge->second};
+    }
     sum += length.length_m * length.length_m;
     lengths.push_back(length);
   }

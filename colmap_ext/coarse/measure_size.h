@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <Eigen/Core>
+#include <map>
 #include <vector>
 
 #include "colmap_ext/coarse/coarse_structure.h"
@@ -19,9 +21,10 @@ std::vector<InertialMotion> MotionsOfCamera(
 // it tells them (EstimateInertialScale); else the model stays as it is. Returns
 // the lengths of the scene's priors in the model, by which the mapper gives its
 // own model the unit (KeepInertialUnit). They are not to hold the shape, which
-// vision knows better: all of them together tell the size to 100 %.
-std::vector<InertialLength> MeasureSize(const SceneData& scene,
-                                        const CameraMountReport& camera_mount,
-                                        CoarseModel* model);
+// vision knows better: all of them together tell the size to 100 %. Bridges
+// (BridgeGaps) are to hold it.
+std::vector<InertialLength> MeasureSize(
+    const SceneData& scene, const CameraMountReport& camera_mount,
+    const std::map<ImagePair, Eigen::Matrix3d>& bridges, CoarseModel* model);
 
 }  // namespace adasfm

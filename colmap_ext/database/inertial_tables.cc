@@ -16,18 +16,26 @@ std::string RowOf(const std::string& table, const SqliteStatement& statement) {
          statement.Text(1);
 }
 
-// None where the wheels know none.
-std::optional<MeasuredTranslation> WheelTranslationFromRow(
-    const SqliteStatement& statement, const std::string& row) {
-  if (statement.IsNull(8) && statement.IsNull(9)) return std::nullopt;
-  MeasuredTranslation by_wheels;
-  DoublesFromBlob(statement, 8, row, 3, by_wheels.translation.data());
-  DoublesFromBlob(statement, 9, row, 9, by_wheels.covariance.data());
-  if (!by_wheels.translation.allFinite() || !by_wheels.covariance.allFinite() ||
-      !(by_wheels.covariance.diagonal().array() >= 0.0).all()) {
-    throw SqliteError(row + ": values that no wheels measure");
+// None where two columns are null.
+std::optional<MeasuredTranslation> TranslationFromRow(
+    const SqliteStatement& statement, int column, const std::string& row) {
+  if (statement.IsNull(column) && statement.IsNull(column + 1)) {
+    return std::nullopt;
   }
-  return by_wheels;
+  MeasuredTranslation measured;
+  DoublesFromBlob(statement, column, row, 3, measured.translation.data());
+  DoublesFromBlob(statement, column + 1, row, 9, measured.covariance.data());
+  if (!measured.translation.allFinite() || !measured.covariance.allFinite() ||
+      !(measured.covariance.diagonal().array() >= 0.0).all()) {
+    throw SqliteError(row + ": values that are no measured translation");
+  }
+  return measured;
+}
+
+void BindTranslation(const MeasuredTranslation& measured, int column,
+                     SqliteStatement* statement) {
+  BindDoubles(statement, column, measured.translation.data(), 3);
+  BindDoubles(statement, column + 1, measured.covariance.data(), 9);
 }
 
 // Older tables are of drives without wheels.
@@ -35,6 +43,13 @@ bool HasWheelColumns(SqliteConnection* database) {
   constexpr size_t kNumColumnsWithoutWheels = 10;
   return database->Columns("adasfm_inertial_motions").size() >
          kNumColumnsWithoutWheels;
+}
+
+// Older tables know no bridges.
+bool HasBridgeColumns(SqliteConnection* database) {
+  constexpr size_t kNumColumnsWithoutBridges = 7;
+  return database->Columns(kInertialLengthTable).size() >
+         kNumColumnsWithoutBridges;
 }
 
 bool IsPositive(double value) { return std::isfinite(value) && value > 0.0; }
@@ -51,7 +66,7 @@ InertialMotion MotionFromRow(const SqliteStatement& statement) {
   // Rows first.
   motion.velocity_by_bias.transposeInPlace();
   motion.position_by_bias.transposeInPlace();
-  motion.by_wheels = WheelTranslationFromRow(statement, row);
+  motion.by_wheels = TranslationFromRow(statement, 8, row);
   if (!IsPositive(motion.dt_s) || !motion.delta_velocity.allFinite() ||
       !motion.delta_position.allFinite() ||
       !motion.velocity_by_bias.allFinite() ||
@@ -97,10 +112,7 @@ void WriteInertialMotions(const ImageNames& names,
     BindDoubles(&statement, 8, velocity_rows.data(), 9);
     BindDoubles(&statement, 9, position_rows.data(), 9);
     BindDoubles(&statement, 10, motion.camera_from_imu_origin.data(), 3);
-    if (motion.by_wheels) {
-      BindDoubles(&statement, 11, motion.by_wheels->translation.data(), 3);
-      BindDoubles(&statement, 12, motion.by_wheels->covariance.data(), 9);
-    }
+    if (motion.by_wheels) BindTranslation(*motion.by_wheels, 11, &statement);
     statement.Step();
   }
 }
@@ -114,17 +126,19 @@ void WriteInertialLengths(const std::vector<InertialLength>& lengths,
       "image_id1 INTEGER NOT NULL, image_id2 INTEGER NOT NULL, "
       "name1 TEXT NOT NULL, name2 TEXT NOT NULL, length_m REAL NOT NULL, "
       "sigma_m REAL NOT NULL, scale_sigma REAL NOT NULL, "
+      "bridge_translation BLOB, bridge_covariance BLOB, "
       "PRIMARY KEY (image_id1, image_id2))");
   const ImageNames images(database);
   SqliteStatement statement(database,
                             "INSERT INTO adasfm_inertial_lengths VALUES "
-                            "(?, ?, ?, ?, ?, ?, ?)");
+                            "(?, ?, ?, ?, ?, ?, ?, ?, ?)");
   for (const InertialLength& length : lengths) {
     statement.Reset();
     images.BindPair(length.image_id1, length.image_id2, &statement);
     statement.BindDouble(5, length.length_m);
     statement.BindDouble(6, length.sigma_m);
     statement.BindDouble(7, length.scale_sigma);
+    if (length.bridge) BindTranslation(*length.bridge, 8, &statement);
     statement.Step();
   }
 }
@@ -161,8 +175,11 @@ std::vector<InertialLength> ReadInertialLengths(SqliteConnection* database) {
   const ImageNames images(database);
   SqliteStatement statement(
       database,
-      "SELECT name1, name2, length_m, sigma_m, scale_sigma "
-      "FROM adasfm_inertial_lengths ORDER BY rowid");
+      std::string("SELECT name1, name2, length_m, sigma_m, scale_sigma") +
+          (HasBridgeColumns(database)
+               ? ", bridge_translation, bridge_covariance "
+               : ", NULL, NULL ") +
+          "FROM adasfm_inertial_lengths ORDER BY rowid");
   while (statement.Step()) {
     const auto pair = images.Ids(statement);
     if (!pair) continue;
@@ -171,10 +188,11 @@ std::vector<InertialLength> ReadInertialLengths(SqliteConnection* database) {
     length.length_m = statement.Double(2);
     length.sigma_m = statement.Double(3);
     length.scale_sigma = statement.Double(4);
+    const std::string row = RowOf(kInertialLengthTable, statement);
+    length.bridge = TranslationFromRow(statement, 5, row);
     if (!std::isfinite(length.length_m) || length.length_m < 0.0 ||
         !IsPositive(length.sigma_m) || !IsPositive(length.scale_sigma)) {
-      throw SqliteError(RowOf(kInertialLengthTable, statement) +
-                        ": values that are not a length");
+      throw SqliteError(row + ": values that are not a length");
     }
     lengths.push_back(length);
   }

@@ -286,9 +286,10 @@ TEST(InertialFactors, TellHowTheImuIsTurned) {
 }
 
 // The wheels' translation takes the place of the smoothed one, or none where
-// they slip; of motions that no factor has, lengths that vision found, and too
-// few motions nothing changes.
+// they slip and across gaps of a drive without; of motions that no factor has,
+// lengths that vision found, and too few motions nothing changes.
 TEST(LeaveAccelerometerToFactors, ReplacesWhatTheFactorsHold) {
+  constexpr image_t kBridge = 7;  // across a gap, by the accelerometer
   std::vector<InertialMotion> motions;
   std::vector<RelativePosePrior> priors;
   std::set<image_t> images;
@@ -299,13 +300,16 @@ TEST(LeaveAccelerometerToFactors, ReplacesWhatTheFactorsHold) {
     prior.image_id2 = image_id + 1;
     prior.flags = kPriorRotation | kPriorDirection | kPriorLength;
     prior.cam2_from_cam1.translation = random.GaussianVector(1.0);
-    if (image_id == 3) prior.flags |= kPriorInertialLength;
+    if (image_id == 3) {
+      prior.flags = kPriorRotation | kPriorLength | kPriorInertialLength;
+    }
+    if (image_id == kBridge) prior.flags |= kPriorInertialLength;
     priors.push_back(prior);
     InertialMotion motion;
     motion.image_id1 = image_id;
     motion.image_id2 = image_id + 1;
     motion.dt_s = 0.2;
-    if (image_id != 5) {
+    if (image_id != 5 && image_id != kBridge) {
       motion.by_wheels = MeasuredTranslation{
           random.GaussianVector(1.0), 0.04 * Eigen::Matrix3d::Identity()};
     }
@@ -322,7 +326,7 @@ TEST(LeaveAccelerometerToFactors, ReplacesWhatTheFactorsHold) {
     EXPECT_EQ((left[i].covariance.topLeftCorner<3, 3>()),
               (priors[i].covariance.topLeftCorner<3, 3>()));
     const image_t image_id = priors[i].image_id1;
-    if (image_id == 5) {
+    if (image_id == 5 || image_id == kBridge) {
       EXPECT_EQ(left[i].flags, kPriorRotation);
     } else if (image_id == 3 || image_id >= 16) {
       EXPECT_EQ(translation, priors[i].cam2_from_cam1.translation);

@@ -123,7 +123,8 @@ class InertialLengthsTest : public PriorCorrectionsTest {
     for (size_t k = 0; k < tables_.priors.size(); ++k) {
       RelativePosePrior& prior = tables_.priors[k];
       lengths_.push_back(
-          {prior.image_id1, prior.image_id2, 1.0 + k, 0.1, 0.01 * (k + 1)});
+          {prior.image_id1, prior.image_id2, 1.0 + k, 0.1, 0.01 * (k + 1), {}});
+      if (k == kBridge) lengths_.back().bridge = Bridge();
       if (k + 1 == tables_.priors.size()) break;
       prior.flags = kPriorRotation;
       prior.covariance.bottomRows<3>().setZero();
@@ -132,6 +133,13 @@ class InertialLengthsTest : public PriorCorrectionsTest {
           std::numeric_limits<double>::infinity());
     }
     EXPECT_TRUE(WritePriorTables(path_, tables_).ok());
+  }
+
+  static MeasuredTranslation Bridge() {
+    MeasuredTranslation bridge;
+    bridge.translation << 0.1, -0.2, 1.5;
+    bridge.covariance << 4.0, 0.5, 0.1, 0.5, 3.0, -0.2, 0.1, -0.2, 5.0;
+    return bridge;
   }
 
   Status Rewrite(const std::optional<Eigen::Quaterniond>& mount = {}) const {
@@ -146,6 +154,8 @@ class InertialLengthsTest : public PriorCorrectionsTest {
     return scene->priors[0].HasLength();
   }
 
+  // The one of a gap.
+  static constexpr size_t kBridge = 1;
   std::vector<InertialLength> lengths_;
 };
 
@@ -160,7 +170,22 @@ TEST_F(InertialLengthsTest, AreReadAsWritten) {
     EXPECT_EQ(read[k].length_m, lengths_[k].length_m);
     EXPECT_EQ(read[k].sigma_m, lengths_[k].sigma_m);
     EXPECT_EQ(read[k].scale_sigma, lengths_[k].scale_sigma);
+    ASSERT_EQ(read[k].bridge.has_value(), k == kBridge);
   }
+  EXPECT_EQ(read[kBridge].bridge->translation, Bridge().translation);
+  EXPECT_EQ(read[kBridge].bridge->covariance, Bridge().covariance);
+}
+
+TEST_F(InertialLengthsTest, OlderTablesHaveNoBridges) {
+  ASSERT_TRUE(Rewrite().ok());
+  SqliteConnection database(path_, SqliteConnection::Mode::kWrite);
+  database.Execute(
+      "ALTER TABLE adasfm_inertial_lengths DROP COLUMN bridge_translation;"
+      "ALTER TABLE adasfm_inertial_lengths DROP COLUMN bridge_covariance;");
+  const std::vector<InertialLength> read = ReadInertialLengths(&database);
+  ASSERT_EQ(read.size(), lengths_.size());
+  EXPECT_EQ(read[kBridge].length_m, lengths_[kBridge].length_m);
+  EXPECT_FALSE(read[kBridge].bridge);
 }
 
 TEST_F(InertialLengthsTest, GoToPriorsWithoutLength) {
@@ -169,14 +194,22 @@ TEST_F(InertialLengthsTest, GoToPriorsWithoutLength) {
   ASSERT_TRUE(scene.ok()) << scene.status().message();
   for (size_t k = 0; k + 1 < lengths_.size(); ++k) {
     const RelativePosePrior& prior = scene->priors[k];
+    EXPECT_LT(AngleBetweenRad(prior.cam2_from_cam1.rotation,
+                              corrected_[k].cam2_from_cam1.rotation),
+              1e-9);
+    EXPECT_EQ(prior.HasOwnLength(), k == kBridge);
+    if (k == kBridge) {
+      EXPECT_TRUE(prior.HasMotion());
+      EXPECT_EQ(prior.cam2_from_cam1.translation, Bridge().translation);
+      EXPECT_EQ(Eigen::Matrix3d(prior.covariance.bottomRightCorner<3, 3>()),
+                Bridge().covariance);
+      continue;
+    }
     EXPECT_EQ(prior.flags, static_cast<uint32_t>(kPriorRotation | kPriorLength |
                                                  kPriorInertialLength));
     EXPECT_EQ(prior.cam2_from_cam1.translation,
               lengths_[k].length_m * Eigen::Vector3d::UnitZ());
     EXPECT_NEAR(prior.covariance(5, 5), 0.01, 1e-12);
-    EXPECT_LT(AngleBetweenRad(prior.cam2_from_cam1.rotation,
-                              corrected_[k].cam2_from_cam1.rotation),
-              1e-9);
   }
   // The last one knows its own.
   EXPECT_EQ(scene->priors.back().flags, tables_.priors.back().flags);
@@ -224,8 +257,10 @@ TEST_F(InertialLengthsTest, AreMatchedByName) {
 }
 
 TEST_F(InertialLengthsTest, DamagedRowsAreAnError) {
-  for (const char* column : {"sigma_m = 0.0", "length_m = -1.0",
-                             "length_m = 9e999", "scale_sigma = -0.1"}) {
+  for (const char* column :
+       {"sigma_m = 0.0", "length_m = -1.0", "length_m = 9e999",
+        "scale_sigma = -0.1", "bridge_covariance = zeroblob(71)",
+        "bridge_translation = zeroblob(23)"}) {
     ASSERT_TRUE(Rewrite().ok());
     SqliteConnection(path_, SqliteConnection::Mode::kWrite)
         .Execute(std::string("UPDATE adasfm_inertial_lengths SET ") + column);

@@ -1,0 +1,126 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <map>
+#include <set>
+
+#include "colmap_ext/host/pose_conversion.h"
+#include "core/so3.h"
+#include "tests/testing/colmap_ext/global_stage_run.h"
+#include "tests/testing/colmap_ext/inertial_drive.h"
+#include "tests/testing/matchers.h"
+
+namespace adasfm {
+namespace {
+
+constexpr double kAccelerometerNoise = 0.02;  // m/s^2 sqrt(s)
+constexpr int kNumImages = 200;
+constexpr int kNumDarkImages = 10;
+
+// A drive with a gyroscope, past 10 images that see nothing.
+class GlobalStageGapsTest : public testing::TestWithParam<uint64_t> {
+ protected:
+  GlobalStageGapsTest() : world_(BuildSyntheticWorld(World())) {
+    scene_ = BuildSyntheticScene(world_, {});
+    for (RelativePosePrior& prior : scene_.priors) {
+      prior.flags = kPriorRotation;
+      prior.cam2_from_cam1.translation.setZero();
+      prior.covariance.bottomRows<3>().setZero();
+      prior.covariance.rightCols<3>().setZero();
+      prior.covariance.diagonal().tail<3>().setConstant(
+          std::numeric_limits<double>::infinity());
+    }
+    for (const SyntheticImage& image : world_.images) {
+      poses_[image.image_id] = image.cam_from_world;
+    }
+  }
+
+  static SyntheticWorldOptions World() {
+    SyntheticWorldOptions options;
+    options.num_images = kNumImages;
+    options.num_blackouts = 1;
+    options.blackout_num_images = kNumDarkImages;
+    options.seed = GetParam();
+    return options;
+  }
+
+  void AddInertialMotions() {
+    std::vector<TimedPose> images;
+    for (const SyntheticImage& image : world_.images) {
+      images.push_back(
+          {image.image_id, image.timestamp_ns, image.cam_from_world});
+    }
+    InertialDriveOptions options;
+    options.noise = kAccelerometerNoise;
+    options.bias = Eigen::Vector3d(0.05, -0.1, 0.08);
+    options.lever = Eigen::Vector3d(0.1, 0.2, -0.3);
+    options.seed = GetParam();
+    scene_.inertial_motions = IntegrateDrive(std::move(images), options);
+  }
+
+  static Rigid3d Motion(const std::map<image_t, Rigid3d>& poses,
+                        image_t image_id1, image_t image_id2) {
+    return poses.at(image_id2) * poses.at(image_id1).Inverse();
+  }
+
+  static Eigen::Vector3d Error(const std::map<image_t, Rigid3d>& true_poses,
+                               const MeasuredTranslation& measured,
+                               const InertialLength& length) {
+    return measured.translation -
+           Motion(true_poses, length.image_id1, length.image_id2).translation;
+  }
+
+  const SyntheticWorld world_;
+  SceneData scene_;
+  std::map<image_t, Rigid3d> poses_;
+};
+
+TEST_P(GlobalStageGapsTest, TheGyroscopeAloneLeavesThemOpen) {
+  const GlobalStageResult result = RunStage(scene_);
+  EXPECT_LE(result.models[0].reconstruction.NumRegImages(),
+            kNumImages - kNumDarkImages);
+  EXPECT_TRUE(result.bridges.empty());
+}
+
+TEST_P(GlobalStageGapsTest, TheAccelerometerLeadsAcross) {
+  AddInertialMotions();
+  const GlobalStageResult result = RunStage(scene_);
+  ASSERT_EQ(result.models.size(), 1);
+  const CoarseModel& model = result.models[0];
+  EXPECT_EQ(model.reconstruction.NumRegImages(), kNumImages);
+  EXPECT_TRUE(model.metric);
+  ASSERT_GT(model.inertial_scale_sigma, 0.0);
+  const std::map<image_t, Rigid3d> poses = CamsFromWorld(model.reconstruction);
+  EXPECT_NEAR(ComputeAlignedErrors(poses, poses_, {}).scale, 1.0,
+              3.0 * model.inertial_scale_sigma);
+
+  // What the mapper gets.
+  ASSERT_EQ(result.bridges.size(), kNumDarkImages + 1);
+  size_t num_bridges = 0;
+  double variance = 0.0;
+  std::set<image_t> dark;
+  for (const InertialLength& length : result.inertial_lengths) {
+    if (!length.bridge) continue;
+    ++num_bridges;
+    const double step_variance = length.bridge->covariance.trace();
+    EXPECT_LT(Error(poses_, *length.bridge, length).norm(),
+              4.0 * std::sqrt(step_variance));
+    variance += step_variance;
+    dark.insert(length.image_id1);
+    dark.insert(length.image_id2);
+  }
+  EXPECT_EQ(num_bridges, result.bridges.size());
+  // The way from what was seen last to what was seen next.
+  const Eigen::Vector3d error =
+      Motion(poses, *dark.begin(), *dark.rbegin()).translation -
+      Motion(poses_, *dark.begin(), *dark.rbegin()).translation;
+  EXPECT_LT(error.norm(), 4.0 * std::sqrt(variance));
+  EXPECT_LT(variance, 0.15 * 0.15);
+}
+
+INSTANTIATE_TEST_SUITE_P(Seeds, GlobalStageGapsTest, testing::Values(1, 2, 3));
+
+}  // namespace
+}  // namespace adasfm
