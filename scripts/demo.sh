@@ -18,12 +18,10 @@ rm -rf "$output"
 mkdir -p "$output"
 "$colmap" adasfm_synthesizer --output_path "$output" --render 1 \
   --num_images 60 --seed 2
-camera=$(sed -nE 's/^ *intrinsics: *\[(.*)\]/\1/p' "$output/sensors.yaml" | tr -d ' ')
 
 say '2/3 From photos and logs to the model'
 "$colmap" adasfm_automatic_reconstructor --image_path "$output/images" \
-  --workspace_path "$output/workspace" --camera_model PINHOLE \
-  --camera_params "$camera" --image_times_path "$output/times.csv" \
+  --workspace_path "$output/workspace" --image_times_path "$output/times.csv" \
   --imu_path "$output/imu.csv" --wheel_path "$output/wheel.csv" \
   --sensors_path "$output/sensors.yaml" --ground_truth_path "$output/gt.txt"
 

@@ -7,6 +7,7 @@
 #include <stdexcept>
 #include <vector>
 
+#include "colmap_ext/datasets/calibrated_camera.h"
 #include "colmap_ext/datasets/dataset_files.h"
 #include "core/rigid3d.h"
 
@@ -48,37 +49,9 @@ Rigid3d RigidFromNumbers(const std::vector<double>& numbers,
                  Eigen::Vector3d(matrix.topRightCorner<3, 1>()));
 }
 
-// Camera of a calibration with Kalibr's or EuRoC's names of the models.
-// Calibration tools put pixel centres at whole numbers, COLMAP at .5.
-void SetCamera(const std::string& distortion_model,
-               const std::vector<double>& intrinsics,
-               const std::vector<double>& distortion, const std::string& path,
-               DatasetLayout* layout) {
-  if (intrinsics.size() != 4) {
-    throw std::runtime_error(path + ": intrinsics are not fu, fv, cu, cv");
-  }
-  std::vector<double> params = {intrinsics[0], intrinsics[1],
-                                intrinsics[2] + 0.5, intrinsics[3] + 0.5};
-  if (distortion_model == "none" || distortion.empty()) {
-    layout->camera_model = "PINHOLE";
-  } else if (distortion.size() != 4) {
-    throw std::runtime_error(path + ": the distortion has " +
-                             std::to_string(distortion.size()) +
-                             " coefficients; 4 are expected");
-  } else {
-    const bool is_fisheye = distortion_model == "equidistant";
-    if (!is_fisheye && distortion_model != "radial-tangential" &&
-        distortion_model != "radtan") {
-      throw std::runtime_error(path +
-                               ": distortion_model = " + distortion_model +
-                               " must be radial-tangential or equidistant; "
-                               "give --camera_model and --camera_params "
-                               "without --data_format");
-    }
-    layout->camera_model = is_fisheye ? "OPENCV_FISHEYE" : "OPENCV";
-    params.insert(params.end(), distortion.begin(), distortion.end());
-  }
-  layout->camera_params = JoinNumbers(params);
+void SetCamera(const CalibratedCamera& camera, DatasetLayout* layout) {
+  layout->camera_model = camera.model;
+  layout->camera_params = camera.params;
 }
 
 // DSO's format: "Pinhole fx fy cx cy 0" or "EquiDistant fx fy cx cy k1..k4",
@@ -102,8 +75,9 @@ void ReadDsoCamera(const std::string& path, DatasetLayout* layout) {
   if (model == "EquiDistant") {
     distortion.assign(numbers.begin() + 4, numbers.end());
   }
-  SetCamera(model == "Pinhole" ? "none" : "equidistant", intrinsics, distortion,
-            path, layout);
+  SetCamera(CameraOfCalibration(model == "Pinhole" ? "none" : "equidistant",
+                                intrinsics, distortion, path),
+            layout);
 }
 
 }  // namespace
@@ -117,11 +91,14 @@ StatusOr<DatasetLayout> FindEurocLayout(const std::string& root) {
   RequireFile(layout.image_times_path);
   const std::string camera_path = mav + "/cam0/sensor.yaml";
   const YAML::Node camera = ReadYaml(camera_path);
-  SetCamera(ReadValue<std::string>(camera, "distortion_model", camera_path),
-            ReadValue<std::vector<double>>(camera, "intrinsics", camera_path),
-            ReadValue<std::vector<double>>(camera, "distortion_coefficients",
-                                           camera_path),
-            camera_path, &layout);
+  SetCamera(
+      CameraOfCalibration(
+          ReadValue<std::string>(camera, "distortion_model", camera_path),
+          ReadValue<std::vector<double>>(camera, "intrinsics", camera_path),
+          ReadValue<std::vector<double>>(camera, "distortion_coefficients",
+                                         camera_path),
+          camera_path),
+      &layout);
   if (!PathExists(mav + "/imu0/data.csv")) return layout;
   layout.imu_path = mav + "/imu0/data.csv";
   const std::string imu_path = mav + "/imu0/sensor.yaml";

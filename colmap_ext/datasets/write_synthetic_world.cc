@@ -172,9 +172,11 @@ void WriteCamera(const SyntheticWorld& world, int index,
   const SyntheticCamera& camera = world.camera;
   const bool is_fisheye = camera.model == SyntheticCameraModel::kFisheye;
   const Eigen::Vector4d& k = camera.fisheye_coeffs;
+  // Calibration tools put pixel centres at whole numbers, COLMAP at .5.
   *file << "cam" << index << ":\n  camera_model: pinhole\n"
         << "  intrinsics: [" << camera.focal_px << ", " << camera.focal_px
-        << ", " << camera.principal_x_px << ", " << camera.principal_y_px
+        << ", " << camera.principal_x_px - 0.5 << ", "
+        << camera.principal_y_px - 0.5
         << "]\n  distortion_model: " << (is_fisheye ? "equidistant" : "radtan")
         << "\n  distortion_coeffs: [" << k[0] << ", " << k[1] << ", " << k[2]
         << ", " << k[3] << "]\n  resolution: [" << camera.width << ", "

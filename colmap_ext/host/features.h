@@ -22,6 +22,9 @@ struct FeatureOptions {
   // Comma-separated, in the model's order; empty: from EXIF, else 1.2 times the
   // longer side as focal length.
   std::string camera_params;
+  // Of the photos that the parameters are of; 0: not known.
+  int camera_width_px = 0;
+  int camera_height_px = 0;
   // 1: all photos are of one camera; 0: each of its own; 2: those of equal size
   // in a folder share one, as with a lens a folder; -1: photos of equal size
   // and equal first parameters share one.

@@ -82,6 +82,18 @@ class ImageWriter {
   bool Exists(const std::string& name) const { return names_.count(name) > 0; }
 
   Status Write(const std::string& name, const PhotoHeader& header) {
+    if (options_.camera_width_px > 0 &&
+        (header.width_px != options_.camera_width_px ||
+         header.height_px != options_.camera_height_px)) {
+      return Status::Error(
+          "the photo " + name + " has " + std::to_string(header.width_px) +
+          "x" + std::to_string(header.height_px) +
+          " pixels, but the camera is calibrated for " +
+          std::to_string(options_.camera_width_px) + "x" +
+          std::to_string(options_.camera_height_px) +
+          " (resolution of cam0 in --sensors_path); give --camera_model and "
+          "--camera_params");
+    }
     const colmap::Camera camera = CameraOfPhoto(options_, header);
     if (options_.single_camera == 1 && !cameras_.empty() &&
         cameras_.count(Key(camera, name)) == 0) {

@@ -4,9 +4,11 @@
 #include <algorithm>
 #include <filesystem>
 #include <fstream>
+#include <optional>
 #include <sstream>
 #include <string>
 
+#include "colmap_ext/datasets/calibrated_camera.h"
 #include "colmap_ext/datasets/dataset_layout.h"
 #include "colmap_ext/io/output_files.h"
 
@@ -56,6 +58,22 @@ Status ApplyLayout(AutomaticReconstructionOptions* options,
   return write("sensors.yaml", layout->sensors_text, &paths->sensors_path);
 }
 
+// Of the calibration of the sensors, where nobody says another one.
+void UseSensorsCamera(const std::string& sensors_path,
+                      FeatureOptions* features) {
+  if (sensors_path.empty() || !features->camera_params.empty() ||
+      features->camera_model != FeatureOptions().camera_model) {
+    return;
+  }
+  const std::optional<CalibratedCamera> camera =
+      ReadSensorsCamera(sensors_path);
+  if (!camera) return;
+  features->camera_model = camera->model;
+  features->camera_params = camera->params;
+  features->camera_width_px = camera->width_px;
+  features->camera_height_px = camera->height_px;
+}
+
 }  // namespace
 
 Status PrepareReconstruction(AutomaticReconstructionOptions* options,
@@ -74,6 +92,7 @@ Status PrepareReconstruction(AutomaticReconstructionOptions* options,
     return Status::Error(
         "sensor logs need the calibration of the sensors; give --sensors_path");
   }
+  UseSensorsCamera(paths->sensors_path, &options->features);
   options->pairs.image_times_path = paths->image_times_path;
   options->priors.max_memory_gb = options->max_memory_gb;
   options->global.max_memory_gb = options->max_memory_gb;

@@ -39,6 +39,8 @@ Status Reconstructor::ExtractAll(const std::vector<std::string>& names) {
     text << ", focal lengths from EXIF: " << images->num_known_focal_lengths
          << ", guessed: "
          << images->num_cameras - images->num_known_focal_lengths;
+  } else {
+    text << ", calibrated as " << options_.features.camera_model;
   }
   message_(text.str());
   if (!images->unreadable.empty()) {

@@ -25,6 +25,7 @@ from benchmarking.figures import (add_arguments, measure, run_table,
                                   world_folder)
 from benchmarking.pair_counts import count_pairs
 from benchmarking.process import Failed, run
+from benchmarking.sets import camera_params
 
 NOT_ABOUT_A_MODEL = ('are in no model', 'fall apart', 'may join another',
                      'joins not made')
@@ -69,13 +70,6 @@ def map_world(folder, logs, args):
   return outcome
 
 
-def read_intrinsics(folder):
-  """Of the first camera of sensors.yaml, as COLMAP's PINHOLE has them."""
-  with open(os.path.join(folder, 'sensors.yaml')) as file:
-    line = next(line for line in file if 'intrinsics:' in line)
-  return ''.join(line.split('[')[1].split(']')[0].split())
-
-
 def map_photos(folder, logs, args):
   """From photos to a model by one command; returns what came out."""
   suffix = 'with' if logs else 'without'
@@ -84,7 +78,8 @@ def map_photos(folder, logs, args):
   arguments = [args.colmap, 'adasfm_automatic_reconstructor', '--image_path',
                os.path.join(folder, 'images'), '--workspace_path', workspace,
                '--extractor', 'opencv', '--camera_model', 'PINHOLE',
-               '--camera_params', read_intrinsics(folder)]
+               '--camera_params',
+               camera_params(os.path.join(folder, 'sensors.yaml'))]
   if logs:
     arguments += ['--image_times_path', os.path.join(folder, 'times.csv'),
                   '--sensors_path', os.path.join(folder, 'sensors.yaml')]

@@ -44,8 +44,11 @@ def make_drive(colmap, folder):
         calibration.replace('type: differential', 'type: odometry'))
     write_drive_bag(folder, float(re.search(r'track_width: *(\S+)',
                                             calibration)[1]))
-    camera = re.search(r'intrinsics: *\[(.*)\]', calibration)[1]
-    camera = camera.replace(' ', '')
+    intrinsics = re.search(r'intrinsics: *\[(.*)\]', calibration)[1]
+    # Calibration tools put pixel centres at whole numbers, COLMAP at 0.5.
+    camera = ','.join(
+        '%.12g' % (float(number) + shift) for number, shift in
+        zip(intrinsics.split(','), (0.0, 0.0, 0.5, 0.5)))
     write_learned(colmap, folder, camera)
     return camera
 

@@ -43,7 +43,16 @@ class AutomaticTest : public CommandLineTest {
     const std::string sensors = ReadBytes(drive_->File("sensors.yaml"));
     ASSERT_TRUE(std::regex_search(sensors, match,
                                   std::regex("intrinsics: *\\[([^\\]]*)\\]")));
-    camera_params_ = std::regex_replace(match[1].str(), std::regex(" "), "");
+    // Calibration tools put pixel centres at whole numbers, COLMAP at .5.
+    std::istringstream intrinsics(
+        std::regex_replace(match[1].str(), std::regex(","), " "));
+    std::vector<double> params(4);
+    for (double& param : params) intrinsics >> param;
+    std::ostringstream text;
+    text << params[0] << "," << params[1] << "," << params[2] + 0.5 << ","
+         << params[3] + 0.5;
+    camera_params_ = text.str();
+    intrinsics_ = match[1].str();
   }
   static void TearDownTestSuite() { drive_.reset(); }
 
@@ -54,8 +63,11 @@ class AutomaticTest : public CommandLineTest {
            " --max_num_features 400";
   }
   std::string WithSensors() const {
-    return Photos() + " --image_times_path " + drive_->File("times.csv") +
-           " --imu_path " + drive_->File("imu.csv") + " --wheel_path " +
+    return "adasfm_automatic_reconstructor --image_path " +
+           drive_->File("images") + " --workspace_path " + workspace_ +
+           " --max_num_features 400 --image_times_path " +
+           drive_->File("times.csv") + " --imu_path " +
+           drive_->File("imu.csv") + " --wheel_path " +
            drive_->File("wheel.csv") + " --sensors_path " +
            drive_->File("sensors.yaml");
   }
@@ -103,16 +115,20 @@ class AutomaticTest : public CommandLineTest {
 
   static std::unique_ptr<TemporaryFolder> drive_;
   static std::string camera_params_;
+  static std::string intrinsics_;
   std::string workspace_ = folder_.File("workspace");
 };
 
 std::unique_ptr<TemporaryFolder> AutomaticTest::drive_;
 std::string AutomaticTest::camera_params_;
+std::string AutomaticTest::intrinsics_;
 
 TEST_F(AutomaticTest, PhotosAndSensorsThenAgainThenWithOtherOptions) {
   Run run = ExpectSuccess(WithSensors() + " --ground_truth_path " +
                           drive_->File("gt.txt"));
   ExpectModel();
+  // The camera is that of sensors.yaml.
+  EXPECT_TRUE(Contains(run.out, "1 camera, calibrated as PINHOLE")) << run.out;
   EXPECT_FALSE(Contains(run.out, "WARNING: the database has no sensor"));
   EXPECT_EQ(DoneSteps().size(), 6);
   // Again: nothing is done twice.
@@ -140,6 +156,19 @@ TEST_F(AutomaticTest, PhotosAndSensorsThenAgainThenWithOtherOptions) {
       ReadPriorTables(workspace_ + "/database.db")->tables.priors.empty());
   EXPECT_FALSE(fs::exists(workspace_ + "/database.db.priors.json"));
   ExpectModel();
+}
+
+TEST_F(AutomaticTest, PhotosOfAnotherSizeThanCalibratedAreAnError) {
+  const std::string sensors = folder_.File("sensors.yaml");
+  std::ofstream(sensors) << std::regex_replace(
+      ReadBytes(drive_->File("sensors.yaml")), std::regex("resolution: .*"),
+      "resolution: [960, 600]");
+  ExpectError("adasfm_automatic_reconstructor --image_path " +
+                  drive_->File("images") + " --workspace_path " + workspace_ +
+                  " --image_times_path " + drive_->File("times.csv") +
+                  " --imu_path " + drive_->File("imu.csv") +
+                  " --sensors_path " + sensors,
+              "has 480x300 pixels, but the camera is calibrated for 960x600");
 }
 
 TEST_F(AutomaticTest, TheUsersColmapExtractsAndMatches) {
@@ -214,7 +243,7 @@ TEST_F(AutomaticTest, EurocRecording) {
   for (int i = 0; i < 3; ++i) {
     for (int j = 0; j < 4; ++j) camera << body_from_cam(i, j) << ", ";
   }
-  camera << "0, 0, 0, 1]\nintrinsics: [" << camera_params_
+  camera << "0, 0, 0, 1]\nintrinsics: [" << intrinsics_
          << "]\ndistortion_model: radial-tangential\n"
             "distortion_coefficients: [0, 0, 0, 0]\n";
   std::ofstream(root + "/mav0/cam0/sensor.yaml") << camera.str();

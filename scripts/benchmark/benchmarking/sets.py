@@ -54,9 +54,11 @@ def shrink(world, max_num_images):
 
 
 def camera_params(sensors_path):
+  """Of cam0, as COLMAP's PINHOLE has them: pixel centres at 0.5."""
   with open(sensors_path) as file:
     match = re.search(r'intrinsics:\s*\[([^\]]*)\]', file.read())
-  return match.group(1).replace(' ', '')
+  fx, fy, cx, cy = (float(number) for number in match.group(1).split(','))
+  return '%.12g,%.12g,%.12g,%.12g' % (fx, fy, cx + 0.5, cy + 0.5)
 
 
 def make_database(name, folder, args):

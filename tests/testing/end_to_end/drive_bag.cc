@@ -61,13 +61,12 @@ void WritePhotos(const std::string& folder, const DriveBagOptions& options,
     const MessageFrame frame{time.timestamp_ns, "camera_optical"};
     const std::string path = folder + "/images/" + time.name;
     const cv::Mat picture = cv::imread(path);
-    // ROS has the first pixel's centre at 0, COLMAP at 0.5.
-    bag->Write(
-        "/camera/camera_info", "sensor_msgs/msg/CameraInfo", time.timestamp_ns,
-        CameraInfoMessage(frame, picture.rows, picture.cols, "plumb_bob",
-                          {0, 0, 0, 0, 0},
-                          {intrinsics[0], 0, intrinsics[2] - 0.5, 0,
-                           intrinsics[1], intrinsics[3] - 0.5, 0, 0, 1}));
+    bag->Write("/camera/camera_info", "sensor_msgs/msg/CameraInfo",
+               time.timestamp_ns,
+               CameraInfoMessage(frame, picture.rows, picture.cols, "plumb_bob",
+                                 {0, 0, 0, 0, 0},
+                                 {intrinsics[0], 0, intrinsics[2], 0,
+                                  intrinsics[1], intrinsics[3], 0, 0, 1}));
     if (!options.has_raw_images) {
       bag->Write("/camera/image_raw/compressed",
                  "sensor_msgs/msg/CompressedImage", time.timestamp_ns,

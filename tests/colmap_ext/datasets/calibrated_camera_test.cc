@@ -1,0 +1,64 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "colmap_ext/datasets/calibrated_camera.h"
+
+#include <gtest/gtest.h>
+
+#include "tests/testing/colmap_ext/temporary_folder.h"
+
+namespace adasfm {
+namespace {
+
+class SensorsCameraTest : public testing::Test {
+ protected:
+  std::optional<CalibratedCamera> Read(const std::string& text) {
+    folder_.Write("sensors.yaml", text);
+    return ReadSensorsCamera(folder_.File("sensors.yaml"));
+  }
+
+  TemporaryFolder folder_;
+};
+
+TEST_F(SensorsCameraTest, PixelCentresAreCOLMAPs) {
+  const auto camera = Read(
+      "cam0:\n  intrinsics: [500, 501.5, 319.5, 239]\n"
+      "  distortion_model: radtan\n  distortion_coeffs: [0, 0, 0, 0]\n"
+      "  resolution: [640, 480]\n");
+  ASSERT_TRUE(camera.has_value());
+  EXPECT_EQ(camera->model, "PINHOLE");
+  EXPECT_EQ(camera->params, "500,501.5,320,239.5");
+  EXPECT_EQ(camera->width_px, 640);
+  EXPECT_EQ(camera->height_px, 480);
+}
+
+TEST_F(SensorsCameraTest, DistortionsGoToTheirModels) {
+  auto camera = Read(
+      "cam0: {camera_model: pinhole, intrinsics: [500, 500, 320, 240], "
+      "distortion_model: radtan, distortion_coeffs: [0.25, -0.5, 0.125, 0]}");
+  ASSERT_TRUE(camera.has_value());
+  EXPECT_EQ(camera->model, "OPENCV");
+  EXPECT_EQ(camera->params, "500,500,320.5,240.5,0.25,-0.5,0.125,0");
+  EXPECT_EQ(camera->width_px, 0);
+  camera = Read(
+      "cam0: {intrinsics: [500, 500, 320, 240], distortion_model: equidistant, "
+      "distortion_coeffs: [0.25, -0.5, 0.125, 0]}");
+  ASSERT_TRUE(camera.has_value());
+  EXPECT_EQ(camera->model, "OPENCV_FISHEYE");
+}
+
+// Photos of another camera, another model, or no intrinsics: as without.
+TEST_F(SensorsCameraTest, WhatItDoesNotKnowIsLeftOut) {
+  const std::string pinhole = "intrinsics: [500, 500, 320, 240]";
+  EXPECT_TRUE(Read("cam0: {" + pinhole + "}").has_value());
+  EXPECT_FALSE(Read("cam0: {" + pinhole + "}\ncam1: {" + pinhole + "}"));
+  EXPECT_FALSE(Read("cam0: {timeshift_cam_imu: 0.0}"));
+  EXPECT_FALSE(Read("cam0: {camera_model: omni, " + pinhole + "}"));
+  EXPECT_FALSE(Read("cam0: {" + pinhole +
+                    ", distortion_model: fov, distortion_coeffs: [1]}"));
+  EXPECT_FALSE(Read("cam0: {intrinsics: [500, 320, 240]}"));
+  EXPECT_FALSE(Read("cam0: {intrinsics: [500, many, 320, 240]}"));
+  EXPECT_FALSE(Read("cam0: ["));
+  EXPECT_FALSE(ReadSensorsCamera(folder_.File("none.yaml")));
+}
+
+}  // namespace
+}  // namespace adasfm
