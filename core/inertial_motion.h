@@ -63,7 +63,7 @@ struct InertialLength {
   double scale_sigma = 0.0;
   // Where vision ties the images to nothing, the translation that accelerometer
   // and the velocities around tell: a measurement of this motion.
-  std::optional<MeasuredTranslation> bridge;
+  std::optional<MeasuredTranslation> bridge = std::nullopt;
 };
 
 // Gives the priors of the same images that have no length theirs, with the flag

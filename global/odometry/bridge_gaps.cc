@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "global/odometry/bridge_gaps.h"
 
-#include <Eigen/Cholesky>
+#include <Eigen/SparseCholesky>
+#include <Eigen/SparseCore>
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
@@ -51,10 +52,6 @@ struct Model {
   std::optional<InertialScale> scale;
 };
 
-Eigen::Matrix3d RotationSigmas(const RelativePosePrior& prior) {
-  return prior.covariance.topLeftCorner<3, 3>();
-}
-
 std::vector<Chain> FindChains(const std::vector<InertialMotion>& motions,
                               const std::vector<RelativePosePrior>& priors) {
   std::map<ImagePair, size_t> rotations;
@@ -89,8 +86,8 @@ void LabelImages(const std::vector<Model>& models, Chain* chain) {
   for (const image_t image_id : chain->images) {
     int label = kNoModel;
     for (size_t k = 0; k < models.size() && label == kNoModel; ++k) {
-      if (models[k].cams_from_world.count(image_id) > 0)
-        label = static_cast<int>(k);
+      if (models[k].cams_from_world.count(image_id) == 0) continue;
+      label = static_cast<int>(k);
     }
     chain->models.push_back(label);
   }
@@ -158,7 +155,9 @@ class GapSmoother {
     Eigen::Vector3d gravity = Eigen::Vector3d::Zero();
     for (int iteration = 0; iteration < 3; ++iteration) {
       BuildEquations(gravity);
-      factor_.compute(hessian_);
+      Eigen::SparseMatrix<double> hessian(right_.size(), right_.size());
+      hessian.setFromTriplets(hessian_.begin(), hessian_.end());
+      factor_.compute(hessian);
       if (factor_.info() != Eigen::Success) return false;
       solution_ = factor_.solve(right_);
       if (!solution_.allFinite()) return false;
@@ -174,8 +173,8 @@ class GapSmoother {
   // Of the model on one side.
   InertialScale Scale(bool is_far) const {
     const int size = is_far ? FarSize() : NearSize();
-    const double variance =
-        factor_.solve(Eigen::VectorXd::Unit(right_.size(), size))[size];
+    const Eigen::VectorXd unit = Eigen::VectorXd::Unit(right_.size(), size);
+    const double variance = factor_.solve(unit)[size];
     InertialScale scale;
     scale.metres_per_unit = solution_[size];
     scale.sigma_ratio =
@@ -251,7 +250,7 @@ class GapSmoother {
       const RelativePosePrior& prior = priors_[chain_.priors[k]];
       world_from_cams_[k + 1 - first_] =
           WorldFromCam(k) * prior.cam2_from_cam1.rotation.conjugate();
-      rotation_covariance_ += RotationSigmas(prior);
+      rotation_covariance_ += prior.covariance.topLeftCorner<3, 3>();
     }
     near_from_far_ = WorldFromCam(gap_.last) * CamFromModel(gap_.last).rotation;
     for (size_t k = gap_.last + 1; k <= last_; ++k) {
@@ -269,8 +268,12 @@ class GapSmoother {
       right_.segment(row, left.cols()) +=
           information * left.transpose() * value;
       for (const auto& [column, across] : blocks) {
-        hessian_.block(row, column, left.cols(), across.cols()) +=
-            information * left.transpose() * across;
+        const Eigen::MatrixXd block = information * left.transpose() * across;
+        for (int i = 0; i < block.rows(); ++i) {
+          for (int j = 0; j < block.cols(); ++j) {
+            hessian_.emplace_back(row + i, column + j, block(i, j));
+          }
+        }
       }
     }
     squares_ += information * value.squaredNorm();
@@ -280,7 +283,7 @@ class GapSmoother {
   void BuildEquations(const Eigen::Vector3d& gravity) {
     const Eigen::Matrix3d one = Eigen::Matrix3d::Identity();
     const int size = Gravity() + kNumShared;
-    hessian_ = Eigen::MatrixXd::Zero(size, size);
+    hessian_.clear();
     right_ = Eigen::VectorXd::Zero(size);
     squares_ = 0.0;
     num_residuals_ = 0;
@@ -346,8 +349,8 @@ class GapSmoother {
     Eigen::MatrixXd across = Eigen::MatrixXd::Zero(right_.size(), 3);
     across.middleRows<3>(Position(gap_.last)).setIdentity();
     across.middleRows<3>(Position(gap_.first)) -= Eigen::Matrix3d::Identity();
-    const Eigen::Matrix3d covariance =
-        across.transpose() * factor_.solve(across);
+    const Eigen::MatrixXd solved = factor_.solve(across);
+    const Eigen::Matrix3d covariance = across.transpose() * solved;
     const double seconds = Seconds();
     const double by_tilt = kGravityMps2 * seconds * seconds / 4.0;
     return variance_factor_ * covariance +
@@ -365,11 +368,11 @@ class GapSmoother {
   std::vector<Eigen::Quaterniond> world_from_cams_;
   Eigen::Quaterniond near_from_far_ = Eigen::Quaterniond::Identity();
   Eigen::Matrix3d rotation_covariance_ = Eigen::Matrix3d::Zero();
-  Eigen::MatrixXd hessian_;
+  std::vector<Eigen::Triplet<double>> hessian_;
   Eigen::VectorXd right_;
   double squares_ = 0.0;
   int num_residuals_ = 0;
-  Eigen::LLT<Eigen::MatrixXd> factor_;
+  Eigen::SimplicialLLT<Eigen::SparseMatrix<double>> factor_;
   Eigen::VectorXd solution_;
   double variance_factor_ = 1.0;
 };

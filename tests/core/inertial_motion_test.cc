@@ -100,5 +100,23 @@ TEST(AddInertialLengths, OnlyToPriorsOfTheSameImagesWithoutLength) {
   EXPECT_EQ(AddInertialLengths({}, &priors), 0.0);
 }
 
+TEST(AddInertialLengths, BridgesAreMeasurementsOfTheirMotion) {
+  InertialLength length{1, 2, 1.5, 0.1, 0.02};
+  length.bridge = MeasuredTranslation{
+      {0.5, -1.0, 1.0}, Eigen::Vector3d(0.01, 0.02, 0.03).asDiagonal()};
+  std::vector<RelativePosePrior> priors = {MakePrior(1, 2, kPriorRotation),
+                                           MakePrior(2, 3, kPriorRotation)};
+  EXPECT_EQ(AddInertialLengths({length, {2, 3, 2.0, 0.1, 0.01}}, &priors),
+            0.02);
+  EXPECT_TRUE(priors[0].HasMotion());
+  EXPECT_TRUE(priors[0].HasOwnLength());
+  EXPECT_EQ(priors[0].cam2_from_cam1.translation, length.bridge->translation);
+  EXPECT_EQ(priors[0].covariance(5, 5), 0.03);
+  EXPECT_EQ(priors[0].covariance(0, 0), 1.0);
+  // Vision's.
+  EXPECT_TRUE(priors[1].HasLength());
+  EXPECT_FALSE(priors[1].HasOwnLength());
+}
+
 }  // namespace
 }  // namespace adasfm

@@ -123,7 +123,7 @@ class InertialLengthsTest : public PriorCorrectionsTest {
     for (size_t k = 0; k < tables_.priors.size(); ++k) {
       RelativePosePrior& prior = tables_.priors[k];
       lengths_.push_back(
-          {prior.image_id1, prior.image_id2, 1.0 + k, 0.1, 0.01 * (k + 1), {}});
+          {prior.image_id1, prior.image_id2, 1.0 + k, 0.1, 0.01 * (k + 1)});
       if (k == kBridge) lengths_.back().bridge = Bridge();
       if (k + 1 == tables_.priors.size()) break;
       prior.flags = kPriorRotation;

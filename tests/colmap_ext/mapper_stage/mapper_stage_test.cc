@@ -41,8 +41,7 @@ std::vector<InertialLength> LengthsOf(
         ComputeCam2FromCam1(cams_from_world.at(prior.image_id1),
                             cams_from_world.at(prior.image_id2))
             .translation.norm();
-    lengths.push_back(
-        {prior.image_id1, prior.image_id2, length_m, 0.0, 0.01, {}});
+    lengths.push_back({prior.image_id1, prior.image_id2, length_m, 0.0, 0.01});
     sum += length_m * length_m;
   }
   for (InertialLength& length : lengths) length.sigma_m = std::sqrt(sum);
