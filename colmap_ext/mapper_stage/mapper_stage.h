@@ -60,6 +60,9 @@ struct MapperStageSummary {
   bool is_georeferenced = false;
   // 1 sigma of the metres, as a ratio; 0 where nobody says.
   double scale_sigma = 0.0;
+  // The lengths of the priors became so much longer when the accelerometer
+  // measured the finished model.
+  double size_over_priors = 1.0;
   bool is_level = false;
   int num_parallel_parts = 0;
   // Of the biggest part, estimated before it runs.

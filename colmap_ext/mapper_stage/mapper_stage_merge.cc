@@ -244,6 +244,7 @@ void MapperStage::SetMetres(colmap::Reconstruction* model) {
             Eigen::Vector3d::Zero()),
       model);
   summary_.scale_sigma = scale->sigma_ratio;
+  summary_.size_over_priors = scale->metres_per_unit;
 }
 
 StatusOr<colmap::Reconstruction> MapperStage::Merge(bool require_all_parts) {

@@ -100,15 +100,16 @@ bool IsHeldByPoints(const colmap::Reconstruction& model, image_t image_id) {
 
 void AddPriorResiduals(const SceneData& data,
                        const colmap::Reconstruction& model,
-                       PriorResiduals* residuals) {
+                       double size_over_priors, PriorResiduals* residuals) {
   std::vector<TranslationResidual> translations;
   for (const RelativePosePrior& prior : data.priors) {
     if (!IsHeldByPoints(model, prior.image_id1) ||
         !IsHeldByPoints(model, prior.image_id2)) {
       continue;
     }
-    const Rigid3d motion = CamFromWorld(model.Image(prior.image_id2)) *
-                           CamFromWorld(model.Image(prior.image_id1)).Inverse();
+    Rigid3d motion = CamFromWorld(model.Image(prior.image_id2)) *
+                     CamFromWorld(model.Image(prior.image_id1)).Inverse();
+    motion.translation /= size_over_priors;
     if (prior.HasRotation()) {
       const double chi2 = Chi2(
           LogSo3(motion.rotation * prior.cam2_from_cam1.rotation.conjugate()),

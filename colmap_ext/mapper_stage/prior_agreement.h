@@ -35,10 +35,11 @@ struct PriorResiduals {
 // Adds those of the scene's priors between images of the model that points
 // hold; translations are of priors with direction and length [m], without the
 // rotation of the direction of driving that all of them share. That is an
-// unknown of the adjustment and no contradiction (shared_errors.h).
+// unknown of the adjustment and no contradiction (shared_errors.h), and no more
+// is size_over_priors, by which the finished model was made larger.
 void AddPriorResiduals(const SceneData& data,
                        const colmap::Reconstruction& model,
-                       PriorResiduals* residuals);
+                       double size_over_priors, PriorResiduals* residuals);
 
 // One entry for each kind that has residuals.
 std::vector<PriorAgreement> SummarizeAgreement(PriorResiduals residuals);

@@ -299,7 +299,8 @@ Verdict AssessModels(const std::vector<AssessedModel>& models,
   CollectFigures(models, &verdict);
   PriorResiduals residuals;
   for (const AssessedModel& model : models) {
-    AddPriorResiduals(*model.data, *model.model, &residuals);
+    AddPriorResiduals(*model.data, *model.model,
+                      model.summary->size_over_priors, &residuals);
   }
   verdict.priors = SummarizeAgreement(std::move(residuals));
   CollectLensErrors(models, &verdict);

@@ -360,6 +360,7 @@ TEST_F(WheelScaleTest, TheAccelerometerCorrectsIt) {
     const double size = RunSize(seed, 0.007);
     EXPECT_LT(summary_.scale_sigma, 0.004) << "seed " << seed;
     EXPECT_NEAR(size, 1.0, 3.0 * summary_.scale_sigma) << "seed " << seed;
+    EXPECT_NEAR(summary_.size_over_priors, 1.0 / kScale, 0.004);
   }
 }
 

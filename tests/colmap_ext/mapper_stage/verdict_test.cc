@@ -150,6 +150,10 @@ TEST_F(VerdictTest, WrongLengthsAreDoubtfulUnlessKeypointsWereLetGo) {
   ExpectResult(Assess(), VerdictResult::kDoubtful, "translations contradict");
   summary_.refine.keypoint_sigma_factor = 8.0;
   ExpectResult(Assess(), VerdictResult::kFailed, "translations contradict");
+  // Where the accelerometer said so, the model was made half as large.
+  summary_.refine.keypoint_sigma_factor = 1.0;
+  summary_.size_over_priors = 0.5;
+  ExpectResult(Assess(), VerdictResult::kGood, "");
 }
 
 // A camera's mounting that is off turns all directions of driving alike, which
