@@ -254,10 +254,11 @@ class GlobalStage {
   }
 
   // Once more where the accelerometer tells the way between parts of a drive
-  // without wheels: odometry then tests the loops between them, too.
+  // whose metres nothing else knows: odometry then tests the loops between
+  // them, too.
   void EstimateModelsAcrossGaps() {
     if (scene_.inertial_motions.empty() || HasLengths(scene_.priors) ||
-        !scene_.positions.empty()) {
+        HasLengths(scene_.frame_priors) || !scene_.positions.empty()) {
       return;
     }
     Begin("gaps", 0.8);
