@@ -8,6 +8,7 @@
 #include <memory>
 #include <utility>
 
+#include "colmap_ext/bags/camera_from_info.h"
 #include "colmap_ext/bags/decode_image.h"
 #include "colmap_ext/bags/write_bag_logs.h"
 #include "colmap_ext/io/output_files.h"
@@ -116,21 +117,21 @@ Status BagExtractor::WriteCalibration() {
 }
 
 Status BagExtractor::WriteCamera() {
-  std::string cause = "no CameraInfo beside it";
-  CameraText camera;
+  StatusOr<CalibratedCamera> camera = Status::Error("no CameraInfo beside it");
   if (logs_.camera_info.has_value()) {
     const bool is_rectified =
         topics_.image->name.find("rect") != std::string::npos;
-    cause = CameraFromInfo(*logs_.camera_info, is_rectified, &camera);
+    camera = CameraFromInfo(*logs_.camera_info, is_rectified);
   }
-  if (!cause.empty()) {
+  if (!camera.ok()) {
     AddMissing("the camera's intrinsics (" + topics_.image->name + ": " +
-               cause + "; they are guessed unless --camera_params gives them)");
+               camera.status().message() +
+               "; they are guessed unless --camera_params gives them)");
     return Status::Ok();
   }
-  camera_model_ = camera.model;
+  camera_model_ = camera->model;
   return WriteTextFile(folder_ + "/" + kCameraFile,
-                       camera.model + " " + camera.params + "\n");
+                       camera->model + " " + camera->params + "\n");
 }
 
 Status BagExtractor::WritePhoto(const BagMessage& message,

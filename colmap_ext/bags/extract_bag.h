@@ -5,8 +5,8 @@
 #include <string>
 #include <vector>
 
-#include "colmap_ext/bags/camera_from_info.h"
 #include "colmap_ext/bags/select_photos.h"
+#include "colmap_ext/datasets/calibrated_camera.h"
 #include "core/progress.h"
 #include "core/sensor_log.h"
 #include "core/status.h"
@@ -32,7 +32,7 @@ struct BagFiles {
   std::string wheel_path;        // wheel.csv
   std::string gnss_path;         // gnss.csv
   std::string sensors_path;      // sensors.yaml: mounting from /tf_static
-  CameraText camera;             // camera.txt: from CameraInfo
+  CalibratedCamera camera;       // camera.txt: from CameraInfo
 };
 
 struct BagExtraction {

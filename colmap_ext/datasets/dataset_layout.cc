@@ -49,9 +49,15 @@ Rigid3d RigidFromNumbers(const std::vector<double>& numbers,
                  Eigen::Vector3d(matrix.topRightCorner<3, 1>()));
 }
 
-void SetCamera(const CalibratedCamera& camera, DatasetLayout* layout) {
-  layout->camera_model = camera.model;
-  layout->camera_params = camera.params;
+void SetCamera(const StatusOr<CalibratedCamera>& camera,
+               const std::string& path, DatasetLayout* layout) {
+  if (!camera.ok()) {
+    throw std::runtime_error(
+        path + ": the camera cannot be used: " + camera.status().message() +
+        "; give --camera_model and --camera_params without --data_format");
+  }
+  layout->camera_model = camera->model;
+  layout->camera_params = camera->params;
 }
 
 // DSO's format: "Pinhole fx fy cx cy 0" or "EquiDistant fx fy cx cy k1..k4",
@@ -76,8 +82,8 @@ void ReadDsoCamera(const std::string& path, DatasetLayout* layout) {
     distortion.assign(numbers.begin() + 4, numbers.end());
   }
   SetCamera(CameraOfCalibration(model == "Pinhole" ? "none" : "equidistant",
-                                intrinsics, distortion, path),
-            layout);
+                                intrinsics, distortion),
+            path, layout);
 }
 
 }  // namespace
@@ -96,9 +102,8 @@ StatusOr<DatasetLayout> FindEurocLayout(const std::string& root) {
           ReadValue<std::string>(camera, "distortion_model", camera_path),
           ReadValue<std::vector<double>>(camera, "intrinsics", camera_path),
           ReadValue<std::vector<double>>(camera, "distortion_coefficients",
-                                         camera_path),
-          camera_path),
-      &layout);
+                                         camera_path)),
+      camera_path, &layout);
   if (!PathExists(mav + "/imu0/data.csv")) return layout;
   layout.imu_path = mav + "/imu0/data.csv";
   const std::string imu_path = mav + "/imu0/sensor.yaml";

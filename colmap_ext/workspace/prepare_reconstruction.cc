@@ -59,19 +59,22 @@ Status ApplyLayout(AutomaticReconstructionOptions* options,
 }
 
 // Of the calibration of the sensors, where nobody says another one.
-void UseSensorsCamera(const std::string& sensors_path,
-                      FeatureOptions* features) {
+Status UseSensorsCamera(const std::string& sensors_path,
+                        FeatureOptions* features) {
   if (sensors_path.empty() || !features->camera_params.empty() ||
       features->camera_model != FeatureOptions().camera_model) {
-    return;
+    return Status::Ok();
   }
-  const std::optional<CalibratedCamera> camera =
+  const StatusOr<std::optional<CalibratedCamera>> read =
       ReadSensorsCamera(sensors_path);
-  if (!camera) return;
+  if (!read.ok()) return read.status();
+  const std::optional<CalibratedCamera>& camera = *read;
+  if (!camera) return Status::Ok();
   features->camera_model = camera->model;
   features->camera_params = camera->params;
   features->camera_width_px = camera->width_px;
   features->camera_height_px = camera->height_px;
+  return Status::Ok();
 }
 
 }  // namespace
@@ -92,7 +95,9 @@ Status PrepareReconstruction(AutomaticReconstructionOptions* options,
     return Status::Error(
         "sensor logs need the calibration of the sensors; give --sensors_path");
   }
-  UseSensorsCamera(paths->sensors_path, &options->features);
+  const Status camera_status =
+      UseSensorsCamera(paths->sensors_path, &options->features);
+  if (!camera_status.ok()) return camera_status;
   options->pairs.image_times_path = paths->image_times_path;
   options->priors.max_memory_gb = options->max_memory_gb;
   options->global.max_memory_gb = options->max_memory_gb;

@@ -135,10 +135,10 @@ RosCameraInfo Info(const std::string& model,
 TEST(CameraFromInfo, ModelsOfRosBecomeColmaps) {
   const auto expect = [](const RosCameraInfo& info, bool is_rectified,
                          const std::string& model, const std::string& params) {
-    CameraText camera;
-    EXPECT_EQ(CameraFromInfo(info, is_rectified, &camera), "");
-    EXPECT_EQ(camera.model, model);
-    EXPECT_EQ(camera.params, params);
+    const auto camera = CameraFromInfo(info, is_rectified);
+    ASSERT_TRUE(camera.ok()) << camera.status().message();
+    EXPECT_EQ(camera->model, model);
+    EXPECT_EQ(camera->params, params);
   };
   expect(Info("plumb_bob", {0, 0, 0, 0, 0}), false, "PINHOLE",
          "500,510,320.5,240.5");
@@ -150,22 +150,25 @@ TEST(CameraFromInfo, ModelsOfRosBecomeColmaps) {
          "FULL_OPENCV", "500,510,320.5,240.5,1,2,3,4,5,6,7,8");
   expect(Info("equidistant", {1, 2, 3, 4}), false, "OPENCV_FISHEYE",
          "500,510,320.5,240.5,1,2,3,4");
+  // Without distortion a fisheye is no pinhole.
+  expect(Info("equidistant", {0, 0, 0, 0}), false, "OPENCV_FISHEYE",
+         "500,510,320.5,240.5,0,0,0,0");
   expect(Info("plumb_bob", {1, 2, 3, 4, 5}), true, "PINHOLE",
          "400,410,310.5,230.5");
 }
 
 TEST(CameraFromInfo, WhatCannotBeUsedIsNamed) {
-  CameraText camera;
+  const auto cause = [](const RosCameraInfo& info) {
+    return CameraFromInfo(info, false).status().message();
+  };
   RosCameraInfo info = Info("plumb_bob", {});
   info.k.fill(0.0);
-  EXPECT_THAT(CameraFromInfo(info, false, &camera), HasSubstr("uncalibrated"));
+  EXPECT_THAT(cause(info), HasSubstr("uncalibrated"));
   info = Info("plumb_bob", {});
   info.binning_x = 2;
-  EXPECT_THAT(CameraFromInfo(info, false, &camera), HasSubstr("binning"));
-  EXPECT_THAT(CameraFromInfo(Info("omni", {1, 2, 3, 4}), false, &camera),
-              HasSubstr("'omni'"));
-  EXPECT_THAT(CameraFromInfo(Info("equidistant", {1}), false, &camera),
-              HasSubstr("4 coefficients"));
+  EXPECT_THAT(cause(info), HasSubstr("binning"));
+  EXPECT_THAT(cause(Info("omni", {1, 2, 3, 4})), HasSubstr("'omni'"));
+  EXPECT_THAT(cause(Info("equidistant", {1})), HasSubstr("4 coefficients"));
 }
 
 // 1 m/s for 10 s with a photo each 0.1 s, the last 5 s at rest but for a turn

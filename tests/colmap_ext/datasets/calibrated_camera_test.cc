@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "colmap_ext/datasets/calibrated_camera.h"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "tests/testing/colmap_ext/temporary_folder.h"
@@ -10,9 +11,14 @@ namespace {
 
 class SensorsCameraTest : public testing::Test {
  protected:
-  std::optional<CalibratedCamera> Read(const std::string& text) {
+  StatusOr<std::optional<CalibratedCamera>> TryRead(const std::string& text) {
     folder_.Write("sensors.yaml", text);
     return ReadSensorsCamera(folder_.File("sensors.yaml"));
+  }
+  std::optional<CalibratedCamera> Read(const std::string& text) {
+    const auto camera = TryRead(text);
+    EXPECT_TRUE(camera.ok()) << camera.status().message();
+    return camera.ok() ? *camera : std::nullopt;
   }
 
   TemporaryFolder folder_;
@@ -43,21 +49,48 @@ TEST_F(SensorsCameraTest, DistortionsGoToTheirModels) {
       "distortion_coeffs: [0.25, -0.5, 0.125, 0]}");
   ASSERT_TRUE(camera.has_value());
   EXPECT_EQ(camera->model, "OPENCV_FISHEYE");
+  // OpenCV's own calibration has five.
+  camera = Read(
+      "cam0: {intrinsics: [500, 500, 320, 240], distortion_model: radtan, "
+      "distortion_coeffs: [0.25, -0.5, 0.125, 0, 0.0625]}");
+  ASSERT_TRUE(camera.has_value());
+  EXPECT_EQ(camera->model, "FULL_OPENCV");
+  EXPECT_EQ(camera->params,
+            "500,500,320.5,240.5,0.25,-0.5,0.125,0,0.0625,0,0,0");
 }
 
-// Photos of another camera, another model, or no intrinsics: as without.
+// Photos of another camera, no intrinsics, no file: as without.
 TEST_F(SensorsCameraTest, WhatItDoesNotKnowIsLeftOut) {
   const std::string pinhole = "intrinsics: [500, 500, 320, 240]";
   EXPECT_TRUE(Read("cam0: {" + pinhole + "}").has_value());
   EXPECT_FALSE(Read("cam0: {" + pinhole + "}\ncam1: {" + pinhole + "}"));
   EXPECT_FALSE(Read("cam0: {timeshift_cam_imu: 0.0}"));
-  EXPECT_FALSE(Read("cam0: {camera_model: omni, " + pinhole + "}"));
-  EXPECT_FALSE(Read("cam0: {" + pinhole +
-                    ", distortion_model: fov, distortion_coeffs: [1]}"));
-  EXPECT_FALSE(Read("cam0: {intrinsics: [500, 320, 240]}"));
-  EXPECT_FALSE(Read("cam0: {intrinsics: [500, many, 320, 240]}"));
   EXPECT_FALSE(Read("cam0: ["));
-  EXPECT_FALSE(ReadSensorsCamera(folder_.File("none.yaml")));
+  EXPECT_FALSE(*ReadSensorsCamera(folder_.File("none.yaml")));
+}
+
+// A focal length guessed in its place would spoil the model without a word.
+TEST_F(SensorsCameraTest, WhatIsWrongWithItIsSaid) {
+  const std::string pinhole = "intrinsics: [500, 500, 320, 240]";
+  const auto expect = [this](const std::string& cam0, const std::string& why) {
+    const auto camera = TryRead("cam0: {" + cam0 + "}");
+    ASSERT_FALSE(camera.ok()) << cam0;
+    EXPECT_THAT(camera.status().message(), testing::HasSubstr(why));
+    EXPECT_THAT(camera.status().message(), testing::HasSubstr("sensors.yaml"));
+    EXPECT_THAT(camera.status().message(),
+                testing::HasSubstr("--camera_params"));
+  };
+  expect("camera_model: omni, " + pinhole, "'omni'");
+  expect(pinhole + ", distortion_model: fov, distortion_coeffs: [1]", "'fov'");
+  expect(pinhole + ", distortion_coeffs: [1, 0, 0, 0]", "no model");
+  expect(pinhole + ", distortion_model: radtan, distortion_coeffs: [1, 0]",
+         "coefficients");
+  expect(pinhole + ", distortion_model: radtan, distortion_coeffs: -0.2",
+         "distortion_coeffs");
+  expect(pinhole + ", resolution: [640]", "resolution");
+  expect("intrinsics: [500, 320, 240]", "fu, fv, cu, cv");
+  expect("intrinsics: [500, many, 320, 240]", "intrinsics");
+  expect("intrinsics: [0, 0, 0, 0]", "uncalibrated");
 }
 
 }  // namespace

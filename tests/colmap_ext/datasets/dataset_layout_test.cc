@@ -145,7 +145,7 @@ TEST_F(LayoutTest, Euroc) {
   Write("r/mav0/cam0/sensor.yaml",
         "distortion_model: fov\nintrinsics: [1, 1, 0, 0]\n"
         "distortion_coefficients: [1, 0, 0, 0]\n");
-  ExpectError("euroc", "r", "distortion_model = fov");
+  ExpectError("euroc", "r", "distortion model 'fov'");
   Write("r/mav0/cam0/sensor.yaml", "T_BS: [1, 2\n");
   ExpectError("euroc", "r", "cam0/sensor.yaml");
 }
