@@ -84,7 +84,9 @@ class WheelYawFit {
                              .segment<2>(ChainGlobals::kLoggedYaw)
                              .cwiseAbs2()
                              .cwiseInverse();
+    // From none on: long slips turn least squares of all by tens of degrees.
     scale_ = Scale();
+    UpdateWeights();
     for (int round = 0; round < kNumRounds; ++round) {
       Solve();
       scale_ = Scale();
@@ -177,6 +179,29 @@ class WheelYawFit {
   Eigen::Matrix2d covariance_ = Eigen::Matrix2d::Zero();
 };
 
+// Wheels that no camera sees slip as often as those that are seen: links of no
+// seen turn err by the mean square of what slips turn too much.
+void AddUnseenSlips(const std::vector<SeenTurn>& seen,
+                    const std::set<size_t>& slips, const WheelYawFit& fit,
+                    OdometryFusionProblem* problem) {
+  double sum = 0.0;
+  std::set<size_t> seen_links;
+  for (const SeenTurn& turn : seen) {
+    seen_links.insert(turn.first_link);
+    if (slips.count(turn.first_link)) sum += std::pow(fit.Residual(turn), 2);
+  }
+  const double variance = sum / seen.size();
+  for (size_t k = 0; k < problem->links.size(); ++k) {
+    OdometryLink& link = problem->links[k];
+    if (link.has_imu || !link.has_wheel_yaw || seen_links.count(k)) continue;
+    link.wheel.yaw_variance += variance;
+    // The way turns by half of it on average.
+    link.wheel.covariance += 0.25 * variance * link.wheel.distance_m *
+                             link.wheel.distance_m *
+                             Eigen::Matrix3d::Identity();
+  }
+}
+
 // Links that only cameras see turn as those of three images agree they do.
 void TakeVisualRotations(const std::vector<TimedRotation>& rotations,
                          timestamp_t timeshift_ns,
@@ -240,6 +265,7 @@ int UseSeenWheelYaw(const std::vector<TimedRotation>& rotations,
     problem->links[k].has_wheel = false;
     problem->links[k].has_wheel_yaw = false;
   }
+  AddUnseenSlips(seen, slips, fit, problem);
   TakeVisualRotations(rotations, timeshift_ns, cam_from_imu, timeline,
                       fit.scale_rad(), options.slip_threshold_sigma, problem);
   return static_cast<int>(slips.size());

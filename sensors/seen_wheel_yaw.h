@@ -22,11 +22,12 @@ namespace adasfm {
 // (wheel_yaw_prior). A link beyond slip_threshold_sigma slips, unless wheels
 // and cameras agree over it and a neighbour together (then the image between
 // errs): nothing is known of its motion, its length included; more than a fifth
-// of the links are no slips, and left as they are. Links without wheels, these
-// among them, turn as cameras saw, where the rotations among three images agree
-// (rotation_triples.h). Vision has no other part in these priors, since it is
-// used again later.
-// On failure: fewer than 20 links change nothing.
+// of the links are no slips, and left as they are. Links that no camera sees
+// get the mean square, over all seen links, of what slips turn too much. Links
+// without wheels, the slips among them, turn as cameras saw, where the
+// rotations among three images agree (rotation_triples.h). Vision has no other
+// part in these priors, since it is used again later. On failure: fewer than 20
+// links change nothing.
 //
 // Returns the number of links that slip.
 int UseSeenWheelYaw(const std::vector<TimedRotation>& rotations,

@@ -47,6 +47,17 @@ double SummedYawSigma(double vision_sigma_rad, const SyntheticWorld& world,
       of_wheels);
 }
 
+// The right wheel turns too fast for a second from this image on.
+void Slip(size_t image, double ratio, Dataset* data) {
+  const timestamp_t begin_ns = data->images[image].timestamp_ns;
+  for (WheelSample& sample : data->logs.wheel) {
+    if (sample.timestamp_ns >= begin_ns &&
+        sample.timestamp_ns < begin_ns + 1'000'000'000) {
+      sample.second *= 1.0 + ratio;
+    }
+  }
+}
+
 // One wheel that slips turns the log by tens of degrees: faster than any tyre
 // holds, or, at a smaller slip, so that without the IMU only cameras can tell.
 TEST(SeenWheelYaw, WheelsThatSlipWithoutAnImuAreFound) {
@@ -57,15 +68,10 @@ TEST(SeenWheelYaw, WheelsThatSlipWithoutAnImuAreFound) {
         SimulateVision(world, seed, {5e-3, 1});
     const auto estimate = [&](double slip,
                               const std::vector<VisualRotation>& rotations) {
-      SensorLogs logs = data.logs;
-      const timestamp_t begin_ns = data.images[40].timestamp_ns;
-      for (WheelSample& sample : logs.wheel) {
-        if (sample.timestamp_ns >= begin_ns &&
-            sample.timestamp_ns < begin_ns + 1'000'000'000) {
-          sample.second *= 1.0 + slip;
-        }
-      }
-      return EstimatePriors(data.images, logs, data.calibration, rotations, {})
+      Dataset slipping = data;
+      Slip(40, slip, &slipping);
+      return EstimatePriors(data.images, slipping.logs, data.calibration,
+                            rotations, {})
           .value();
     };
     const auto chi2 = [&](const PriorEstimate& estimate) {
@@ -136,6 +142,82 @@ TEST(SeenWheelYaw, CamerasSeeWhatWheelsTurnAlike) {
                                  SummedYawSigma(0.0, world, data)))
           << "seed " << seed;
     }
+  }
+}
+
+// Many slips to one side are no curvature of the wheels.
+TEST(SeenWheelYaw, ManySlipsAlikeAreSlips) {
+  for (const uint64_t seed : {1, 2, 3}) {
+    const SyntheticWorld world = BuildSyntheticWorld(SmallWorld(seed, 200));
+    Dataset data = WheelsAlone(world);
+    for (const size_t image : {20, 50, 80, 110, 140, 170}) {
+      Slip(image, 0.15, &data);
+    }
+    const PriorEstimate estimate =
+        EstimatePriors(data.images, data.logs, data.calibration,
+                       SimulateVision(world, seed, {3e-3, 2}), {})
+            .value();
+    EXPECT_EQ(estimate.priors.size(), data.images.size() - 1);
+    EXPECT_LT(ComputePairErrors(estimate, data.cams_from_world).chi2, 1.25)
+        << "seed " << seed;
+    EXPECT_LT(SummedYawError(estimate, data),
+              3.0 * SummedYawSigma(3e-3, world, data))
+        << "seed " << seed;
+  }
+}
+
+// Wheels that slip where cameras see it slip where they do not, too; those that
+// never do are believed there as before.
+TEST(SeenWheelYaw, SlipsThatNoCameraSeesAreAllowedFor) {
+  constexpr size_t kFirst = 130, kLast = 150;  // no pairs between
+  for (const uint64_t seed : {1, 2, 3}) {
+    const SyntheticWorld world = BuildSyntheticWorld(SmallWorld(seed, 200));
+    Dataset data = WheelsAlone(world);
+    std::vector<VisualRotation> vision;
+    for (const VisualRotation& rotation :
+         SimulateVision(world, seed, {3e-3, 2})) {
+      const auto is_seen = [&](image_t image_id) {
+        return image_id <= data.images[kFirst].image_id ||
+               image_id >= data.images[kLast].image_id;
+      };
+      if (is_seen(rotation.image_id1) && is_seen(rotation.image_id2)) {
+        vision.push_back(rotation);
+      }
+    }
+    // Squares of the errors in sigmas, and the sigmas, of unseen turns.
+    double chi2 = 0.0, sigma_rad = 0.0;
+    const auto measure = [&] {
+      const PriorEstimate estimate =
+          EstimatePriors(data.images, data.logs, data.calibration, vision, {})
+              .value();
+      chi2 = sigma_rad = 0.0;
+      for (const RelativePosePrior& prior : estimate.priors) {
+        if (prior.image_id1 < data.images[kFirst].image_id ||
+            prior.image_id2 > data.images[kLast].image_id) {
+          continue;
+        }
+        const Rigid3d truth =
+            data.cams_from_world.at(prior.image_id2) *
+            data.cams_from_world.at(prior.image_id1).Inverse();
+        const double error =
+            LogSo3(prior.cam2_from_cam1.rotation * truth.rotation.conjugate())
+                .y();
+        chi2 += error * error / prior.covariance(1, 1) / (kLast - kFirst);
+        sigma_rad += std::sqrt(prior.covariance(1, 1)) / (kLast - kFirst);
+      }
+    };
+    measure();
+    const double sigma_without_rad = sigma_rad;
+    EXPECT_LT(chi2, 2.0) << "seed " << seed;
+    Slip(140, 0.15, &data);
+    measure();
+    EXPECT_NEAR(sigma_rad, sigma_without_rad, 0.1 * sigma_without_rad);
+    EXPECT_GT(chi2, 20.0) << "seed " << seed;
+    for (const size_t image : {20, 50, 80, 170}) Slip(image, 0.15, &data);
+    measure();
+    EXPECT_GT(sigma_rad, 5.0 * sigma_without_rad) << "seed " << seed;
+    // A fourth of the unseen time slips, a tenth of the seen.
+    EXPECT_LT(chi2, 2.0 * 2.5) << "seed " << seed;
   }
 }
 
