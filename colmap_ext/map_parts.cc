@@ -107,18 +107,6 @@ std::vector<std::string> ReadEarlierWarnings(const MapRequest& request) {
   return warnings;
 }
 
-// How well the wheels' unit is known (SensorSummary); none when nobody says.
-std::optional<double> ReadWheelScaleSigma(const MapRequest& request) {
-  const nlohmann::json json = ReadSummary(ImportSummaryPath(request));
-  if (!json.is_object() || !json.contains("wheel_scale_sigma") ||
-      !json["wheel_scale_sigma"].is_number()) {
-    return std::nullopt;
-  }
-  const double sigma = json["wheel_scale_sigma"].get<double>();
-  if (!(sigma > 0.0)) return std::nullopt;
-  return sigma;
-}
-
 // The stage's options for this scene's cameras.
 MapperStageOptions ResolveOptions(const MapOptions& options,
                                   const SceneData& scene) {
@@ -190,9 +178,6 @@ Verdict Assess(const MapRequest& request, const CoarseModels& coarse,
   Verdict verdict =
       AssessModels(assessed, coarse.rest, ReadEarlierWarnings(request));
   verdict.lost_images = std::move(lost);
-  if (verdict.metric_source == "wheels") {
-    verdict.metric_sigma = ReadWheelScaleSigma(request);
-  }
   return verdict;
 }
 

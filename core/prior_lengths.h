@@ -8,6 +8,14 @@
 
 namespace adasfm {
 
+// What an import found of the size of the lengths that wheels log.
+struct WheelScale {
+  double scale = 1.0;  // metres a logged metre
+  double sigma = 0.0;  // 1 sigma of it
+  // Believed of 1 before any other sensor was asked.
+  double stated_sigma = 0.0;
+};
+
 // Whether any of the priors knows a length, and with it the metre.
 inline bool HasLengths(const std::vector<RelativePosePrior>& priors) {
   return std::any_of(

@@ -39,7 +39,10 @@ void CreateTables(SqliteConnection* database) {
       "covariance BLOB NOT NULL);"
       "CREATE TABLE IF NOT EXISTS adasfm_length_drift ("
       "image_id INTEGER PRIMARY KEY NOT NULL, name TEXT NOT NULL, "
-      "sigma_ratio REAL NOT NULL);");
+      "sigma_ratio REAL NOT NULL);"
+      "CREATE TABLE IF NOT EXISTS adasfm_wheel_scale ("
+      "image_id INTEGER PRIMARY KEY NOT NULL, name TEXT NOT NULL, "
+      "scale REAL NOT NULL, sigma REAL NOT NULL, stated_sigma REAL NOT NULL);");
 }
 
 void WriteImageTimes(const ImageNames& names,
@@ -132,6 +135,20 @@ void WriteLengthDrift(const ImageNames& names, const PriorTables& tables,
   statement.Step();
 }
 
+void WriteWheelScale(const ImageNames& names, const PriorTables& tables,
+                     SqliteConnection* database) {
+  if (!tables.wheel_scale || tables.priors.empty()) return;
+  const image_t image_id = tables.priors.front().image_id1;
+  SqliteStatement statement(
+      database, "INSERT INTO adasfm_wheel_scale VALUES (?, ?, ?, ?, ?)");
+  statement.BindInt(1, image_id);
+  statement.BindText(2, names.Name(image_id));
+  statement.BindDouble(3, tables.wheel_scale->scale);
+  statement.BindDouble(4, tables.wheel_scale->sigma);
+  statement.BindDouble(5, tables.wheel_scale->stated_sigma);
+  statement.Step();
+}
+
 void WritePositionOrigin(const std::optional<GeodeticPosition>& origin,
                          SqliteConnection* database) {
   database->Execute("DELETE FROM adasfm_meta WHERE key = 'position_origin'");
@@ -181,13 +198,15 @@ Status WritePriorTables(const std::string& database_path,
         "DELETE FROM adasfm_gravity;"
         "DELETE FROM adasfm_position_priors;"
         "DELETE FROM adasfm_gyroscope_bias;"
-        "DELETE FROM adasfm_length_drift;");
+        "DELETE FROM adasfm_length_drift;"
+        "DELETE FROM adasfm_wheel_scale;");
     WriteImageTimes(names, tables.image_times, &database);
     WritePriors(names, tables.priors, &database);
     WriteGravity(names, tables.gravity, &database);
     WritePositions(names, tables.positions, &database);
     WriteGyroscopeBias(names, tables, &database);
     WriteLengthDrift(names, tables, &database);
+    WriteWheelScale(names, tables, &database);
     WriteInertialMotions(names, tables.inertial_motions, &database);
     WritePositionOrigin(tables.position_origin, &database);
     WriteRigCameras(tables.rig_cameras, &database);

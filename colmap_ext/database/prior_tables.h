@@ -10,6 +10,7 @@
 #include "core/camera_rig.h"
 #include "core/inertial_motion.h"
 #include "core/position_prior.h"
+#include "core/prior_lengths.h"
 #include "core/relative_pose_prior.h"
 #include "core/sqlite.h"
 #include "core/status.h"
@@ -49,6 +50,8 @@ struct PriorTables {
   // 1 sigma of the error that the lengths of neighbouring priors share, as a
   // ratio; 0 where nothing shows one, and in databases of before it.
   double length_drift_ratio = 0.0;
+  // None without wheels, in databases of before it, and of merged imports.
+  std::optional<WheelScale> wheel_scale;
   // Of imports with an IMU: consecutive images, in order of time.
   std::vector<InertialMotion> inertial_motions;
   // Of one rig of several cameras; all known. Written here, and read by

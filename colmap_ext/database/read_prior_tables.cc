@@ -220,6 +220,27 @@ void ReadLengthDrift(SqliteConnection* database, PriorTables* tables) {
   }
 }
 
+// Of several imports each has its own.
+void ReadWheelScale(SqliteConnection* database, PriorTables* tables) {
+  if (!database->HasTable("adasfm_wheel_scale")) return;
+  SqliteStatement statement(
+      database,
+      "SELECT name, scale, sigma, stated_sigma FROM adasfm_wheel_scale");
+  int num_rows = 0;
+  while (statement.Step()) {
+    const WheelScale scale = {statement.Double(1), statement.Double(2),
+                              statement.Double(3)};
+    for (const double value : {scale.scale, scale.sigma, scale.stated_sigma}) {
+      if (std::isfinite(value) && value > 0.0) continue;
+      throw SqliteError("table adasfm_wheel_scale, image " + statement.Text(0) +
+                        ": values that are not positive");
+    }
+    tables->wheel_scale = scale;
+    ++num_rows;
+  }
+  if (num_rows > 1) tables->wheel_scale.reset();
+}
+
 void ReadPositionOrigin(SqliteConnection* database, PriorTables* tables) {
   if (!database->HasTable("adasfm_meta")) return;
   SqliteStatement statement(
@@ -259,6 +280,7 @@ LoadedPriorTables ReadPriorTables(SqliteConnection* database) {
   ReadPositions(names, database, &loaded);
   ReadGyroscopeBias(database, &loaded.tables);
   ReadLengthDrift(database, &loaded.tables);
+  ReadWheelScale(database, &loaded.tables);
   loaded.tables.inertial_motions =
       ReadInertialMotions(names, database, &loaded.num_ignored_rows);
   ReadPositionOrigin(database, &loaded.tables);

@@ -58,8 +58,8 @@ struct MapperStageSummary {
   // frame the model then has.
   bool has_metric_sensors = false;
   bool is_georeferenced = false;
-  // 1 sigma of the unit, as a ratio, where the accelerometer tells it; else 0.
-  double inertial_scale_sigma = 0.0;
+  // 1 sigma of the metres, as a ratio; 0 where nobody says.
+  double scale_sigma = 0.0;
   // The lengths of the priors became so much longer when the accelerometer
   // measured the finished model.
   double size_over_priors = 1.0;
@@ -133,7 +133,7 @@ class MapperStage {
   std::unique_ptr<MapperScene> BuildWholeScene(bool with_matches) const;
   // Takes the merged model through the rounds that are left.
   Status RefineMerged(const std::string& fingerprint, MergeCheckpoint* merged);
-  void SetInertialUnit(colmap::Reconstruction* model);
+  void SetMetres(colmap::Reconstruction* model);
   // So that the result is never worse than the prior trajectory.
   void FallBackToCoarsePoses(std::unique_ptr<MapperScene>* scene);
 

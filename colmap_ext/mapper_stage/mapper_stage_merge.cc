@@ -14,6 +14,7 @@
 #include "colmap_ext/scene/align_to_gravity.h"
 #include "colmap_ext/scene/keep_inertial_unit.h"
 #include "core/median.h"
+#include "core/prior_lengths.h"
 #include "core/release_memory.h"
 #include "core/sim3d.h"
 #include "core/stopwatch.h"
@@ -21,6 +22,28 @@
 
 namespace adasfm {
 namespace {
+
+// The importer has every reading of the log, and its size is the better one
+// where both are alike. Where it is much less certain it leaned on tilts that
+// vision knows better: slow machines, short of accelerations.
+constexpr double kMaxSigmaOverImporter = 0.6;
+
+// The size of a model in the wheels' metres by what is stated of the wheels and
+// by the accelerometer. What the importer found of both stays out: it counts
+// the accelerometer already.
+InertialScale CombineWithWheels(const WheelScale& wheels,
+                                const InertialScale& inertial) {
+  const double weight = 1.0 / (wheels.stated_sigma * wheels.stated_sigma);
+  const double inertial_weight =
+      1.0 / (inertial.sigma_ratio * inertial.sigma_ratio);
+  InertialScale scale;
+  scale.metres_per_unit =
+      std::exp((inertial_weight * std::log(inertial.metres_per_unit) -
+                weight * std::log(wheels.scale)) /
+               (inertial_weight + weight));
+  scale.sigma_ratio = 1.0 / std::sqrt(inertial_weight + weight);
+  return scale;
+}
 
 // The unit of thresholds where metres are unknown.
 double ComputeNeighborDistance(const SceneData& data,
@@ -188,25 +211,40 @@ Status MapperStage::RefineMerged(const std::string& fingerprint,
   return Status::Ok();
 }
 
-// The accelerometer, which has part in the final shape, tells its size better
-// than that of the coarse model, whose metres stay where it does not. What that
-// shape and the accelerometer differ by does not tell how well: the adjustment
-// does.
-void MapperStage::SetInertialUnit(colmap::Reconstruction* model) {
-  summary_.inertial_scale_sigma = data_.inertial_scale_sigma;
-  if (!(data_.inertial_scale_sigma > 0.0)) return;
-  KeepInertialUnit(data_.priors, model);
-  const std::optional<InertialScale> scale =
+// The accelerometer tells the size of the final shape, in which it has part,
+// better than that of the coarse model, and of slow machines better than the
+// importer. What the shape and the accelerometer differ by does not tell how
+// well: the adjustment does. The metres that the model has stay where this is
+// less certain.
+void MapperStage::SetMetres(colmap::Reconstruction* model) {
+  const bool is_by_wheels = !(data_.inertial_scale_sigma > 0.0);
+  if (is_by_wheels) {
+    if (!data_.wheel_scale || summary_.is_georeferenced ||
+        HasLengths(data_.frame_priors)) {
+      return;
+    }
+    summary_.scale_sigma = data_.wheel_scale->sigma / data_.wheel_scale->scale;
+  } else {
+    summary_.scale_sigma = data_.inertial_scale_sigma;
+    KeepInertialUnit(data_.priors, model);
+  }
+  if (!(summary_.refine.unit_sigma > 0.0)) return;
+  std::optional<InertialScale> scale =
       EstimateInertialScale(data_.inertial_motions, CamsFromWorld(*model));
-  if (!scale || !(summary_.refine.unit_sigma > 0.0)) return;
-  const double sigma =
+  if (!scale) return;
+  scale->sigma_ratio =
       std::hypot(scale->sigma_ratio, summary_.refine.unit_sigma);
-  if (sigma >= data_.inertial_scale_sigma) return;
+  double max_sigma = summary_.scale_sigma;
+  if (is_by_wheels) {
+    scale = CombineWithWheels(*data_.wheel_scale, *scale);
+    max_sigma *= kMaxSigmaOverImporter;
+  }
+  if (scale->sigma_ratio >= max_sigma) return;
   TransformReconstruction(
       Sim3d(scale->metres_per_unit, Eigen::Quaterniond::Identity(),
             Eigen::Vector3d::Zero()),
       model);
-  summary_.inertial_scale_sigma = sigma;
+  summary_.scale_sigma = scale->sigma_ratio;
   summary_.size_over_priors = scale->metres_per_unit;
 }
 
@@ -236,7 +274,7 @@ StatusOr<colmap::Reconstruction> MapperStage::Merge(bool require_all_parts) {
   const Stopwatch refine_watch;
   status = RefineMerged(fingerprint, &*merged);
   if (!status.ok()) return status;
-  SetInertialUnit(&model);
+  SetMetres(&model);
   summary_.is_level =
       summary_.is_georeferenced || AlignToGravity(data_, &model);
   summary_.refine_seconds = refine_watch.Seconds();

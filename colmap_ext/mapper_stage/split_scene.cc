@@ -105,6 +105,7 @@ SplitSceneData SplitScene(const std::vector<CoarsePoseMap>& coarse_models,
     component.rigs.cameras = scene.rigs.cameras;
     component.position_origin = scene.position_origin;
     component.length_drift_ratio = scene.length_drift_ratio;
+    component.wheel_scale = scene.wheel_scale;
     component.inertial_scale_sigma = scene.inertial_scale_sigma;
   }
   split.rest.cameras = std::move(scene.cameras);

@@ -279,7 +279,7 @@ void CollectFigures(const std::vector<AssessedModel>& models,
   verdict->is_metric = verdict->num_metric_models == verdict->num_models;
   verdict->metric_source = MetricSource(models);
   for (const AssessedModel& model : models) {
-    const double sigma = model.summary->inertial_scale_sigma;
+    const double sigma = model.summary->scale_sigma;
     if (sigma > verdict->metric_sigma.value_or(0.0)) {
       verdict->metric_sigma = sigma;
     }

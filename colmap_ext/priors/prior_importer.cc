@@ -422,6 +422,12 @@ StatusOr<PriorImport> ComputePriorImport(const PriorImportPaths& given_paths,
   import.tables.gyroscope_bias_covariance =
       BiasCovarianceInCam(estimate->summary, *calibration);
   import.tables.length_drift_ratio = estimate->summary.length_drift_ratio;
+  if (estimate->summary.wheel_scale_sigma > 0.0 &&
+      options.estimation.fusion.wheel_scale_sigma > 0.0) {
+    import.tables.wheel_scale = {estimate->summary.wheel_scale,
+                                 estimate->summary.wheel_scale_sigma,
+                                 options.estimation.fusion.wheel_scale_sigma};
+  }
   import.summary = std::move(estimate->summary);
   import.warnings.insert(import.warnings.end(), import.summary.warnings.begin(),
                          import.summary.warnings.end());

@@ -54,6 +54,7 @@ void ReadScenePriors(SqliteConnection* database,
   scene->priors = std::move(loaded.tables.priors);
   scene->gyroscope_bias_covariance = loaded.tables.gyroscope_bias_covariance;
   scene->length_drift_ratio = loaded.tables.length_drift_ratio;
+  scene->wheel_scale = loaded.tables.wheel_scale;
   scene->positions = std::move(loaded.tables.positions);
   scene->position_origin = loaded.tables.position_origin;
   scene->rigs = ReadCameraRigs(database);

@@ -12,6 +12,7 @@
 #include "core/camera_rig.h"
 #include "core/inertial_motion.h"
 #include "core/position_prior.h"
+#include "core/prior_lengths.h"
 #include "core/relative_pose_prior.h"
 #include "core/rigid3d.h"
 #include "core/status.h"
@@ -59,6 +60,7 @@ struct SceneData {
   // As in PriorTables; the priors share these errors.
   std::optional<Eigen::Matrix3d> gyroscope_bias_covariance;
   double length_drift_ratio = 0.0;
+  std::optional<WheelScale> wheel_scale;
   // As in PriorTables, of the camera as it is mounted; after adasfm_global only
   // where wheels measured lengths or it found metres by them.
   std::vector<InertialMotion> inertial_motions;

@@ -145,6 +145,7 @@ class MergeDatabasesTest : public testing::Test {
       motion.dt_s = 0.1 * i;
       tables.inertial_motions.push_back(motion);
     }
+    tables.wheel_scale = WheelScale{0.99, 0.002, 0.01};
     const Status status = WritePriorTables(path, tables);
     ASSERT_TRUE(status.ok()) << status.message();
   }
@@ -281,6 +282,9 @@ TEST_F(MergeDatabasesTest, SessionsAreKeptApartByTheirPrefixes) {
   for (const RelativePosePrior& prior : both->tables.priors) {
     EXPECT_EQ(prior.image_id1 <= kNumImages, prior.image_id2 <= kNumImages);
   }
+  // Wheels are of each session.
+  EXPECT_TRUE(one->tables.wheel_scale.has_value());
+  EXPECT_FALSE(both->tables.wheel_scale.has_value());
   // Each session's ids follow the order of its images.
   const auto& motions = both->tables.inertial_motions;
   ASSERT_EQ(motions.size(), 2 * one->tables.inertial_motions.size());

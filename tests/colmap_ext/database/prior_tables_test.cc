@@ -77,6 +77,8 @@ class PriorTablesTest : public testing::Test {
         [&random]() { return random.Gaussian(1e-3); });
     tables.gyroscope_bias_covariance = root * root.transpose();
     tables.length_drift_ratio = random.Uniform(0.001, 0.1);
+    tables.wheel_scale = WheelScale{random.Uniform(0.98, 1.02),
+                                    random.Uniform(0.001, 0.01), 0.01};
     // The last one has seen no translation.
     RelativePosePrior& last = tables.priors.back();
     last.flags = kPriorRotation;
@@ -152,6 +154,12 @@ void ExpectEqual(const PriorTables& a, const PriorTables& b) {
   }
   EXPECT_EQ(a.gyroscope_bias_covariance, b.gyroscope_bias_covariance);
   EXPECT_EQ(a.length_drift_ratio, b.length_drift_ratio);
+  ASSERT_EQ(a.wheel_scale.has_value(), b.wheel_scale.has_value());
+  if (a.wheel_scale) {
+    EXPECT_EQ(a.wheel_scale->scale, b.wheel_scale->scale);
+    EXPECT_EQ(a.wheel_scale->sigma, b.wheel_scale->sigma);
+    EXPECT_EQ(a.wheel_scale->stated_sigma, b.wheel_scale->stated_sigma);
+  }
   ASSERT_EQ(a.position_origin.has_value(), b.position_origin.has_value());
   if (!a.position_origin) return;
   EXPECT_EQ(a.position_origin->latitude_deg, b.position_origin->latitude_deg);
@@ -196,6 +204,7 @@ void PriorTablesTest::ExpectScene(bool has_lengths) {
     EXPECT_TRUE(scene->images.at(2).gravity_in_cam.has_value());
     EXPECT_TRUE(scene->gyroscope_bias_covariance.has_value());
     EXPECT_GT(scene->length_drift_ratio, 0.0);
+    EXPECT_TRUE(scene->wheel_scale.has_value());
     EXPECT_EQ(scene->inertial_motions.size(),
               is_before_global || has_lengths ? 5 : 0);
     EXPECT_EQ(scene->inertial_scale_sigma, 0.0);
@@ -206,9 +215,12 @@ void PriorTablesTest::ExpectScene(bool has_lengths) {
 TEST_F(PriorTablesTest, DatabasesWithoutSharedErrorsAreRead) {
   PriorTables tables = MakeTables(1);
   ASSERT_TRUE(WritePriorTables(path_, tables).ok());
-  Execute("DROP TABLE adasfm_gyroscope_bias; DROP TABLE adasfm_length_drift;");
+  Execute(
+      "DROP TABLE adasfm_gyroscope_bias; DROP TABLE adasfm_length_drift;"
+      "DROP TABLE adasfm_wheel_scale;");
   tables.gyroscope_bias_covariance.reset();
   tables.length_drift_ratio = 0.0;
+  tables.wheel_scale.reset();
   StatusOr<LoadedPriorTables> loaded = ReadPriorTables(path_);
   ASSERT_TRUE(loaded.ok()) << loaded.status().message();
   ExpectEqual(loaded->tables, tables);
@@ -351,6 +363,8 @@ TEST_F(PriorTablesTest, RefusesRowsItCouldNotHaveWritten) {
       "UPDATE adasfm_gyroscope_bias SET covariance = zeroblob(72);",
       "UPDATE adasfm_gyroscope_bias SET covariance = zeroblob(71);",
       "UPDATE adasfm_length_drift SET sigma_ratio = -0.01;",
+      "UPDATE adasfm_wheel_scale SET scale = 0.0;",
+      "UPDATE adasfm_wheel_scale SET stated_sigma = 9e999;",
       "UPDATE adasfm_inertial_motions SET dt_s = 0.0;",
       "UPDATE adasfm_inertial_motions SET dt_s = 9e999;",
       "UPDATE adasfm_inertial_motions SET delta_velocity = zeroblob(23);",

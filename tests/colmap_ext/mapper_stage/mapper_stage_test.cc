@@ -316,10 +316,57 @@ TEST_F(MapperStageTest, TheAccelerometerTellsTheSizeOfTheFinalModel) {
     const AlignedErrors errors =
         ComputeAlignedErrors(Run(world), world.true_poses, {});
     EXPECT_EQ(errors.num_images, 100);
-    EXPECT_LT(summary_.inertial_scale_sigma, 0.004) << "seed " << seed;
-    EXPECT_NEAR(errors.scale, 1.0, 3.0 * summary_.inertial_scale_sigma)
+    EXPECT_LT(summary_.scale_sigma, 0.004) << "seed " << seed;
+    EXPECT_NEAR(errors.scale, 1.0, 3.0 * summary_.scale_sigma)
         << "seed " << seed;
   }
+}
+
+// Wheels that the importer took for 2 % too short.
+class WheelScaleTest : public MapperStageTest {
+ protected:
+  static constexpr double kScale = 1.02;
+
+  // How far the model's size is off when the importer was this sure.
+  double RunSize(uint64_t seed, double sigma) {
+    MapperWorldOptions options;
+    options.world.num_images = 100;
+    options.world.seed = seed;
+    options.center_sigma_m = 0.02;
+    MapperWorld world = BuildMapperWorld(options);
+    InertialDriveOptions drive;
+    drive.noise = 0.005;
+    drive.seed = seed;
+    world.data.inertial_motions = IntegrateDrive(world, drive);
+    for (auto& [image_id, pose] : world.coarse_poses) {
+      pose.translation *= kScale;
+    }
+    for (size_t i = 0; i < world.data.priors.size(); ++i) {
+      RelativePosePrior& prior = world.data.priors[i];
+      prior.cam2_from_cam1.translation *= kScale;
+      world.data.inertial_motions[i].by_wheels =
+          MeasuredTranslation{prior.cam2_from_cam1.translation,
+                              prior.covariance.bottomRightCorner<3, 3>()};
+    }
+    world.data.wheel_scale = WheelScale{kScale, sigma, 0.01};
+    std::filesystem::remove_all(folder_);
+    return 1.0 / ComputeAlignedErrors(Run(world), world.true_poses, {}).scale;
+  }
+};
+
+// Its sigma is that of the accelerometer on the final shape.
+TEST_F(WheelScaleTest, TheAccelerometerCorrectsIt) {
+  for (const uint64_t seed : {1, 2, 3}) {
+    const double size = RunSize(seed, 0.007);
+    EXPECT_LT(summary_.scale_sigma, 0.004) << "seed " << seed;
+    EXPECT_NEAR(size, 1.0, 3.0 * summary_.scale_sigma) << "seed " << seed;
+    EXPECT_NEAR(summary_.size_over_priors, 1.0 / kScale, 0.004);
+  }
+}
+
+TEST_F(WheelScaleTest, StaysWhereItIsKnownBetter) {
+  EXPECT_NEAR(RunSize(1, 0.0005), kScale, 0.002);
+  EXPECT_NEAR(summary_.scale_sigma, 0.0005 / kScale, 1e-12);
 }
 
 // The ablations of the paper.

@@ -45,6 +45,7 @@ class SplitSceneTest : public testing::Test {
     scene_.position_origin = GeodeticPosition();
     scene_.length_drift_ratio = 0.01;
     scene_.inertial_scale_sigma = 0.02;
+    scene_.wheel_scale = WheelScale{0.99, 0.002, 0.01};
     for (const auto& [image_id1, image_id2] :
          std::vector<std::pair<image_t, image_t>>{
              {1, 2}, {2, 3}, {3, 5}, {5, 6}}) {
@@ -96,6 +97,7 @@ TEST_F(SplitSceneTest, EveryImageHasOneComponent) {
   EXPECT_TRUE(split.components[1].position_origin.has_value());
   EXPECT_EQ(split.components[1].length_drift_ratio, 0.01);
   EXPECT_EQ(split.components[1].inertial_scale_sigma, 0.02);
+  EXPECT_TRUE(split.components[1].wheel_scale.has_value());
   ASSERT_EQ(split.components[0].inertial_motions.size(), 2);
   EXPECT_EQ(split.components[0].inertial_motions[1].image_id2, 3);
   ASSERT_EQ(split.components[1].inertial_motions.size(), 1);
