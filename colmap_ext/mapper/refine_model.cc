@@ -268,12 +268,16 @@ class ModelRefiner {
       index_of_image.emplace(image_id, static_cast<int>(index_of_image.size()));
     }
     DisjointSets chains(images.size());
+    const auto join = [&](image_t image_id1, image_t image_id2) {
+      if (images.count(image_id1) == 0 || images.count(image_id2) == 0) return;
+      chains.Join(index_of_image.at(image_id1), index_of_image.at(image_id2));
+    };
     for (const RelativePosePrior& prior : scene_.priors) {
-      if (prior.HasMotion() && images.count(prior.image_id1) &&
-          images.count(prior.image_id2)) {
-        chains.Join(index_of_image.at(prior.image_id1),
-                    index_of_image.at(prior.image_id2));
-      }
+      if (prior.HasMotion()) join(prior.image_id1, prior.image_id2);
+    }
+    // The factors over three images hold those in between.
+    for (const InertialMotion& motion : FindInertialMotions()) {
+      join(motion.image_id1, motion.image_id2);
     }
     std::set<int> supported_chains;
     for (const image_t image_id : images) {

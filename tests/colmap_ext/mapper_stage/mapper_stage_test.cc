@@ -322,6 +322,40 @@ TEST_F(MapperStageTest, TheAccelerometerTellsTheSizeOfTheFinalModel) {
   }
 }
 
+// Photos of nothing in a drive by an IMU alone: the factors over three images
+// hold them. Its noise of 0.005 m/s^2 sqrt(s) moves the half second of two
+// photos by some millimetres, which two more on either side show.
+TEST_F(MapperStageTest, TheAccelerometerHoldsImagesWithoutPoints) {
+  for (const uint64_t seed : {1, 2, 3}) {
+    MapperWorldOptions options;
+    options.world.num_images = 100;
+    options.world.seed = seed;
+    options.world.num_blackouts = 1;
+    options.world.blackout_num_images = 2;
+    options.center_sigma_m = 0.02;
+    MapperWorld world = BuildMapperWorld(options);
+    InertialDriveOptions drive;
+    drive.noise = 0.005;
+    drive.seed = seed;
+    world.data.inertial_motions = IntegrateDrive(world, drive);
+    world.data.inertial_scale_sigma = 0.02;
+    LeaveToAnImu(&world);
+    std::filesystem::remove_all(folder_);
+    const std::map<image_t, Rigid3d> poses = Run(world);
+    EXPECT_EQ(poses.size(), 100) << "seed " << seed;
+    std::map<image_t, Rigid3d> around;
+    for (const auto& [image_id, image] : world.data.images) {
+      if (!image.keypoints.empty()) continue;
+      for (image_t near = image_id - 2; near <= image_id + 2; ++near) {
+        if (poses.count(near)) around.emplace(near, poses.at(near));
+      }
+    }
+    ASSERT_EQ(around.size(), 6) << "seed " << seed;
+    EXPECT_LT(ComputeAlignedErrors(around, world.true_poses, {}).max_m, 0.02)
+        << "seed " << seed;
+  }
+}
+
 // Wheels that the importer took for 2 % too short.
 class WheelScaleTest : public MapperStageTest {
  protected:
