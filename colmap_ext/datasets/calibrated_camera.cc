@@ -46,8 +46,9 @@ StatusOr<CalibratedCamera> CameraOfNode(const YAML::Node& cam) {
   if (!camera.ok()) return camera.status();
   const auto size = ReadField<std::vector<int>>(cam, "resolution", {0, 0});
   if (!size.ok()) return size.status();
-  if (size->size() != 2)
+  if (size->size() != 2) {
     return Status::Error("its resolution is not two sides");
+  }
   camera->width_px = size->front();
   camera->height_px = size->back();
   return camera;

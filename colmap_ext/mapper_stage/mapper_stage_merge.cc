@@ -24,8 +24,7 @@ namespace adasfm {
 namespace {
 
 // The importer has every reading of the log, and its size is the better one
-// where both are alike. Where it is much less certain it leaned on tilts that
-// vision knows better: slow machines, short of accelerations.
+// where both are about as certain. Of slow machines it is much less so.
 constexpr double kMaxSigmaOverImporter = 0.6;
 
 // The size of a model in the wheels' metres by what is stated of the wheels and
@@ -215,9 +214,10 @@ Status MapperStage::RefineMerged(const std::string& fingerprint,
 // better than that of the coarse model, and of slow machines better than the
 // importer. What the shape and the accelerometer differ by does not tell how
 // well: the adjustment does. The metres that the model has stay where this is
-// less certain.
+// less certain. A model that measured lengths hold has theirs, whatever the
+// coarse one had.
 void MapperStage::SetMetres(colmap::Reconstruction* model) {
-  const bool is_by_wheels = !(data_.inertial_scale_sigma > 0.0);
+  const bool is_by_wheels = HasMeasuredLengths(data_.priors);
   if (is_by_wheels) {
     if (!data_.wheel_scale || summary_.is_georeferenced ||
         HasLengths(data_.frame_priors)) {
@@ -225,6 +225,7 @@ void MapperStage::SetMetres(colmap::Reconstruction* model) {
     }
     summary_.scale_sigma = data_.wheel_scale->sigma / data_.wheel_scale->scale;
   } else {
+    if (!(data_.inertial_scale_sigma > 0.0)) return;
     summary_.scale_sigma = data_.inertial_scale_sigma;
     KeepInertialUnit(data_.priors, model);
   }

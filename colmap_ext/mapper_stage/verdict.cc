@@ -245,8 +245,10 @@ std::string MetricSource(const std::vector<AssessedModel>& models) {
   for (const AssessedModel& model : models) {
     is_georeferenced |= model.summary->is_georeferenced;
     if (!model.summary->has_metric_sensors) continue;
-    has_wheels |= HasMeasuredLengths(model.data->priors);
-    has_accelerometer |= model.data->inertial_scale_sigma > 0.0;
+    const bool is_by_wheels = HasMeasuredLengths(model.data->priors);
+    has_wheels |= is_by_wheels;
+    has_accelerometer |=
+        !is_by_wheels && model.data->inertial_scale_sigma > 0.0;
     has_rig |= HasLengths(model.data->frame_priors);
   }
   std::string source;

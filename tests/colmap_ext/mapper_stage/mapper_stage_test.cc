@@ -294,21 +294,29 @@ TEST_F(MapperStageTest, WrongPlacesLeaveTheUnitOfTheAccelerometer) {
   }
 }
 
+// Coarse poses 0.02 m off, and an IMU with white noise of 0.005 m/s^2 sqrt(s).
+MapperWorld BuildInertialDrive(uint64_t seed, int num_blackouts = 0) {
+  MapperWorldOptions options;
+  options.world.num_images = 100;
+  options.world.seed = seed;
+  options.world.num_blackouts = num_blackouts;
+  options.world.blackout_num_images = 2;
+  options.center_sigma_m = 0.02;
+  MapperWorld world = BuildMapperWorld(options);
+  InertialDriveOptions drive;
+  drive.noise = 0.005;
+  drive.seed = seed;
+  world.data.inertial_motions = IntegrateDrive(world, drive);
+  return world;
+}
+
 // An IMU without wheels: the coarse model's metres, 2 % off, end within 3
 // sigmas of the truth, of which 0.2 % is what nothing sees. Noise of 0.005
 // m/s^2 sqrt(s) moves a second by 0.003 m, where the drive changes its speed by
 // 1 m/s.
 TEST_F(MapperStageTest, TheAccelerometerTellsTheSizeOfTheFinalModel) {
   for (const uint64_t seed : {1, 2, 3}) {
-    MapperWorldOptions options;
-    options.world.num_images = 100;
-    options.world.seed = seed;
-    options.center_sigma_m = 0.02;
-    MapperWorld world = BuildMapperWorld(options);
-    InertialDriveOptions drive;
-    drive.noise = 0.005;
-    drive.seed = seed;
-    world.data.inertial_motions = IntegrateDrive(world, drive);
+    MapperWorld world = BuildInertialDrive(seed);
     world.data.inertial_scale_sigma = 0.02;
     for (auto& [image_id, pose] : world.coarse_poses) pose.translation *= 1.02;
     LeaveToAnImu(&world);
@@ -327,17 +335,7 @@ TEST_F(MapperStageTest, TheAccelerometerTellsTheSizeOfTheFinalModel) {
 // photos by some millimetres, which two more on either side show.
 TEST_F(MapperStageTest, TheAccelerometerHoldsImagesWithoutPoints) {
   for (const uint64_t seed : {1, 2, 3}) {
-    MapperWorldOptions options;
-    options.world.num_images = 100;
-    options.world.seed = seed;
-    options.world.num_blackouts = 1;
-    options.world.blackout_num_images = 2;
-    options.center_sigma_m = 0.02;
-    MapperWorld world = BuildMapperWorld(options);
-    InertialDriveOptions drive;
-    drive.noise = 0.005;
-    drive.seed = seed;
-    world.data.inertial_motions = IntegrateDrive(world, drive);
+    MapperWorld world = BuildInertialDrive(seed, 1);
     world.data.inertial_scale_sigma = 0.02;
     LeaveToAnImu(&world);
     std::filesystem::remove_all(folder_);
@@ -361,17 +359,9 @@ class WheelScaleTest : public MapperStageTest {
  protected:
   static constexpr double kScale = 1.02;
 
-  // How far the model's size is off when the importer was this sure.
-  double RunSize(uint64_t seed, double sigma) {
-    MapperWorldOptions options;
-    options.world.num_images = 100;
-    options.world.seed = seed;
-    options.center_sigma_m = 0.02;
-    MapperWorld world = BuildMapperWorld(options);
-    InertialDriveOptions drive;
-    drive.noise = 0.005;
-    drive.seed = seed;
-    world.data.inertial_motions = IntegrateDrive(world, drive);
+  // The importer was this sure.
+  static MapperWorld Build(uint64_t seed, double sigma) {
+    MapperWorld world = BuildInertialDrive(seed);
     for (auto& [image_id, pose] : world.coarse_poses) {
       pose.translation *= kScale;
     }
@@ -383,6 +373,11 @@ class WheelScaleTest : public MapperStageTest {
                               prior.covariance.bottomRightCorner<3, 3>()};
     }
     world.data.wheel_scale = WheelScale{kScale, sigma, 0.01};
+    return world;
+  }
+
+  // How far the model's size is off.
+  double RunSize(const MapperWorld& world) {
     std::filesystem::remove_all(folder_);
     return 1.0 / ComputeAlignedErrors(Run(world), world.true_poses, {}).scale;
   }
@@ -391,7 +386,7 @@ class WheelScaleTest : public MapperStageTest {
 // Its sigma is that of the accelerometer on the final shape.
 TEST_F(WheelScaleTest, TheAccelerometerCorrectsIt) {
   for (const uint64_t seed : {1, 2, 3}) {
-    const double size = RunSize(seed, 0.007);
+    const double size = RunSize(Build(seed, 0.007));
     EXPECT_LT(summary_.scale_sigma, 0.004) << "seed " << seed;
     EXPECT_NEAR(size, 1.0, 3.0 * summary_.scale_sigma) << "seed " << seed;
     EXPECT_NEAR(summary_.size_over_priors, 1.0 / kScale, 0.004);
@@ -399,8 +394,22 @@ TEST_F(WheelScaleTest, TheAccelerometerCorrectsIt) {
 }
 
 TEST_F(WheelScaleTest, StaysWhereItIsKnownBetter) {
-  EXPECT_NEAR(RunSize(1, 0.0005), kScale, 0.002);
+  EXPECT_NEAR(RunSize(Build(1, 0.0005)), kScale, 0.002);
   EXPECT_NEAR(summary_.scale_sigma, 0.0005 / kScale, 1e-12);
+}
+
+// The coarse stage had no use for the wheels, and the step at a slip has the
+// accelerometer's length: the wheels hold the final model all the same.
+TEST_F(WheelScaleTest, DoesNotFollowTheCoarseModel) {
+  MapperWorld world = Build(1, 0.0005);
+  world.data.inertial_scale_sigma = 0.02;
+  RelativePosePrior& slip = world.data.priors[50];
+  slip.flags = kPriorRotation | kPriorLength | kPriorInertialLength;
+  slip.cam2_from_cam1.translation *= 1.05;
+  world.data.inertial_motions[50].by_wheels.reset();
+  EXPECT_NEAR(RunSize(world), kScale, 0.002);
+  EXPECT_NEAR(summary_.scale_sigma, 0.0005 / kScale, 1e-12);
+  EXPECT_EQ(summary_.size_over_priors, 1.0);
 }
 
 // The ablations of the paper.
