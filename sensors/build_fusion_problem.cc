@@ -59,15 +59,11 @@ FusionInput BuildFusionProblem(const PriorEstimationOptions& options,
   AddHoleUncertainty(logs, timeline.times_ns,
                      calibration.imu_from_wheel.rotation, &problem.links);
   if (options.use_visual_rotations) {
-    input.visual_links = AddVisualRotations(
-        vision.rotations, vision.timeshift_ns,
-        calibration.cam_from_imu.rotation, timeline, &problem);
     input.num_seen_slips = UseSeenWheelYaw(
         vision.rotations, vision.timeshift_ns,
         calibration.cam_from_imu.rotation, timeline, options.fusion, &problem);
   }
-  // What the links hold already must not count twice.
-  if (vision.has_bias && input.visual_links.num_links == 0) {
+  if (vision.has_bias) {
     problem.prior_gyroscope_bias = vision.bias;
     problem.prior_gyroscope_bias_sigma = vision.bias_sigma;
   }

@@ -7,14 +7,12 @@
 #include "sensors/smoother/build_odometry_links.h"
 #include "sensors/smoother/motion_logs.h"
 #include "sensors/use_vision.h"
-#include "sensors/visual_links.h"
 
 namespace adasfm {
 
 struct FusionInput {
   OdometryTimeline timeline;
   OdometryFusionProblem problem;
-  VisualLinks visual_links;
   // Intervals where wheels without the IMU slip (sensors/seen_wheel_yaw.h).
   int num_seen_slips = 0;
 };

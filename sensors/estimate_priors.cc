@@ -17,8 +17,8 @@
 #include "sensors/smoother/compose_inertial_motion.h"
 #include "sensors/smoother/compose_prior.h"
 #include "sensors/smoother/compose_wheel_translation.h"
+#include "sensors/timed_rotations.h"
 #include "sensors/use_vision.h"
-#include "sensors/visual_links.h"
 #include "sensors/wheel_skids.h"
 
 namespace adasfm {
@@ -184,8 +184,6 @@ void PriorEstimator::Fuse() {
     problem_ = std::move(input.problem);
     problem_.wheel_persistence = wheel_persistence;
     num_seen_slips = input.num_seen_slips;
-    summary.num_visual_links = input.visual_links.num_links;
-    summary.visual_sigma_deg = RadToDeg(input.visual_links.sigma_rad);
     fused_ = FuseOdometry(problem_, options_.fusion);
     if (i == kMaxNumCorrections ||
         !CorrectNoiseFigures(stated_, fused_, &calibration_, &wheel_persistence,

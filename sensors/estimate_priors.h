@@ -52,11 +52,11 @@ struct PriorEstimationOptions {
   // Logs are used from this long before the first to this long after the last
   // image: a standstill there tells the biases.
   double max_lead_s = 20.0;
-  // Whether two-view rotations help to find the gyroscope's bias: its first
-  // value when the machine never stands still, and its course on the way.
+  // Whether two-view rotations help to find the gyroscope's bias, and where
+  // wheels without an IMU slip.
   bool use_visual_rotations = true;
-  // What their scatter does not show when they are too poor for the rest and
-  // tell the first value only, 1 sigma, rad/s.
+  // What all of them err by alike, which their scatter does not show, 1 sigma,
+  // rad/s.
   double visual_bias_sigma = 0.002;
   // Whether a contradiction between sensors is an error: vision against the
   // gyroscope (sensors/calibration_check/check_against_vision.h), wheels

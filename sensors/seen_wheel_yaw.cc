@@ -11,7 +11,7 @@
 #include "core/so3.h"
 #include "sensors/rotation_triples.h"
 #include "sensors/smoother/chain_state.h"
-#include "sensors/visual_links.h"
+#include "sensors/timed_rotations.h"
 
 namespace adasfm {
 namespace {

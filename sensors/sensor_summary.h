@@ -67,10 +67,6 @@ struct SensorSummary {
   // The low-pass filter that was undone (see GyroscopeFilter); 0: none.
   double gyroscope_lag_s = 0.0;
   double gyroscope_delay_s = 0.0;
-  // Pairs whose two-view rotation took part in the smoother, and with which
-  // sigma an axis.
-  int num_visual_links = 0;
-  double visual_sigma_deg = 0.0;
   std::vector<WheelSlip> wheel_slips;  // camera clock
   double distance_m = 0.0;
   // Expected error of the chained priors after 100 m, 1 sigma.

@@ -34,10 +34,6 @@ void AddFusionOptions(OdometryFusionOptions* fusion, CommandOptions* command) {
       "roll and pitch of a machine without IMU [rad/sqrt(s)]");
   add("slip_threshold_sigma", &fusion->slip_threshold_sigma,
       "wheels further than this from the IMU lose weight [sigma]");
-  add("vision_threshold_sigma", &fusion->vision_threshold_sigma,
-      "two-view rotations further than this from the rest lose weight [sigma]");
-  add("visual_rotation_scale_sigma", &fusion->visual_turn_sigma,
-      "scale of all two-view rotations before any data, 1 sigma [1 = 100 %]");
   add("slip_min_speed_m_s", &fusion->slip_min_speed_m_s,
       "slip is reported beyond this error of the speed [m/s]");
   add("standstill_speed_sigma_m_s", &fusion->standstill_speed_sigma,
@@ -59,7 +55,6 @@ void AddOldNames(CommandOptions* command) {
       {"lateral_speed_noise", "lateral_speed_noise_m_s_sqrt_hz"},
       {"vertical_speed_noise", "vertical_speed_noise_m_s_sqrt_hz"},
       {"planar_rotation_noise", "planar_rotation_noise_rad_sqrt_s"},
-      {"visual_turn_sigma", "visual_rotation_scale_sigma"},
       {"standstill_speed_sigma", "standstill_speed_sigma_m_s"},
       {"standstill_rate_sigma", "standstill_rate_sigma_rad_s"},
       {"unaided_speed_sigma", "unaided_speed_sigma_m_s"},
@@ -117,11 +112,11 @@ void AddImporterOptions(PriorImportOptions* options, CommandOptions* command) {
   add("max_lead_s", &estimation->max_lead_s,
       "logs are used from this long before the first image on [s]");
   add("use_visual_rotations", &estimation->use_visual_rotations,
-      "two-view rotations help to find the gyroscope's bias: its first value "
-      "when the machine never stands still, and its course (0 or 1)");
+      "two-view rotations help to find the gyroscope's bias, and where wheels "
+      "without an IMU slip (0 or 1)");
   add("visual_bias_sigma_rad_s", &estimation->visual_bias_sigma,
-      "what their scatter does not show when they are too poor for the rest "
-      "and give the first value only, 1 sigma [rad/s]");
+      "what all of them err by alike, which their scatter does not show, 1 "
+      "sigma [rad/s]");
   add("estimate_time_shift", &estimation->estimate_time_shift,
       "add the time shift that vision and gyroscope agree on to the "
       "calibration's: 0, 1, or -1: when it is clear and at most 0.15 s");

@@ -33,9 +33,7 @@ std::string ImuLines(const SensorSummary& summary) {
        << summary.accelerometer_bias_sigma << " m/s^2\n"
        << "gravity             " << ToText(summary.first_gravity_in_cam)
        << " in the first camera\n"
-       << "standstill          " << summary.standstill_s << " s\n"
-       << "vision in smoother  " << summary.num_visual_links << " pairs, +- "
-       << summary.visual_sigma_deg << " deg\n";
+       << "standstill          " << summary.standstill_s << " s\n";
   if (summary.gyroscope_lag_s > 0.0) {
     text << "gyroscope filter    low-pass of " << summary.gyroscope_lag_s
          << " s undone\n";
@@ -150,8 +148,6 @@ std::string PriorImportToJson(const PriorImport& import) {
        summary.unexplained_rotation.interval_time_sigma_s},
       {"gyroscope_lag_s", summary.gyroscope_lag_s},
       {"gyroscope_delay_s", summary.gyroscope_delay_s},
-      {"num_visual_links", summary.num_visual_links},
-      {"visual_sigma_deg", summary.visual_sigma_deg},
       {"imu_rate_hz", summary.imu_rate_hz},
       {"num_imu_gaps", summary.num_imu_gaps},
       {"max_imu_gap_s", summary.max_imu_gap_s},

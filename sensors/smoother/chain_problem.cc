@@ -17,7 +17,7 @@ ChainProblem::ChainProblem(const OdometryFusionProblem& problem,
                            const OdometryFusionOptions& options)
     : problem(problem),
       options(options),
-      weights(problem.links.size()),
+      wheel_weights(problem.links.size(), 1.0),
       states(problem.initial_states.size()) {
   for (size_t k = 0; k < states.size(); ++k) {
     states[k].state = problem.initial_states[k];
@@ -29,7 +29,7 @@ ChainProblem::ChainProblem(const OdometryFusionProblem& problem,
 
 LinkResiduals ChainProblem::Residuals(size_t k) const {
   return ComputeLinkResiduals({&problem, &options}, problem.links[k], states[k],
-                              states[k + 1], globals, weights[k]);
+                              states[k + 1], globals, wheel_weights[k]);
 }
 
 Eigen::Vector3d ChainProblem::InitialStep(size_t k) const {

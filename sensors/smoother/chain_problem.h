@@ -26,8 +26,8 @@ struct ChainProblem {
 
   const OdometryFusionProblem& problem;
   const OdometryFusionOptions& options;
-  std::vector<LinkWeights> weights;  // one a link
-  std::vector<ChainState> states;    // one more
+  std::vector<double> wheel_weights;  // one a link
+  std::vector<ChainState> states;     // one more
   ChainGlobals globals;
 
  private:

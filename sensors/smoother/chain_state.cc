@@ -26,8 +26,7 @@ ChainGlobals::Vector ChainGlobals::PriorSigmas(
   const double mount = DegToRad(options.wheel_mount_sigma_deg);
   Vector sigmas;
   sigmas << options.wheel_scale_sigma, options.wheel_track_sigma,
-      options.wheel_curvature_sigma, mount, mount, options.visual_turn_sigma,
-      options.wheel_delay_sigma_s;
+      options.wheel_curvature_sigma, mount, mount, options.wheel_delay_sigma_s;
   return sigmas.cwiseMax(kFixed);
 }
 

@@ -36,20 +36,18 @@ struct ChainGlobals {
     kCurvature,  // follows kLoggedYaw: they have a covariance
     kMountYaw,
     kMountPitch,
-    kVisualTurn,
     kWheelDelay
   };
-  static constexpr int kSize = 7;
+  static constexpr int kSize = 6;
   using Vector = Eigen::Matrix<double, kSize, 1>;
 
   // Logged length = first * true length, logged yaw = second * true yaw -
   // third * distance; the forward direction is turned by the mount angles;
-  // two-view rotation vectors are the sixth times the true ones (a wrong focal
-  // length); wheel readings tell what was this long ago, s (a speed is the mean
+  // wheel readings tell what was this long ago, s (a speed is the mean
   // since the reading before, and takes its time on the way).
   // Factors stand with what is estimated, not with what was logged: a factor
   // of noisy readings would come out too small, the smaller the noise is then.
-  Vector values = (Vector() << 1.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0).finished();
+  Vector values = (Vector() << 1.0, 1.0, 0.0, 0.0, 0.0, 0.0).finished();
 
   static Vector PriorMeans() { return ChainGlobals().values; }
   static Vector PriorSigmas(const OdometryFusionOptions& options);

@@ -36,7 +36,7 @@ OdometryMotion Motion(const ChainProblem& chain, size_t k) {
       chain.states[k].state.world_from_imu;
   motion.body2_from_body1 =
       Rigid3d(r21, r21 * -chain.states[k + 1].step_in_previous);
-  motion.wheel_weight = chain.weights[k].wheel;
+  motion.wheel_weight = chain.wheel_weights[k];
   return motion;
 }
 

@@ -38,7 +38,7 @@ class LinkBuilder {
   void AddBiasWalk();
   // The weights divide the covariance; both must be positive.
   void AddWheel(double weight);
-  void AddVision(double weight);
+  void AddVision();
   void AddStandstill();
   void AddWeakPriors();
 
@@ -47,7 +47,6 @@ class LinkBuilder {
     result.values = values_.head(num_rows_);
     result.jacobian = jacobian_.topRows(num_rows_);
     result.wheel_chi2 = wheel_chi2_;
-    result.vision_chi2 = vision_chi2_;
     return result;
   }
 
@@ -113,7 +112,6 @@ class LinkBuilder {
   int num_rows_ = 0;
   LinkResiduals rows_;  // only which rows are whose
   double wheel_chi2_ = 0.0;
-  double vision_chi2_ = 0.0;
   Eigen::Matrix<double, kMaxResiduals, 1> values_;
   Eigen::Matrix<double, kMaxResiduals, kLinkSize> jacobian_;
 };

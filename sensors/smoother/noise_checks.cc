@@ -41,7 +41,7 @@ void NoiseChecks::Add(const ChainProblem& chain, size_t k,
                       const LinkResiduals& residuals,
                       const LinkCovariance& covariance) {
   const OdometryLink& link = chain.problem.links[k];
-  const double wheel_weight = chain.weights[k].wheel;
+  const double wheel_weight = chain.wheel_weights[k];
   // Wheels at rest err less.
   if (!link.has_imu || !link.has_wheel ||
       link.standstill != StandstillKind::kNone) {

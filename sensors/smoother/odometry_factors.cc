@@ -85,18 +85,10 @@ void LinkBuilder::AddBiasWalk() {
       noise.accelerometer_random_walk * root_dt);
 }
 
-void LinkBuilder::AddVision(double weight) {
-  const int row = num_rows_;
-  const double visual_per_true = globals_.values[ChainGlobals::kVisualTurn];
-  const Eigen::Vector3d turn = LogSo3(link_.visual_rotation) / visual_per_true;
-  const Eigen::Quaterniond measured = ExpSo3(turn);
-  const Eigen::Vector3d error = LogSo3(measured.conjugate() * a_rotation_);
-  jacobian_.block<3, 1>(row, kGlobals + ChainGlobals::kVisualTurn) =
-      RightJacobianInverseSo3(-error) * turn / visual_per_true;
-  AddRotationResidual(measured, link_.visual_sigma_rad *
-                                    link_.visual_sigma_rad / weight *
-                                    Eigen::Matrix3d::Identity());
-  vision_chi2_ = values_.segment<3>(row).squaredNorm() / weight;
+void LinkBuilder::AddVision() {
+  AddRotationResidual(link_.visual_rotation, link_.visual_sigma_rad *
+                                                 link_.visual_sigma_rad *
+                                                 Eigen::Matrix3d::Identity());
 }
 
 void LinkBuilder::AddStandstill() {
@@ -148,12 +140,12 @@ LinkResiduals ComputeLinkResiduals(const LinkContext& context,
                                    const ChainState& first,
                                    const ChainState& second,
                                    const ChainGlobals& globals,
-                                   const LinkWeights& weights) {
+                                   double wheel_weight) {
   LinkBuilder builder(context, link, first, second, globals);
   if (link.has_imu) builder.AddImu();
   builder.AddBiasWalk();
-  if (link.has_wheel) builder.AddWheel(weights.wheel);
-  if (link.has_vision) builder.AddVision(weights.vision);
+  if (link.has_wheel) builder.AddWheel(wheel_weight);
+  if (link.has_vision) builder.AddVision();
   if (link.standstill != StandstillKind::kNone) builder.AddStandstill();
   builder.AddWeakPriors();
   return builder.Finish();

@@ -20,7 +20,7 @@ inline constexpr int kLinkSize = 2 * ChainState::kSize + ChainGlobals::kSize;
 //   wheels    q (u + A l - l) - (M d + N (phi x d)) - D s f   (3x3 / weight),
 //             along the direction of driving first
 //   yaw       q' z . (Log(A) - D w) - curvature * distance - yaw
-//   vision    Log(Exp(Log(V) / s)^T A)                (sigma / weight)
+//   vision    Log(V^T A)                              (sigma)
 //   rest      Log(A), u, v_k, v_k+1                   (at a standstill)
 // with D the wheels' delay, s and w the changes of the wheel frame's speed and
 // of the body's rate over the link, f forward in the middle of the turn, plus
@@ -30,7 +30,6 @@ struct LinkResiduals {
   Eigen::Matrix<double, Eigen::Dynamic, kLinkSize> jacobian;
   // Squared norm of the wheels' residuals, before their weight.
   double wheel_chi2 = 0.0;
-  double vision_chi2 = 0.0;  // the same for vision
   // First row and number of the rows that depend on the accelerometer's noise,
   // the wheels' speed and the wheels' yaw. Each is whitened.
   struct Rows {
@@ -40,22 +39,17 @@ struct LinkResiduals {
   Rows accelerometer, wheel_speed, wheel_yaw;
 };
 
-// What a link's sensors count for: 1, less where they contradict the rest.
-struct LinkWeights {
-  double wheel = 1.0;
-  double vision = 1.0;
-};
-
 struct LinkContext {
   const OdometryFusionProblem* problem = nullptr;
   const OdometryFusionOptions* options = nullptr;
 };
 
+// wheel_weight: 1, less where the wheels contradict the rest.
 LinkResiduals ComputeLinkResiduals(const LinkContext& context,
                                    const OdometryLink& link,
                                    const ChainState& first,
                                    const ChainState& second,
                                    const ChainGlobals& globals,
-                                   const LinkWeights& weights);
+                                   double wheel_weight);
 
 }  // namespace adasfm

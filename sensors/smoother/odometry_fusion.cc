@@ -90,20 +90,12 @@ Smoother::Change Smoother::Step() {
 
 void Smoother::UpdateWeights(double factor) {
   const double wheel_threshold = factor * options_.slip_threshold_sigma;
-  const double vision_threshold = factor * options_.vision_threshold_sigma;
   for (size_t k = 0; k < chain_.NumLinks(); ++k) {
     const OdometryLink& link = problem_.links[k];
     // Without the IMU there is nothing that they could contradict.
-    if (!link.has_imu || !(link.has_wheel || link.has_vision)) continue;
-    const LinkResiduals residuals = chain_.Residuals(k);
-    if (link.has_wheel) {
-      chain_.weights[k].wheel =
-          RobustWeight(residuals.wheel_chi2, wheel_threshold);
-    }
-    if (link.has_vision) {
-      chain_.weights[k].vision =
-          RobustWeight(residuals.vision_chi2, vision_threshold);
-    }
+    if (!link.has_imu || !link.has_wheel) continue;
+    chain_.wheel_weights[k] =
+        RobustWeight(chain_.Residuals(k).wheel_chi2, wheel_threshold);
   }
 }
 
@@ -111,7 +103,7 @@ std::vector<std::pair<size_t, double>> Smoother::FindSlippingLinks() const {
   std::vector<std::pair<size_t, double>> links;
   for (size_t k = 0; k < chain_.NumLinks(); ++k) {
     const OdometryLink& link = problem_.links[k];
-    if (!link.has_wheel || chain_.weights[k].wheel > kSlipWeight) continue;
+    if (!link.has_wheel || chain_.wheel_weights[k] > kSlipWeight) continue;
     const double speed_error = ComputeWheelSpeedError(
         problem_, k, chain_.states[k], chain_.states[k + 1], chain_.globals);
     if (std::abs(speed_error) >= options_.slip_min_speed_m_s) {
@@ -139,7 +131,7 @@ OdometryFusionResult Smoother::Run() {
   OdometryFusionResult result;
   double factor = kFirstThresholdFactor;
   for (const size_t k : FindSuspectWheels(problem_, options_.gravity_m_s2)) {
-    chain_.weights[k].wheel = kFirstSlipWeight;
+    chain_.wheel_weights[k] = kFirstSlipWeight;
   }
   while (result.num_iterations < options_.max_num_iterations) {
     ++result.num_iterations;

@@ -40,11 +40,6 @@ struct OdometryFusionOptions {
   double planar_rotation_noise = 0.03;
   // A wheel interval further than this from the IMU (in sigmas) loses weight.
   double slip_threshold_sigma = 4.0;
-  // The same for a two-view rotation.
-  double vision_threshold_sigma = 3.0;
-  // Two-view rotations may all be too large or too small by this share: a wrong
-  // focal length.
-  double visual_turn_sigma = 0.01;
   // Reported as slip when also the speed is off by more than this.
   double slip_min_speed_m_s = 0.2;
   // A machine at rest moves no more than this. The rate is one unknown of a
@@ -90,7 +85,8 @@ struct OdometryLink {
   // together, s (sensors/smoother/standstill.h).
   Eigen::Vector3d standstill_rate_density = Eigen::Vector3d::Zero();
   double standstill_time_s = 0.0;
-  // The body's rotation over the link (first_from_second) as cameras saw it.
+  // The body's rotation over the link (first_from_second) as cameras saw it,
+  // where wheels without an IMU slip.
   bool has_vision = false;
   Eigen::Quaterniond visual_rotation = Eigen::Quaterniond::Identity();
   double visual_sigma_rad = 0.0;

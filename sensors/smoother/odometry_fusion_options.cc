@@ -17,8 +17,6 @@ bool OdometryFusionOptions::IsValid(std::string* error) const {
                  {"vertical_speed_noise_m_s_sqrt_hz", vertical_speed_noise},
                  {"planar_rotation_noise_rad_sqrt_s", planar_rotation_noise},
                  {"slip_threshold_sigma", slip_threshold_sigma},
-                 {"vision_threshold_sigma", vision_threshold_sigma},
-                 {"visual_rotation_scale_sigma", visual_turn_sigma},
                  {"standstill_speed_sigma_m_s", standstill_speed_sigma},
                  {"standstill_rate_sigma_rad_s", standstill_rate_sigma},
                  {"unaided_speed_sigma_m_s", unaided_speed_sigma}})

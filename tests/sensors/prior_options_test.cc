@@ -156,11 +156,6 @@ INSTANTIATE_TEST_SUITE_P(
         OptionChange{"SlipMinSpeed",
                      [](Options* o) { o->fusion.slip_min_speed_m_s = 100.0; }},
         OptionChange{
-            "VisionThreshold",
-            [](Options* o) { o->fusion.vision_threshold_sigma = 100.0; }},
-        OptionChange{"VisualTurn",
-                     [](Options* o) { o->fusion.visual_turn_sigma = 1e-5; }},
-        OptionChange{
             "StandstillSpeed",
             [](Options* o) { o->fusion.standstill_speed_sigma = 0.5; }},
         OptionChange{

@@ -77,15 +77,14 @@ Eigen::VectorXd ResidualsAfter(
   second.Retract(delta.segment<ChainState::kSize>(ChainState::kSize));
   globals.values += delta.tail<ChainGlobals::kSize>();
   const LinkContext context{&r.problem, &r.options};
-  return ComputeLinkResiduals(context, r.link, first, second, globals,
-                              LinkWeights{0.5, 0.5})
+  return ComputeLinkResiduals(context, r.link, first, second, globals, 0.5)
       .values;
 }
 
 void ExpectJacobianIsNumeric(const RandomLink& r) {
   const LinkContext context{&r.problem, &r.options};
-  const LinkResiduals residuals = ComputeLinkResiduals(
-      context, r.link, r.first, r.second, r.globals, LinkWeights{0.5, 0.5});
+  const LinkResiduals residuals =
+      ComputeLinkResiduals(context, r.link, r.first, r.second, r.globals, 0.5);
   constexpr double kStep = 1e-6;
   for (int column = 0; column < kLinkSize; ++column) {
     Eigen::Matrix<double, kLinkSize, 1> delta;

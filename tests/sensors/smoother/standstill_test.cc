@@ -11,7 +11,7 @@
 
 #include "core/random.h"
 #include "core/so3.h"
-#include "sensors/visual_links.h"
+#include "sensors/timed_rotations.h"
 
 namespace adasfm {
 namespace {

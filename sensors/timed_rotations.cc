@@ -1,51 +1,15 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "sensors/visual_links.h"
+#include "sensors/timed_rotations.h"
 
 #include <algorithm>
-#include <cmath>
 #include <set>
-
-#include "core/median.h"
-#include "core/so3.h"
 
 namespace adasfm {
 namespace {
 
-// Fewer say too little of a bias to be worth their risk.
-constexpr int kMinNumLinks = 20;
 constexpr int kMinNumInliers = 20;
-// Poorer geometries err alike by more than a gyroscope does (0.1 deg where
-// their noise is 0.3).
-constexpr double kMaxSigma = 0.0035;  // rad
-// Two-view geometries are never more exact than this.
-constexpr double kMinSigma = 3e-4;  // rad
-constexpr double kSigmaFactor = 1.5;
 // Five times what a keypoint errs by.
 constexpr double kMinSeenMotionRad = 5e-3;
-// Of the turn: a slightly turned T_cam_imu moves whole bends.
-constexpr double kTurnShare = 0.05;
-
-// Vision against the gyroscope over the links: the errors' sigma per axis.
-double EstimateSigma(const std::vector<OdometryLink>& links,
-                     const std::vector<size_t>& indices) {
-  std::vector<Eigen::Vector3d> errors;
-  for (const size_t k : indices) {
-    errors.push_back(LogSo3(links[k].imu.delta_rotation.conjugate() *
-                            links[k].visual_rotation));
-  }
-  Eigen::Vector3d rate;
-  std::vector<double> values(indices.size());
-  for (int axis = 0; axis < 3; ++axis) {
-    for (size_t i = 0; i < indices.size(); ++i) {
-      values[i] = errors[i][axis] / links[indices[i]].dt_s;
-    }
-    rate[axis] = UpperMedian(&values);
-  }
-  for (size_t i = 0; i < indices.size(); ++i) {
-    values[i] = (errors[i] - rate * links[indices[i]].dt_s).norm();
-  }
-  return UpperMedian(&values) / kMedianNorm3;
-}
 
 }  // namespace
 
@@ -114,36 +78,6 @@ Eigen::Quaterniond BodyRotation(const TimedRotation& rotation,
                                 const Eigen::Quaterniond& cam_from_imu) {
   return cam_from_imu.conjugate() * rotation.cam2_from_cam1.conjugate() *
          cam_from_imu;
-}
-
-VisualLinks AddVisualRotations(const std::vector<TimedRotation>& rotations,
-                               timestamp_t timeshift_ns,
-                               const Eigen::Quaterniond& cam_from_imu,
-                               const OdometryTimeline& timeline,
-                               OdometryFusionProblem* problem) {
-  std::vector<size_t> indices;
-  for (const TimedRotation& rotation : rotations) {
-    const std::optional<size_t> k =
-        FindLinkOfRotation(rotation, timeshift_ns, timeline);
-    if (!k) continue;
-    OdometryLink& link = problem->links[*k];
-    if (!link.has_imu || link.dt_s <= 0.0) continue;
-    link.visual_rotation = BodyRotation(rotation, cam_from_imu);
-    indices.push_back(*k);
-  }
-  if (indices.size() < kMinNumLinks) return VisualLinks();
-  const double sigma = EstimateSigma(problem->links, indices);
-  if (sigma > kMaxSigma) return VisualLinks();
-  VisualLinks result;
-  result.num_links = static_cast<int>(indices.size());
-  result.sigma_rad = kSigmaFactor * std::max(kMinSigma, sigma);
-  for (const size_t k : indices) {
-    problem->links[k].has_vision = true;
-    const double turn = LogSo3(problem->links[k].visual_rotation).norm();
-    problem->links[k].visual_sigma_rad =
-        std::hypot(result.sigma_rad, kTurnShare * turn);
-  }
-  return result;
 }
 
 }  // namespace adasfm
