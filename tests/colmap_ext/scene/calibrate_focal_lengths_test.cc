@@ -92,6 +92,27 @@ TEST(CalibrateFocalLengths, FindsTheTruthOfALensWithTwoRadialTerms) {
   }
 }
 
+// A shutter that opens row by row gives every pair a focal length of its own;
+// the search among them must end, and DescribeFocalLength's sigma hold.
+TEST(CalibrateFocalLengths, FindsALensBehindARollingShutter) {
+  for (const uint64_t seed : {1, 2, 3}) {
+    for (const double spacing_m : {1.5, 4.0}) {
+      SyntheticWorldOptions options = Drive(seed);
+      options.rolling_shutter_s = 0.03;
+      options.spacing_m = spacing_m;
+      const SyntheticWorld world = BuildSyntheticWorld(options);
+      SceneData scene = SceneWithFocalLength(world, 1.0);
+      UseUnknownLens(0.07, -0.09, 1.6, &scene);
+      const auto found =
+          CalibrateFocalLengths(FocalLengthCalibrationOptions(), &scene);
+      ASSERT_EQ(found.size(), 1) << seed << ", " << spacing_m;
+      EXPECT_NEAR(std::log(found[0].found_px / world.camera.focal_px), 0.0,
+                  2.0 * 0.035)
+          << seed << ", " << spacing_m;
+    }
+  }
+}
+
 // A right focal length is no reason to leave out the distortion.
 TEST(CalibrateFocalLengths, FindsTheDistortionAtARightFocalLength) {
   const SyntheticWorld world = BuildSyntheticWorld(Drive(1));
