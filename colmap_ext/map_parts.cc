@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cstdlib>
 #include <fstream>
+#include <iterator>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -18,6 +19,7 @@
 #include "colmap_ext/io/folder_lock.h"
 #include "colmap_ext/io/georeference_file.h"
 #include "colmap_ext/io/output_files.h"
+#include "colmap_ext/mapper_stage/leftover_components.h"
 #include "colmap_ext/mapper_stage/lost_images.h"
 #include "colmap_ext/mapper_stage/map_components.h"
 #include "colmap_ext/read_coarse_models.h"
@@ -172,8 +174,8 @@ Verdict Assess(const MapRequest& request, const CoarseModels& coarse,
                std::vector<LostImage> lost) {
   std::vector<AssessedModel> assessed;
   for (const MappedComponent& component : mapped) {
-    assessed.push_back(
-        {&component.component->data, &component.summary, &component.model});
+    assessed.push_back({&coarse.components[component.component].data,
+                        &component.summary, &component.model});
   }
   Verdict verdict =
       AssessModels(assessed, coarse.rest, ReadEarlierWarnings(request));
@@ -226,10 +228,10 @@ Status AssessAndWrite(const MapRequest& request, const CoarseModels& coarse,
   for (const MappedComponent& component : mapped) {
     if (component.model.NumRegImages() == 0) continue;
     models.push_back(&component.model);
+    const ComponentToMap& source = coarse.components[component.component];
     report->models.push_back(
-        {component.component->coarse_index, component.summary,
-         AssessModel(component.component->data, component.summary, {},
-                     component.model)});
+        {source.coarse_index, component.summary,
+         AssessModel(source.data, component.summary, {}, component.model)});
   }
   StatusOr<std::vector<LostImage>> lost = FindLost(request, coarse, mapped);
   if (!lost.ok()) return lost.status();
@@ -240,9 +242,10 @@ Status AssessAndWrite(const MapRequest& request, const CoarseModels& coarse,
         mapped.begin(), mapped.end(), [](const MappedComponent& component) {
           return component.summary.is_georeferenced;
         });
-    status = UpdateGeoreference(is_georeferenced,
-                                mapped.front().component->data.position_origin,
-                                request.output_path);
+    status = UpdateGeoreference(
+        is_georeferenced,
+        coarse.components[mapped.front().component].data.position_origin,
+        request.output_path);
   }
   if (status.ok()) {
     status = WriteTextFile(request.output_path + "/summary.json",
@@ -251,6 +254,46 @@ Status AssessAndWrite(const MapRequest& request, const CoarseModels& coarse,
   if (!status.ok()) return status;
   return RemoveSurplusCheckpoints(request.output_path,
                                   coarse.components.size());
+}
+
+// What the models left out; also where the parts were mapped by other calls.
+Status MapLeftovers(const MapperStageOptions& options,
+                    const MapRequest& request, const MapperProgress& progress,
+                    CoarseModels* coarse,
+                    std::vector<MappedComponent>* mapped) {
+  const size_t num_components = coarse->components.size();
+  TakeLeftovers(*mapped, &coarse->components);
+  if (coarse->components.size() == num_components) return Status::Ok();
+  size_t num_images = 0;
+  for (size_t k = 0; k < coarse->components.size(); ++k) {
+    ComponentToMap& component = coarse->components[k];
+    CompleteRigs(component.coarse, &component.data);
+    if (k >= num_components) num_images += component.coarse.size();
+  }
+  if (progress) {
+    progress(std::to_string(num_images) +
+                 " images that hold together are left out: mapping them by "
+                 "themselves",
+             0.0);
+  }
+  StatusOr<std::vector<MappedComponent>> found = MapComponents(
+      options, coarse->components, num_components, request.output_path,
+      MapperSteps::kAll, request.part_index, progress);
+  if (!found.ok()) return found.status();
+  std::move(found->begin(), found->end(), std::back_inserter(*mapped));
+  return Status::Ok();
+}
+
+// Most images first; an error when there are none.
+Status SortBySize(std::vector<MappedComponent>* mapped) {
+  std::stable_sort(mapped->begin(), mapped->end(),
+                   [](const MappedComponent& a, const MappedComponent& b) {
+                     return a.model.NumRegImages() > b.model.NumRegImages();
+                   });
+  if (mapped->front().model.NumRegImages() > 0) return Status::Ok();
+  return Status::Error(
+      "no image could be reconstructed; does the coarse model at "
+      "--input_path belong to this database?");
 }
 
 }  // namespace
@@ -299,11 +342,14 @@ StatusOr<MapReport> MapParts(const MapOptions& options,
   if (!has_priors) report.warnings.push_back(kNoPriorsWarning);
   report.warnings.insert(report.warnings.end(), frame_warnings.begin(),
                          frame_warnings.end());
-  const StatusOr<std::vector<MappedComponent>> mapped =
-      MapComponents(stage_options, coarse->components, request.output_path,
+  StatusOr<std::vector<MappedComponent>> mapped =
+      MapComponents(stage_options, coarse->components, 0, request.output_path,
                     request.steps, request.part_index, progress);
   if (!mapped.ok()) return mapped.status();
   if (mapped->empty()) return report;
+  status = MapLeftovers(stage_options, request, progress, &*coarse, &*mapped);
+  if (status.ok()) status = SortBySize(&*mapped);
+  if (!status.ok()) return status;
   status = AssessAndWrite(request, *coarse, *mapped, *frames, &report);
   if (!status.ok()) return status;
   return report;

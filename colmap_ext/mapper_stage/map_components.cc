@@ -36,16 +36,16 @@ std::vector<size_t> FindComponentFolders(const std::string& output_path) {
 
 // The share of the run that each component is, by its images.
 std::vector<std::pair<double, double>> FindProgressRanges(
-    const std::vector<ComponentToMap>& components) {
+    const std::vector<ComponentToMap>& components, size_t first) {
   double num_images = 0.0;
-  for (const ComponentToMap& component : components) {
-    num_images += component.data.images.size();
+  for (size_t k = first; k < components.size(); ++k) {
+    num_images += components[k].data.images.size();
   }
   std::vector<std::pair<double, double>> ranges;
   double begin = 0.0;
-  for (const ComponentToMap& component : components) {
+  for (size_t k = first; k < components.size(); ++k) {
     const double share =
-        component.data.images.size() / std::max(1.0, num_images);
+        components[k].data.images.size() / std::max(1.0, num_images);
     ranges.push_back({begin, share});
     begin += share;
   }
@@ -54,11 +54,11 @@ std::vector<std::pair<double, double>> FindProgressRanges(
 
 std::vector<std::unique_ptr<MapperStage>> CreateStages(
     const MapperStageOptions& options,
-    const std::vector<ComponentToMap>& components,
+    const std::vector<ComponentToMap>& components, size_t first,
     const std::string& output_path, const MapperProgress& progress) {
-  const auto ranges = FindProgressRanges(components);
+  const auto ranges = FindProgressRanges(components, first);
   std::vector<std::unique_ptr<MapperStage>> stages;
-  for (size_t k = 0; k < components.size(); ++k) {
+  for (size_t k = first; k < components.size(); ++k) {
     MapperProgress part_progress;
     if (progress) {
       const std::string prefix =
@@ -66,7 +66,7 @@ std::vector<std::unique_ptr<MapperStage>> CreateStages(
               ? ""
               : "coarse model " + std::to_string(components[k].coarse_index) +
                     ": ";
-      part_progress = [progress, prefix, range = ranges[k]](
+      part_progress = [progress, prefix, range = ranges[k - first]](
                           const std::string& line, double share_done) {
         progress(prefix + line, range.first + range.second * share_done);
       };
@@ -98,8 +98,8 @@ Status RunOnePart(int part_index,
       ", but the plan has the parts 0 to " + std::to_string(num_parts - 1));
 }
 
-Status RunComponent(MapperSteps steps, const ComponentToMap& component,
-                    MapperStage* stage, std::vector<MappedComponent>* mapped) {
+Status RunComponent(MapperSteps steps, size_t component, MapperStage* stage,
+                    std::vector<MappedComponent>* mapped) {
   Status status;
   if (steps != MapperSteps::kMerge) status = stage->Plan();
   if (status.ok() && steps == MapperSteps::kAll) status = stage->RunAllParts();
@@ -109,7 +109,7 @@ Status RunComponent(MapperSteps steps, const ComponentToMap& component,
   StatusOr<colmap::Reconstruction> model =
       stage->Merge(/*require_all_parts=*/true);
   if (!model.ok()) return model.status();
-  mapped->push_back({&component, stage->Summary(), std::move(*model)});
+  mapped->push_back({component, stage->Summary(), std::move(*model)});
   return Status::Ok();
 }
 
@@ -121,30 +121,21 @@ std::string ComponentOutputPath(const std::string& output_path, size_t k) {
 
 StatusOr<std::vector<MappedComponent>> MapComponents(
     const MapperStageOptions& options,
-    const std::vector<ComponentToMap>& components,
+    const std::vector<ComponentToMap>& components, size_t first,
     const std::string& output_path, MapperSteps steps, int part_index,
     const MapperProgress& progress) {
   std::vector<std::unique_ptr<MapperStage>> stages =
-      CreateStages(options, components, output_path, progress);
+      CreateStages(options, components, first, output_path, progress);
   std::vector<MappedComponent> mapped;
   if (steps == MapperSteps::kPart) {
     const Status status = RunOnePart(part_index, &stages);
     if (!status.ok()) return status;
     return mapped;
   }
-  for (size_t k = 0; k < components.size(); ++k) {
+  for (size_t k = 0; k < stages.size(); ++k) {
     const Status status =
-        RunComponent(steps, components[k], stages[k].get(), &mapped);
+        RunComponent(steps, first + k, stages[k].get(), &mapped);
     if (!status.ok()) return status;
-  }
-  std::stable_sort(mapped.begin(), mapped.end(),
-                   [](const MappedComponent& a, const MappedComponent& b) {
-                     return a.model.NumRegImages() > b.model.NumRegImages();
-                   });
-  if (!mapped.empty() && mapped.front().model.NumRegImages() == 0) {
-    return Status::Error(
-        "no image could be reconstructed; does the coarse model at "
-        "--input_path belong to this database?");
   }
   return mapped;
 }

@@ -23,7 +23,8 @@ struct ComponentToMap {
 };
 
 struct MappedComponent {
-  const ComponentToMap* component = nullptr;
+  // Among those to map.
+  size_t component = 0;
   MapperStageSummary summary;
   // Empty when no image could be reconstructed.
   colmap::Reconstruction model;
@@ -33,13 +34,12 @@ struct MappedComponent {
 // output_path/component_<k>.
 std::string ComponentOutputPath(const std::string& output_path, size_t k);
 
-// Runs the mapper stage's steps on all components, one after another. The steps
-// plan and part give no models; the parts of the components are numbered one
-// after another. Otherwise the models, most images first. An error when no
-// component gave any. Components must outlive the result.
+// Runs the mapper stage's steps on all components from the first on, one after
+// another. The steps plan and part give no models; the parts of the components
+// are numbered one after another.
 StatusOr<std::vector<MappedComponent>> MapComponents(
     const MapperStageOptions& options,
-    const std::vector<ComponentToMap>& components,
+    const std::vector<ComponentToMap>& components, size_t first,
     const std::string& output_path, MapperSteps steps, int part_index,
     const MapperProgress& progress);
 
