@@ -265,10 +265,8 @@ Status MapLeftovers(const MapperStageOptions& options,
   TakeLeftovers(*mapped, &coarse->components);
   if (coarse->components.size() == num_components) return Status::Ok();
   size_t num_images = 0;
-  for (size_t k = 0; k < coarse->components.size(); ++k) {
-    ComponentToMap& component = coarse->components[k];
-    CompleteRigs(component.coarse, &component.data);
-    if (k >= num_components) num_images += component.coarse.size();
+  for (size_t k = num_components; k < coarse->components.size(); ++k) {
+    num_images += coarse->components[k].coarse.size();
   }
   if (progress) {
     progress(std::to_string(num_images) +

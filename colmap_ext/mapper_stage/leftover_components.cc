@@ -44,6 +44,17 @@ std::vector<CoarsePoseMap> FindStretches(const ComponentToMap& component,
   return stretches;
 }
 
+// What SplitScene leaves to its callers.
+void AddFramePriors(const std::vector<RelativePosePrior>& frame_priors,
+                    SceneData* data) {
+  for (const RelativePosePrior& prior : frame_priors) {
+    if (data->images.count(prior.image_id1) > 0 &&
+        data->images.count(prior.image_id2) > 0) {
+      data->frame_priors.push_back(prior);
+    }
+  }
+}
+
 void TakeLeftoversOf(const colmap::Reconstruction& model, size_t index,
                      std::vector<ComponentToMap>* components) {
   const std::vector<CoarsePoseMap> stretches =
@@ -54,12 +65,15 @@ void TakeLeftoversOf(const colmap::Reconstruction& model, size_t index,
     poses[0].emplace(image_id, CamFromWorld(model.Image(image_id)));
   }
   poses.insert(poses.end(), stretches.begin(), stretches.end());
+  const std::vector<RelativePosePrior> frame_priors =
+      (*components)[index].data.frame_priors;
   SplitSceneData split =
       SplitScene(poses, std::move((*components)[index].data));
   for (size_t k = 1; k < poses.size(); ++k) {
     ComponentToMap leftover = (*components)[index];
     leftover.coarse = std::move(poses[k]);
     leftover.data = std::move(split.components[k]);
+    AddFramePriors(frame_priors, &leftover.data);
     for (auto& [camera_id, camera] : leftover.data.cameras) {
       if (model.ExistsCamera(camera_id)) camera = model.Camera(camera_id);
     }
@@ -71,6 +85,7 @@ void TakeLeftoversOf(const colmap::Reconstruction& model, size_t index,
   }
   source.data = std::move(split.components[0]);
   source.data.images.merge(split.rest.images);
+  AddFramePriors(frame_priors, &source.data);
 }
 
 }  // namespace

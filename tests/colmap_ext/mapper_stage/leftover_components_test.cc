@@ -30,6 +30,12 @@ class LeftoverComponentsTest : public testing::Test {
     // Between stretches, as a false loop.
     component.data.pairs.push_back(Pair(12, 13));
     component.data.pairs.push_back(Pair(30, 41));
+    for (image_t image_id = 1; image_id <= 40; ++image_id) {
+      RelativePosePrior prior;
+      prior.image_id1 = image_id;
+      prior.image_id2 = image_id + 1;
+      component.data.frame_priors.push_back(prior);
+    }
     components_.push_back(std::move(component));
   }
 
@@ -89,6 +95,7 @@ TEST_F(LeftoverComponentsTest, StretchesBecomeComponents) {
   EXPECT_EQ(components_[0].data.images.size(), 18);
   EXPECT_EQ(components_[1].coarse.size(), 12);
   EXPECT_EQ(components_[1].data.pairs.size(), 11);
+  EXPECT_EQ(components_[1].data.frame_priors.size(), 11);
   EXPECT_EQ(components_[2].coarse.size(), 10);
   EXPECT_EQ(components_[2].data.images.count(41), 1);
   // They go on with what the model has found of the camera.
