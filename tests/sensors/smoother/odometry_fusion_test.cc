@@ -57,7 +57,7 @@ struct RandomLink {
       state->step_in_previous =
           Eigen::Vector3d(1.0, 0.1, 0.0) + random.GaussianVector(0.1);
     }
-    globals.values << 1.02, 0.97, 0.01, 0.03, -0.02, 1.01, 0.04;
+    globals.values << 1.02, 0.97, 0.01, 0.03, -0.02, 0.04;
     link.rate_change =
         samples.back().angular_velocity - samples.front().angular_velocity;
   }
