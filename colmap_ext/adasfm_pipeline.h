@@ -32,7 +32,8 @@ namespace adasfm {
 //        2.4 edges off the rotations        2.8 match refinement
 //
 //   3  MapParts             adasfm_mapper              partition/, colmap_ext/
-//      coarse models + cleaned matches -> a model each
+//      coarse models + cleaned matches -> a model each, and one of each
+//      stretch that these leave out (mapper_stage/leftover_components.h)
 //        3.1 cut into overlapping parts     3.3 align and merge the parts
 //        3.2 incremental SfM per part       3.4 refine the whole
 //

@@ -70,9 +70,10 @@ void TakeLeftoversOf(const colmap::Reconstruction& model, size_t index,
   SplitSceneData split =
       SplitScene(poses, std::move((*components)[index].data));
   for (size_t k = 1; k < poses.size(); ++k) {
-    ComponentToMap leftover = (*components)[index];
-    leftover.coarse = std::move(poses[k]);
-    leftover.data = std::move(split.components[k]);
+    const ComponentToMap& source = (*components)[index];
+    ComponentToMap leftover{source.coarse_index, std::move(poses[k]),
+                            std::move(split.components[k]),
+                            source.initial_position_loss_scale};
     AddFramePriors(frame_priors, &leftover.data);
     for (auto& [camera_id, camera] : leftover.data.cameras) {
       if (model.ExistsCamera(camera_id)) camera = model.Camera(camera_id);

@@ -8,7 +8,7 @@
 namespace adasfm {
 namespace {
 
-enum class Sensors { kBoth, kImu, kWheels, kPoorVision, kFilteredImu };
+enum class Sensors { kBoth, kImu, kWheels, kFilteredImu };
 
 // An option, another value for it, and the sensors with which it matters.
 struct OptionChange {
@@ -28,8 +28,7 @@ class Drive {
     const SyntheticWorld world = BuildSyntheticWorld(options);
     data_ = ToDataset(world);
     data_.calibration.timeshift_cam_imu_s = 0.0;
-    const double vision_noise = sensors == Sensors::kPoorVision ? 6e-3 : 1e-3;
-    vision_ = SimulateVision(world, 3, {vision_noise, 1, 0.05});
+    vision_ = SimulateVision(world, 3, {1e-3, 1, 0.05});
     if (sensors == Sensors::kFilteredImu) {
       Filter(0.15, &data_.logs.imu);
       data_.calibration.timeshift_cam_imu_s = 0.13;
@@ -116,8 +115,7 @@ INSTANTIATE_TEST_SUITE_P(
         OptionChange{"UseVisualRotations",
                      [](Options* o) { o->use_visual_rotations = false; }},
         OptionChange{"VisualBiasSigma",
-                     [](Options* o) { o->visual_bias_sigma = 2e-5; },
-                     Sensors::kPoorVision},
+                     [](Options* o) { o->visual_bias_sigma = 2e-5; }},
         OptionChange{"UndoGyroscopeFilter",
                      [](Options* o) { o->undo_gyroscope_filter = false; },
                      Sensors::kFilteredImu},
