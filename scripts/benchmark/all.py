@@ -198,6 +198,11 @@ def photos(args):
              '--colmap4', find_colmap4(args))
 
 
+def handheld(args):
+  run_script(args, 'handheld', 'handheld_tables.py', '--recordings_path',
+             args.recordings_path, '--colmap4', find_colmap4(args))
+
+
 # The steps, in the order in which they are run.
 STEPS = {
     'readme': lambda args: Benchmark(args).readme(),
@@ -220,6 +225,7 @@ STEPS = {
         args, 'alike_seeds', 'stress_worlds.py', *ALIKE_DIALS, '--seeds',
         '1-40', '--summary', '1'),
     'photos': photos,
+    'handheld': handheld,
     'global_results': lambda args: run_script(
         args, 'global_results', 'global_tables.py', '--num_seeds', '5'),
     'global_seeds': lambda args: run_script(
@@ -260,6 +266,10 @@ def parse_arguments(words=None):
   parser.add_argument('--data_path',
                       default=os.path.join(ROOT, '..', 'shared', 'data'),
                       help='folder of the recordings')
+  parser.add_argument('--recordings_path',
+                      default=os.path.join(ROOT, '..', 'recordings'),
+                      help='folder with clones of edge-slam-rgb-imu and '
+                      'DM-VIO-dataset')
   build = os.environ.get('ADASFM_BUILD_DIR') or os.path.join(ROOT, 'build')
   parser.add_argument('--colmap', default=os.path.join(build, 'bin', 'colmap'),
                       help='our launcher, built from these sources')

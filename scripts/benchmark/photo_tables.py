@@ -105,16 +105,14 @@ def run_parts(name, workspace, folder, args):
   return dict(outcome(output, source, usage, args, log_path), parts=num_parts)
 
 
-def run_peer(name, command, executable, workspace, folder, args):
+def run_peer(source, fixed, command, executable, workspace, folder, args):
   """On the geometries as they were before adasfm_global."""
-  source = os.path.join(args.data_path, name)
   log_path = folder + '.log'
   os.makedirs(folder)
   database = os.path.join(folder, 'database.db')
   shutil.copy(os.path.join(workspace, 'database.db'), database)
   run([args.colmap, 'adasfm_restorer', '--database_path', database], log_path)
-  output, steps = run_mapper(command, executable, folder, source, args,
-                             fixed=bool(options_of(name, args)))
+  output, steps = run_mapper(command, executable, folder, source, args, fixed)
   return outcome(output, source, steps[command], args, log_path)
 
 
@@ -142,8 +140,8 @@ def run_set(name, args):
       name, workspace, os.path.join(top, 'parts'), args))
   for i, (heading, (command, executable)) in enumerate(peers_of(args).items()):
     methods[heading] = attempt(lambda: run_peer(
-        name, command, executable, workspace,
-        os.path.join(top, 'peer-%d' % i), args))
+        os.path.join(args.data_path, name), bool(options_of(name, args)),
+        command, executable, workspace, os.path.join(top, 'peer-%d' % i), args))
   if not args.keep:
     shutil.rmtree(top)
   return {'set': name, 'methods': methods}

@@ -6,6 +6,8 @@
 
 #include "colmap_ext/host/database.h"
 #include "colmap_ext/host/model.h"
+#include "colmap_ext/host/model_folder.h"
+#include "colmap_ext/host/pose_conversion.h"
 #include "colmap_ext/io/double_blob.h"
 #include "core/sqlite.h"
 #include "tests/testing/colmap_ext/command_line_fixture.h"
@@ -260,6 +262,37 @@ TEST_F(ChainTest, TheMapperTakesALensWithMoreTerms) {
   run = ExpectSuccess(MapperArguments("known"));
   EXPECT_EQ(run.out.find("coarse model's camera"), std::string::npos);
   EXPECT_EQ(CameraOf("known/0").ModelName(), "SIMPLE_RADIAL");
+}
+
+// Without sensors nothing leads through the dark. A coarse model that joins
+// both sides all the same, the second one anywhere, ends as a model for each.
+TEST_F(ChainTest, StretchesThatACoarseModelJoinsByAGuessAreAModelEach) {
+  Make("--num_images 90 --seed 5 --num_blackouts 1 --blackout_images 14");
+  ExpectSuccess(GlobalArguments("apart"));
+  auto joined = ReadModel(folder_.File("apart/0"));
+  const auto second = ReadModel(folder_.File("apart/1"));
+  ASSERT_TRUE(joined.ok() && second.ok());
+  const size_t num_images[] = {joined->NumRegImages(), second->NumRegImages()};
+  ASSERT_GE(num_images[1], 20u);
+  const Rigid3d guess(Eigen::Quaterniond(0.8, 0.0, 0.6, 0.0),
+                      Eigen::Vector3d(3.0, -2.0, 1.0));
+  for (const image_t image_id : RegisteredImages(*second)) {
+    colmap::Image image;
+    image.SetImageId(image_id);
+    image.SetCameraId(second->Image(image_id).CameraId());
+    image.SetName(second->Image(image_id).Name());
+    joined->AddImage(image);
+    joined->RegisterImage(image_id);
+    SetCamFromWorld(CamFromWorld(second->Image(image_id)) * guess,
+                    &joined->Image(image_id));
+  }
+  ASSERT_TRUE(WriteModelFolder(folder_.File("global"), {&*joined}).ok());
+  ExpectSuccess(MapperArguments());
+  for (int k = 0; k < 2; ++k) {
+    const nlohmann::json evaluation = Evaluate("sparse/" + std::to_string(k));
+    EXPECT_EQ(evaluation["num_images"], num_images[k]);
+    EXPECT_LT(evaluation["sim3_least_squares"]["translation_rmse_m"], 0.5);
+  }
 }
 
 TEST_F(ChainTest, WithoutSensorsThereIsOneWarningAndAModel) {

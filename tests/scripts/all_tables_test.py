@@ -16,6 +16,7 @@ sys.path.insert(0, SCRIPTS)
 
 import all as all_tables  # noqa: E402
 from benchmarking import process  # noqa: E402
+from benchmarking import handheld  # noqa: E402
 from benchmarking.figures import run_table  # noqa: E402
 from benchmarking.ledger import (Ledger, MixedVersions,  # noqa: E402
                                  hash_sources, make_stamp)
@@ -195,6 +196,43 @@ def record(name, method, models, num_images=100, error=''):
           'peak_mib': 100, 'step_cpu_seconds': {'clean': 5.0, 'map': 10.0},
           'evaluation': {'num_true_images': num_images, 'sim3': {'scale': 1.0}},
           'models': [{'images': n, 'rmse_m': e} for n, e in models]}
+
+
+class HandheldTest(Folder):
+  """A phone's log: objects on many lines, two sensors with their own times."""
+
+  def setUp(self):
+    super().setUp()
+    self.source = self.path(handheld.RECORDINGS['phone 1'])
+    frames = [{'fileName': 'frame_%d.jpg' % k, 'timestamp': 1000 * k}
+              for k in range(7)]
+    samples = [{'sensorType': 1, 'timestamp': 500 + 1000 * k,
+                'values': [float(k), 2.0 * k, 9.8]} for k in range(7)]
+    # Twice the same time, an uncalibrated gyroscope's six values, a magnetometer.
+    samples += [{'sensorType': 4, 'timestamp': t,
+                 'values': [0.1, 0.2, 0.3, 0.0, 0.0, 0.0]}
+                for t in (0, 500, 1750, 1750, 9000)]
+    samples.append({'sensorType': 2, 'timestamp': 600, 'values': [1, 2, 3]})
+    for name, objects in (('camera_frames', frames), ('imu_data', samples)):
+      write(os.path.join(self.source, 'data', name + '.jsonl'),
+            '\n'.join(json.dumps(o, indent=2) for o in objects) + '\n{"cut":')
+    for k in (0, 6):
+      write(os.path.join(self.source, 'images', 'frame_%d.jpg' % k), 'photo')
+
+  def test_every_third_photo_that_is_there(self):
+    folder = self.path('prepared')
+    self.assertEqual(handheld.prepare('phone 1', self.folder, folder), 2)
+    self.assertEqual(read(os.path.join(folder, 'times.csv')).splitlines()[1:],
+                     ['0,frame_0.jpg', '6000,frame_6.jpg'])
+    self.assertEqual(read(os.path.join(folder, 'images', 'frame_6.jpg')),
+                     'photo')
+
+  def test_accelerations_at_the_times_of_the_gyroscope(self):
+    folder = self.path('prepared')
+    handheld.prepare('phone 1', self.folder, folder)
+    self.assertEqual(
+        read(os.path.join(folder, 'imu.csv')).splitlines()[1:],
+        ['500,0.1,0.2,0.3,0.0,0.0,9.8', '1750,0.1,0.2,0.3,1.25,2.5,9.8'])
 
 
 class AllTest(Folder):
