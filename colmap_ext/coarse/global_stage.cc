@@ -60,6 +60,20 @@ Status NothingHoldsTogether() {
       "a relative pose and no usable priors; match the images first");
 }
 
+// Fewer points than this hold no pose.
+constexpr size_t kMinNumPointsOfPose = 6;
+
+std::map<image_t, Rigid3d> PosesHeldByPoints(
+    const colmap::Reconstruction& reconstruction) {
+  std::map<image_t, Rigid3d> poses;
+  for (const auto& [image_id, pose] : CamsFromWorld(reconstruction)) {
+    if (reconstruction.Image(image_id).NumPoints3D() >= kMinNumPointsOfPose) {
+      poses.emplace(image_id, pose);
+    }
+  }
+  return poses;
+}
+
 // What two-view verification took for the motion of a pair was that of
 // something else, as of cars that carry most of its matches: those of its raw
 // matches that agree with the poses.
@@ -264,7 +278,7 @@ class GlobalStage {
     Begin("gaps", 0.8);
     std::vector<std::map<image_t, Rigid3d>> models;
     for (const CoarseModel& model : result_.models) {
-      models.push_back(CamsFromWorld(model.reconstruction));
+      models.push_back(PosesHeldByPoints(model.reconstruction));
     }
     InertialOdometry odometry =
         BridgeGaps(MotionsOfCamera(scene_, result_.poses.camera_mount),

@@ -1,10 +1,13 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <map>
 #include <set>
+#include <utility>
+#include <vector>
 
 #include "colmap_ext/host/pose_conversion.h"
 #include "core/so3.h"
@@ -18,6 +21,8 @@ namespace {
 constexpr double kAccelerometerNoise = 0.02;  // m/s^2 sqrt(s)
 constexpr int kNumImages = 200;
 constexpr int kNumDarkImages = 10;
+constexpr size_t kNumKeptMatches = 16;
+constexpr size_t kNumPoints = 4;
 
 // A drive with a gyroscope, past 10 images that see nothing.
 class GlobalStageGapsTest : public testing::TestWithParam<uint64_t> {
@@ -58,6 +63,45 @@ class GlobalStageGapsTest : public testing::TestWithParam<uint64_t> {
     options.lever = Eigen::Vector3d(0.1, 0.2, -0.3);
     options.seed = GetParam();
     scene_.inertial_motions = IntegrateDrive(std::move(images), options);
+  }
+
+  // Pairs with later images hold this one, nearly all by matches that no third
+  // image has: their directions place it, and it has next to no points.
+  void TakePoints(image_t image_id) {
+    std::map<image_t, std::set<uint32_t>> seen_in_no_other;
+    std::set<uint32_t> used;
+    for (ScenePair& pair : scene_.pairs) {
+      if (pair.image_id1 != image_id && pair.image_id2 != image_id) continue;
+      std::vector<FeatureMatch> kept;
+      if (pair.image_id1 == image_id) {
+        for (const FeatureMatch& match : pair.inlier_matches) {
+          if (kept.size() == kNumKeptMatches) break;
+          if (!used.insert(match.point2D_idx1).second) continue;
+          kept.push_back(match);
+          if (used.size() <= kNumPoints) continue;
+          seen_in_no_other[pair.image_id2].insert(match.point2D_idx2);
+        }
+      }
+      pair.inlier_matches = std::move(kept);
+    }
+    for (ScenePair& pair : scene_.pairs) {
+      if (pair.image_id1 == image_id || pair.image_id2 == image_id) continue;
+      auto& matches = pair.inlier_matches;
+      matches.erase(
+          std::remove_if(matches.begin(), matches.end(),
+                         [&](const FeatureMatch& match) {
+                           return seen_in_no_other[pair.image_id1].count(
+                                      match.point2D_idx1) ||
+                                  seen_in_no_other[pair.image_id2].count(
+                                      match.point2D_idx2);
+                         }),
+          matches.end());
+    }
+    scene_.pairs.erase(std::remove_if(scene_.pairs.begin(), scene_.pairs.end(),
+                                      [](const ScenePair& pair) {
+                                        return pair.inlier_matches.empty();
+                                      }),
+                       scene_.pairs.end());
   }
 
   static Rigid3d Motion(const std::map<image_t, Rigid3d>& poses,
@@ -118,6 +162,26 @@ TEST_P(GlobalStageGapsTest, TheAccelerometerLeadsAcross) {
       Motion(poses_, *dark.begin(), *dark.rbegin()).translation;
   EXPECT_LT(error.norm(), 4.0 * std::sqrt(variance));
   EXPECT_LT(variance, 0.15 * 0.15);
+}
+
+// Nothing but the step to it would tie the far side to the near one.
+TEST_P(GlobalStageGapsTest, AnImageOnFewPointsBelongsToTheGap) {
+  AddInertialMotions();
+  std::set<image_t> dark;
+  for (const auto& [image_id, image] : scene_.images) dark.insert(image_id);
+  for (const ScenePair& pair : scene_.pairs) {
+    dark.erase(pair.image_id1);
+    dark.erase(pair.image_id2);
+  }
+  ASSERT_EQ(dark.size(), kNumDarkImages);
+  const image_t next = *dark.rbegin() + 1;
+  TakePoints(next);
+  const GlobalStageResult result = RunStage(scene_);
+  EXPECT_EQ(result.models[0].reconstruction.NumRegImages(), kNumImages);
+  EXPECT_LE(result.models[0].reconstruction.Image(next).NumPoints3D(),
+            kNumPoints);
+  EXPECT_EQ(result.bridges.size(), kNumDarkImages + 2);
+  EXPECT_EQ(result.bridges.count(ImagePair(next, next + 1)), 1);
 }
 
 INSTANTIATE_TEST_SUITE_P(Seeds, GlobalStageGapsTest, testing::Values(1, 2, 3));
