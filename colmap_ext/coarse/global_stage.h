@@ -63,6 +63,11 @@ struct GlobalStageResult {
   std::vector<CoarseStep> steps;
 };
 
+// Whether an odometry that leads across gaps between models (BridgeGaps) did
+// good: the largest model has more images, and vision's pairs bear it out.
+bool IsBetterAcrossGaps(const GlobalStageResult& in_parts,
+                        const GlobalStageResult& across);
+
 // Called when a step begins, with its name and the share of steps that are
 // done.
 using StageProgress = std::function<void(const std::string&, double)>;

@@ -6,6 +6,7 @@
 #include <limits>
 #include <map>
 #include <set>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -182,6 +183,38 @@ TEST_P(GlobalStageGapsTest, AnImageOnFewPointsBelongsToTheGap) {
             kNumPoints);
   EXPECT_EQ(result.bridges.size(), kNumDarkImages + 2);
   EXPECT_EQ(result.bridges.count(ImagePair(next, next + 1)), 1);
+}
+
+// A largest model of so many images, by so many of 100 pairs and all of 50
+// motions of sensors.
+GlobalStageResult ResultOf(image_t num_images, int num_kept_pairs) {
+  GlobalStageResult result;
+  result.models.resize(2);
+  for (image_t image_id = 1; image_id <= num_images; ++image_id) {
+    colmap::Image image;
+    image.SetImageId(image_id);
+    image.SetName(std::to_string(image_id));
+    result.models[1].reconstruction.AddImage(image);
+    result.models[1].reconstruction.RegisterImage(image_id);
+  }
+  result.poses.graph.edges.resize(150);
+  for (int k = 0; k < 150; ++k) {
+    ViewGraphEdge& edge = result.poses.graph.edges[k];
+    if (k >= 100) {
+      edge.source = EdgeSource::kSensor;
+    } else if (k >= num_kept_pairs) {
+      edge.removal = EdgeRemoval::kTranslation;
+    }
+  }
+  return result;
+}
+
+TEST(IsBetterAcrossGaps, AsksForMoreImagesAndMostPairs) {
+  const GlobalStageResult in_parts = ResultOf(30, 80);
+  EXPECT_TRUE(IsBetterAcrossGaps(in_parts, ResultOf(40, 85)));
+  EXPECT_TRUE(IsBetterAcrossGaps(in_parts, ResultOf(40, 73)));
+  EXPECT_FALSE(IsBetterAcrossGaps(in_parts, ResultOf(40, 70)));
+  EXPECT_FALSE(IsBetterAcrossGaps(in_parts, ResultOf(30, 85)));
 }
 
 INSTANTIATE_TEST_SUITE_P(Seeds, GlobalStageGapsTest, testing::Values(1, 2, 3));
