@@ -12,6 +12,7 @@
 #include "colmap_ext/coarse/split_models.h"
 #include "colmap_ext/host/pose_conversion.h"
 #include "colmap_ext/scene/scene_bearings.h"
+#include "colmap_ext/scene/untied_parts.h"
 #include "core/option_checker.h"
 #include "core/prior_lengths.h"
 #include "core/release_memory.h"
@@ -64,8 +65,6 @@ Status NothingHoldsTogether() {
 // kept by an odometry that was right, and 0.28 on a phone's walk by one that
 // was not.
 constexpr double kMinKeptRatio = 0.9;
-// Fewer points than this hold no pose.
-constexpr size_t kMinNumPointsOfPose = 6;
 
 std::map<image_t, Rigid3d> PosesHeldByPoints(
     const colmap::Reconstruction& reconstruction) {

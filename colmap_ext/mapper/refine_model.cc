@@ -27,8 +27,6 @@ namespace {
 
 // Fewer points than this do not hold an image by themselves.
 constexpr size_t kMinNumPointsToHold = 20;
-// And with fewer than this nothing is known of its pose.
-constexpr size_t kMinNumPointsToKeep = 6;
 // How weak the ties of such images to the coarse motion's length are.
 constexpr double kCoarseLengthSigmaRatio = 0.2;
 constexpr size_t kMaxNumCoarseEdges = 4;
@@ -282,7 +280,7 @@ class ModelRefiner {
     std::set<int> supported_chains;
     for (const image_t image_id : images) {
       if (reconstruction_.Image(image_id).NumPoints3D() >=
-          kMinNumPointsToKeep) {
+          kMinNumPointsOfPose) {
         supported_chains.insert(chains.Find(index_of_image.at(image_id)));
       }
     }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <cstddef>
 #include <set>
 #include <vector>
 
@@ -9,6 +10,9 @@
 #include "core/types.h"
 
 namespace adasfm {
+
+// With fewer points nothing is known of an image's pose.
+inline constexpr size_t kMinNumPointsOfPose = 6;
 
 // Parts of a model whose place and size against the rest nothing tells: the
 // adjustment left hardly any point that both see, and no sensor knows a motion

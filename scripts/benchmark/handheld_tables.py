@@ -18,10 +18,9 @@ import sys
 
 from benchmarking.figures import add_arguments, run_table
 from benchmarking.handheld import RECORDINGS, prepare
+from benchmarking.methods import log_options
 from benchmarking.process import run
 from photo_tables import attempt, outcome, peers_of, run_peer
-
-LOGS = {'image_times': 'times.csv', 'imu': 'imu.csv', 'sensors': 'sensors.yaml'}
 
 
 def read_json(path):
@@ -36,12 +35,11 @@ def knows_camera(source):
 
 def run_ours(source, folder, use_imu, args):
   log_path = folder + '.log'
-  options = [word for option, name in LOGS.items()
-             for word in ('--%s_path' % option, os.path.join(source, name))
-             if use_imu or (option == 'sensors' and knows_camera(source))]
+  logs = ['image_times', 'imu', 'sensors'] if use_imu else (
+      ['sensors'] if knows_camera(source) else [])
   usage = run([args.colmap, 'adasfm_automatic_reconstructor', '--image_path',
                os.path.join(source, 'images'), '--workspace_path', folder,
-               *options], log_path)
+               *log_options(source, logs)], log_path)
   result = outcome(os.path.join(folder, 'sparse'), source, usage, args,
                    log_path)
   result['verdict'] = read_json(os.path.join(folder, 'sparse',
@@ -123,7 +121,8 @@ def parse_arguments():
                 if os.path.isdir(os.path.join(args.recordings_path, folder))]
   for name in RECORDINGS:
     if name not in args.there:
-      print('left out %s: not in %s' % (name, args.recordings_path))
+      print('left out %s: not in %s' % (name, args.recordings_path),
+            file=sys.stderr)
   if not args.there:
     parser.exit(0, 'no recordings: no table\n')
   return args

@@ -193,7 +193,8 @@ def parse_arguments():
            if os.path.isdir(os.path.join(args.data_path, name))]
   for name in args.sets:
     if name not in there:
-      print('left out %s: not in %s' % (name, args.data_path))
+      print('left out %s: not in %s' % (name, args.data_path),
+            file=sys.stderr)
   if not there:
     parser.exit(0, 'no photos: no table\n')
   args.sets = there

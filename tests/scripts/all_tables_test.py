@@ -15,8 +15,7 @@ SCRIPTS = os.path.join(os.path.dirname(os.path.abspath(__file__)), '..', '..',
 sys.path.insert(0, SCRIPTS)
 
 import all as all_tables  # noqa: E402
-from benchmarking import process  # noqa: E402
-from benchmarking import handheld  # noqa: E402
+from benchmarking import handheld, process  # noqa: E402
 from benchmarking.figures import run_table  # noqa: E402
 from benchmarking.ledger import (Ledger, MixedVersions,  # noqa: E402
                                  hash_sources, make_stamp)

@@ -10,7 +10,7 @@ import bisect
 import json
 import os
 
-EVERY = 3  # of 26 to 30 frames a second
+EVERY = 3  # of 18 to 30 frames a second
 NUM_FRAMES = 610
 
 PHONES = 'edge-slam-rgb-imu/slam-mvp/data'

@@ -42,12 +42,14 @@ SMALL_PARTS = ['--AdaSfmPartition.max_num_images_undivided', '50',
                '--AdaSfmPartition.max_part_size', '50']
 
 
-def log_options(source):
-  """Of the importer and the one command, for the logs of a set."""
-  return [word for option, file in (
-      ('image_times', 'times.csv'), ('imu', 'imu.csv'), ('wheel', 'wheel.csv'),
-      ('sensors', 'sensors.yaml'))
-          for word in ('--%s_path' % option, os.path.join(source, file))]
+LOGS = {'image_times': 'times.csv', 'imu': 'imu.csv', 'wheel': 'wheel.csv',
+        'sensors': 'sensors.yaml'}
+
+
+def log_options(source, logs=tuple(LOGS)):
+  """Of the importer and the one command, for these logs of a set."""
+  return [word for log in logs
+          for word in ('--%s_path' % log, os.path.join(source, LOGS[log]))]
 
 
 def fixed_intrinsics(prefix):
