@@ -12,6 +12,7 @@ import argparse
 import functools
 import os
 import random
+import re
 import shutil
 import subprocess
 import sys
@@ -99,12 +100,19 @@ def copy_real(folder, args):
                 os.path.join(folder, 'features.log'))
 
 
+def count_named(output):
+  """Samples of imu.csv that the importer's warnings count."""
+  warnings = [line for line in output.splitlines()
+              if line.startswith('WARNING') and 'imu.csv' in line]
+  return sum(int(count) for line in warnings for count in re.findall(
+      r'(\d+) (?:samples? (?:is|are|repeat)|of \d+ in all)', line))
+
+
 def map_drive(folder, args):
   """Errors of the model of a drive with the logs that lie there."""
   chain = Chain(args.colmap, folder)
   imported = chain.importer({'sensors': ('imu.csv', 'wheel.csv')})
-  record = {'named': sum('imu.csv' in line for line in
-                         imported.stderr.splitlines())}
+  record = {'named': count_named(imported.stdout)}
   for done in (imported,
                chain.call('global', '--database_path',
                           chain.path('database.db'), '--output_path',
@@ -167,9 +175,9 @@ def campaign_table(records):
 
 
 def spoilt_table(records):
-  lines = ['| spoilt | %s |' % ' | '.join('seed %d' % seed
-                                          for seed in SPOILT_SEEDS),
-           '|---' * (len(SPOILT_SEEDS) + 1) + '|']
+  lines = ['| spoilt | %s | samples named |' % ' | '.join(
+      'seed %d' % seed for seed in SPOILT_SEEDS),
+           '|---' * (len(SPOILT_SEEDS) + 2) + '|']
   runs = {(r['spoilt'], r['seed']): r for r in records}
   for name in SPOILT:
     cells = []
@@ -181,6 +189,8 @@ def spoilt_table(records):
       error_m = run['errors']['shape_m']
       cells.append('%.3f m' % error_m if run is clean else '%.3f m, %.2f' % (
           error_m, error_m / clean['errors']['shape_m']))
+    cells.append(', '.join(str(runs[name, seed]['named'])
+                           for seed in SPOILT_SEEDS))
     lines.append('| %s | %s |' % (name, ' | '.join(cells)))
   return lines
 

@@ -53,12 +53,22 @@ class FaultsTest(unittest.TestCase):
     self.assertTrue(lines[-1].endswith('| 200: 198 killed | 2 |'), lines[-1])
 
   def test_errors_are_set_against_the_clean_log(self):
-    runs = [{'spoilt': name, 'seed': seed,
+    runs = [{'spoilt': name, 'seed': seed, 'named': seed,
              'errors': {'shape_m': 0.02 if name == 'nothing' else 0.03}}
             for name in fault_tables.SPOILT for seed in (7, 8)]
     lines = fault_tables.spoilt_table(runs)
-    self.assertIn('| nothing | 0.020 m | 0.020 m |', lines)
+    self.assertIn('| nothing | 0.020 m | 0.020 m | 7, 8 |', lines)
     self.assertIn('0.030 m, 1.50', lines[-1])
+
+  def test_samples_that_warnings_name_are_counted(self):
+    self.assertEqual(fault_tables.count_named('\n'.join((
+        'd/imu.csv has 90 samples',
+        'WARNING: d/imu.csv, line 9: 1 sample is a spike, far from 4; left out',
+        'WARNING: d/imu.csv, lines 3-6: 4 samples repeat the same reading',
+        'WARNING: d/imu.csv, lines 3-4: 20 samples are all zero (0.1 s)',
+        'WARNING: d/imu.csv, line 7: first of 4 places where samples are '
+        'missing, 25 of 90 in all (28 %)',
+        'WARNING: d/wheel.csv, line 9: 1 sample is a spike'))), 50)
 
 
 class SeedsTest(unittest.TestCase):
