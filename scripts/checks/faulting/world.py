@@ -179,7 +179,8 @@ def is_close(path1, path2):
     return poses1.keys() == poses2.keys() and all(
         abs(a - b) < MAX_ROUNDING for image in poses1
         for a, b in zip(poses1[image], poses2[image]))
-  return path1.endswith('.json') or (
+  # With costs in the state of a checkpoint.
+  return path1.endswith('state.json') or (
       path1.endswith('points3D.bin') and
       os.path.getsize(path1) == os.path.getsize(path2))
 
