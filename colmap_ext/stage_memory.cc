@@ -19,11 +19,12 @@ constexpr double kBytesOfProgram = 65e6;
 constexpr double kImportBytesPerLogByte = 11.0;
 // Of adasfm_global and of adasfm_mapper, which peak where they hold the scene
 // with what they know of every keypoint and match, and again where the whole
-// is adjusted. Measured on 160 to 10,000 images, rounded up by a third.
-constexpr double kBytesOfStage = 20e6;
-constexpr double kBytesPerImage = 7e4;
-constexpr double kBytesPerKeypoint = 200.0;
-constexpr double kBytesPerMatch = 50.0;
+// is adjusted, in what the budget leaves. Measured on 51 to 30,000 images
+// (docs/reference/mapper.md), rounded up.
+constexpr double kBytesOfStage = 30e6;
+constexpr double kBytesPerImage = 5e4;
+constexpr double kBytesPerKeypoint = 180.0;
+constexpr double kBytesPerMatch = 45.0;
 
 // Of a file, or of all files below a folder; 0 where there is none.
 double SizeOnDisk(const std::string& path) {

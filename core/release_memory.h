@@ -1,7 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <unistd.h>
+
 #include <cstdlib>
+#include <fstream>
 
 #if defined(__GLIBC__)
 #include <malloc.h>
@@ -16,6 +19,15 @@ inline void ReleaseFreedMemory() {
 #if defined(__GLIBC__)
   malloc_trim(0);
 #endif
+}
+
+// What the process has of the machine's memory; 0 where the system does not
+// say.
+inline double ResidentMemoryBytes() {
+  double num_pages = 0.0;
+  double num_resident_pages = 0.0;
+  std::ifstream("/proc/self/statm") >> num_pages >> num_resident_pages;
+  return num_resident_pages * sysconf(_SC_PAGESIZE);
 }
 
 }  // namespace adasfm

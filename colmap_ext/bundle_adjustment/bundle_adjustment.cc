@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <optional>
 #include <stdexcept>
 
@@ -16,6 +17,7 @@
 #include "core/median.h"
 #include "core/option_checker.h"
 #include "core/parallel.h"
+#include "core/release_memory.h"
 #include "core/stopwatch.h"
 
 namespace adasfm {
@@ -36,9 +38,16 @@ constexpr int kMinNumResidualsForThreads = 20000;
 // Beyond so many blocks (1.2 GB) of the factor a point is one for each group of
 // its images of which any two share three points: of 30,000 images 12 to 37 %
 // of the pairs that see points together share fewer, which tell little of each
-// other, but take much of the memory (docs/reference/math.md).
+// other, but take much of the memory (docs/reference/math.md). Where memory is
+// bounded they must share more, in steps of two, up to the last number.
 constexpr size_t kMaxNumBlocksWhole = 4000000;
 constexpr int kMinNumSharedPoints = 3;
+constexpr int kMaxMinNumSharedPoints = 48;
+// Measured on 30,000 images: a block of the equations, with the rows of its
+// numbers, one of their factor, and an observation with its part of its point.
+constexpr double kBytesPerBlock = 440.0;
+constexpr double kBytesPerFactorBlock = 380.0;
+constexpr double kBytesPerObservation = 100.0;
 
 bool HasMeasuredLengths(const std::vector<PosePriorEdge>& priors) {
   return std::any_of(priors.begin(), priors.end(), [](const auto& edge) {
@@ -87,12 +96,27 @@ void AssignWindows(const SharedErrorOptions& options,
   }
 }
 
-// Priors tie images of one drive that see points together anyway.
-size_t CountFactorBlocks(const Covisibility& covisibility) {
-  return FindBlockOrdering(covisibility.Neighbors()).num_factor_blocks;
-}
+// The reduced camera system. Priors tie images of one drive that see points
+// together anyway.
+struct SystemSize {
+  explicit SystemSize(const Covisibility& covisibility)
+      : num_factor_blocks(
+            FindBlockOrdering(covisibility.Neighbors()).num_factor_blocks) {
+    for (const std::vector<int>& neighbors : covisibility.Neighbors()) {
+      num_blocks += 1 + neighbors.size();
+    }
+  }
 
-// How the reduced camera system is solved.
+  double Bytes() const {
+    return kBytesPerBlock * num_blocks +
+           kBytesPerFactorBlock * num_factor_blocks;
+  }
+
+  size_t num_blocks = 0;
+  size_t num_factor_blocks = 0;
+};
+
+// How it is solved.
 struct FactorPlan {
   // Whether its factor is no larger than that of max_num_images_sparse images
   // that all see each other. Drives, nearly banded, stay far below.
@@ -101,18 +125,40 @@ struct FactorPlan {
   std::optional<Covisibility> cut;
 };
 
-FactorPlan PlanFactor(size_t max_num_images_sparse,
+// What the points leave of the memory that the process may take.
+double MaxSystemBytes(double max_memory_gb, const std::set<image_t>& images,
+                      const colmap::Reconstruction& reconstruction) {
+  if (max_memory_gb < 0.0) return std::numeric_limits<double>::infinity();
+  ReleaseFreedMemory();
+  double num_observations = 0.0;
+  for (const image_t image_id : images) {
+    num_observations += reconstruction.Image(image_id).NumPoints3D();
+  }
+  return 1e9 * max_memory_gb - ResidentMemoryBytes() -
+         kBytesPerObservation * num_observations;
+}
+
+FactorPlan PlanFactor(const PriorBundleAdjustmentOptions& options,
                       const std::set<image_t>& images,
                       const colmap::Reconstruction& reconstruction) {
   FactorPlan plan;
-  if (images.size() <= max_num_images_sparse) return plan;
-  size_t num_blocks = CountFactorBlocks(Covisibility(images, reconstruction));
-  if (num_blocks > kMaxNumBlocksWhole) {
-    plan.cut.emplace(images, reconstruction, kMinNumSharedPoints);
-    num_blocks = CountFactorBlocks(*plan.cut);
+  const size_t max_num_images = options.max_num_images_sparse;
+  if (images.size() <= max_num_images && options.max_memory_gb < 0.0) {
+    return plan;
+  }
+  const double max_bytes =
+      MaxSystemBytes(options.max_memory_gb, images, reconstruction);
+  SystemSize size(Covisibility(images, reconstruction));
+  if (size.num_factor_blocks > kMaxNumBlocksWhole || size.Bytes() > max_bytes) {
+    for (int min_num_shared = kMinNumSharedPoints;; min_num_shared *= 2) {
+      plan.cut.emplace(images, reconstruction, min_num_shared);
+      size = SystemSize(*plan.cut);
+      if (size.Bytes() <= max_bytes) break;
+      if (min_num_shared >= kMaxMinNumSharedPoints) break;
+    }
   }
   plan.is_small =
-      num_blocks <= max_num_images_sparse * (max_num_images_sparse - 1) / 2;
+      size.num_factor_blocks <= max_num_images * (max_num_images - 1) / 2;
   return plan;
 }
 
@@ -247,6 +293,7 @@ bool PriorBundleAdjustmentOptions::IsValid(std::string* error) const {
                       "reproj_loss_scale_px", reproj_loss_scale_px,
                       "must be finite")
              .AtLeast(1, "max_num_iterations", max_num_iterations)
+             .PositiveOrMinusOne("max_memory_gb", max_memory_gb)
              .NotNegative({{"function_tolerance", function_tolerance},
                            {"accelerometer_noise", accelerometer_noise}})
              .AtLeast(max_num_images_dense, "max_num_images_sparse",
@@ -269,8 +316,7 @@ PriorBundleAdjustmentSummary AdjustBundle(
   summary.prior_sigma_factors = options.prior_sigma_factors;
   PriorBundleAdjustmentProblem with_windows = problem;
   AssignWindows(options.shared_errors, &with_windows.priors);
-  FactorPlan plan = PlanFactor(options.max_num_images_sparse, problem.images,
-                               *reconstruction);
+  FactorPlan plan = PlanFactor(options, problem.images, *reconstruction);
   BundleProblem bundle(options, with_windows, *reconstruction,
                        /*may_keep_points_apart=*/plan.is_small,
                        plan.cut ? &*plan.cut : nullptr);

@@ -126,6 +126,10 @@ struct PriorBundleAdjustmentOptions {
   // what has a larger factor than the second number of them iteratively.
   int max_num_images_dense = 50;
   int max_num_images_sparse = 5000;
+  // Of the process, in GB (1e9 bytes): where more would be taken, images that
+  // share few points count as sharing none (docs/reference/math.md). -1: as
+  // much as the adjustment needs.
+  double max_memory_gb = -1.0;
 
   bool RefinesCameras() const {
     return refine_focal_length || refine_principal_point || refine_extra_params;

@@ -281,6 +281,7 @@ class GlobalStage {
   void BuildModel(const CoarseComponent& component) {
     CoarseStructureOptions options = options_.structure;
     options.bundle.shared_errors.length_drift_ratio = scene_.length_drift_ratio;
+    options.bundle.max_memory_gb = options_.max_memory_gb;
     CoarseModelInput input = CreateModelInput(
         MatchAnew(options_.refinement, scene_, raw_matches_,
                   correspondences_.bearings, component, result_.poses.graph),

@@ -200,6 +200,7 @@ class ModelRefiner {
     options.refine_extra_params = options_.refine_extra_params;
     options.function_tolerance = function_tolerance;
     options.num_threads = options_.num_threads;
+    options.max_memory_gb = options_.max_memory_gb;
     VarianceComponentOptions balance = local_.balance;
     if (is_tentative) balance.estimate_keypoint_sigma = false;
     const PriorBundleAdjustmentSummary adjustment =

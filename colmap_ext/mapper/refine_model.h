@@ -26,6 +26,8 @@ struct RefineModelOptions {
   double initial_position_loss_scale =
       PriorBundleAdjustmentOptions().position_loss_scale;
   int num_threads = -1;
+  // Of the process, in GB (1e9 bytes); see PriorBundleAdjustmentOptions.
+  double max_memory_gb = -1.0;
 };
 
 struct RefineModelSummary {

@@ -41,8 +41,9 @@ LocalMapperOptions StricterOptions(LocalMapperOptions options) {
   return options;
 }
 
-MapperStageOptions WithThreads(MapperStageOptions options) {
+MapperStageOptions CompleteOptions(MapperStageOptions options) {
   options.refine.num_threads = EffectiveNumThreads(options.num_threads);
+  options.refine.max_memory_gb = options.max_memory_gb;
   return options;
 }
 
@@ -69,7 +70,7 @@ MapperStage::MapperStage(const MapperStageOptions& options,
                          const SceneData& data, const CoarsePoseMap& coarse,
                          const std::string& output_path,
                          MapperProgress progress, PartMapper part_mapper)
-    : options_(WithThreads(options)),
+    : options_(CompleteOptions(options)),
       data_(data),
       coarse_(coarse),
       checkpoint_path_(output_path + "/checkpoints"),

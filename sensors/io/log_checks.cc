@@ -125,8 +125,9 @@ Status CheckLogTimes(const std::vector<timestamp_t>& times_ns,
     return Status::Error(
         origin.Locate(i) +
         FormatFigures(
-            ": time goes back by %.6f s; the log is not in order of time "
-            "or joins two recordings: sort it or cut it",
+            ": time goes back by %.6f s; the log is not in order of time, "
+            "joins two recordings or mixes two sensors: sort it, cut it or "
+            "keep one",
             SecondsFromNs(times_ns[i - 1] - times_ns[i])));
   }
   const double period = ComputeMedianPeriod(times_ns);

@@ -373,6 +373,40 @@ TEST(AdjustBundleTest, ThreadsChangeNothingButRounding) {
   }
 }
 
+// Where its equations do not fit, points are cut, which tell the poses nearly
+// the same; where they do, nothing changes.
+TEST(AdjustBundleTest, CutsPointsWhereMemoryIsBounded) {
+  for (const uint64_t seed : {1, 2, 3}) {
+    BundleWorldOptions world;
+    world.num_images = 100;
+    world.num_keypoints_per_image = 300;
+    world.pixel_noise_px = 0.5;
+    world.seed = seed;
+    std::vector<colmap::Reconstruction> models;
+    std::vector<int> num_points;
+    for (const double max_memory_gb : {-1.0, 1000.0, 1e-3}) {
+      models.push_back(BuildBundleWorld(world));
+      PerturbBundleWorld(2e-3, 0.05, seed, &models.back());
+      PriorBundleAdjustmentProblem problem = ProblemOfAll(models.back());
+      problem.priors = TruePriors(world);
+      PriorBundleAdjustmentOptions options = ConvergeFully();
+      options.max_memory_gb = max_memory_gb;
+      const PriorBundleAdjustmentSummary summary =
+          AdjustBundle(options, problem, &models.back());
+      EXPECT_TRUE(summary.success);
+      num_points.push_back(summary.num_points);
+    }
+    EXPECT_EQ(num_points[1], num_points[0]);
+    EXPECT_GT(num_points[2], num_points[0]);
+    for (const image_t id : models[0].RegImageIds()) {
+      EXPECT_EQ(models[1].Image(id).Tvec(), models[0].Image(id).Tvec());
+    }
+    // What cutting adds to the noise is less than the noise.
+    EXPECT_LT(CenterError(world, models[2]),
+              std::sqrt(2.0) * CenterError(world, models[0]));
+  }
+}
+
 TEST(PosePriorEdgeFromPriorTest, TakesWhatTheFlagsClaim) {
   RelativePosePrior prior;
   prior.image_id1 = 1;
