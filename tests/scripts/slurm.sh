@@ -312,6 +312,8 @@ check_database() {
   rm "$hold/part"
   wait_for 200 'the drive is done' says "$work/drive300" '^Finished'
   same_model "$work/plain" "$work/drive300"
+  grep -q 'AdaSfmMapper.max_memory_gb' "$work"/drive300/logs/merge-*.log ||
+    fail 'the merge does not know what memory it has'
   [ "$(num_runs "$work/drive300" global)" = 1 ] || fail 'the global stage ran twice'
   says "$work/drive300" -E '^parts +[0-9]+ +[0-9]+ +[0-9]+ ' ||
     fail 'the table has no parts'

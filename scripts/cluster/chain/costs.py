@@ -11,6 +11,14 @@ SLOWNESS = 4.0
 MIN_MINUTES = 10.0
 
 
+def whole_mb(facts):
+    """Of adasfm_global and of the merge: more than colmap_ext/stage_memory.cc
+    estimates for the scene."""
+    return (135 + 0.07 * facts['num_images'] +
+            200e-6 * facts['num_keypoints'] +
+            50e-6 * facts['num_inlier_matches'])
+
+
 def memory_mb(stage, settings, facts):
     """Bytes of an image, a keypoint and an inlier, times 1.3 to 1.5 of what was
     measured."""
@@ -30,8 +38,7 @@ def memory_mb(stage, settings, facts):
     if stage.name == 'priors':
         return 120 + 0.1 * images
     if stage.name in ('global', 'merge'):
-        # As colmap_ext/stage_memory.cc, and 50 MB.
-        return 135 + 0.07 * images + 200 * keypoints + 50 * inliers
+        return whole_mb(facts)
     if stage.name == 'parts' and 'part_memory_mb' in facts:
         return 1.2 * facts['scene_memory_mb'] + facts['part_memory_mb']
     return scene + (200 if stage.name == 'parts' else 0)

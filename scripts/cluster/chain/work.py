@@ -11,7 +11,7 @@ import shutil
 import sqlite3
 import subprocess
 
-from chain import prepare
+from chain import costs, prepare
 
 
 class TaskError(Exception):
@@ -277,4 +277,12 @@ def parts(work):
 
 
 def merge(work):
-    mapper(work, 'merge', work.settings.threads)
+    """The adjustment of a large model keeps to what Slurm gives: MiB, which
+    are 5 % more than a thousandth of a GB, for the task itself."""
+    settings = work.settings
+    budget = []
+    given_mb = float(os.environ.get('SLURM_MEM_PER_NODE', 0))
+    if (given_mb >= costs.whole_mb(prepare.expected(settings)) and
+            'max_memory_gb' not in settings.mapper_options):
+        budget = ['--AdaSfmMapper.max_memory_gb', '%.3f' % (given_mb / 1e3)]
+    mapper(work, 'merge', settings.threads, *budget)
