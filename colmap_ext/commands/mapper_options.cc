@@ -96,8 +96,8 @@ void AddMapperOptions(MapOptions* options, CommandOptions* command) {
       "parts at a time; -1: as threads and memory allow");
   add("max_memory_gb", &options->stage.max_memory_gb,
       "for the parts that run at the same time, and for the refinement, which "
-      "cuts points to keep to it and does not begin where it cannot [GB]; -1: "
-      "parts take 70 % of what is available");
+      "cuts points to keep to it and does not begin where the scene may take "
+      "more [GB]; -1: parts take 70 % of what is available");
   command->AddDefault("num_threads", &options->stage.num_threads,
                       "threads; -1: all of the machine's");
   AddPartitionOptions(&options->stage, command);
