@@ -265,10 +265,9 @@ def set_sections(records, benchmark):
 def view_graph_section(record, world):
   return ['## View graph with and without augmentation', '',
           'World: %s. %s Without these (`AdaSfmGlobal.use_augmentation 0`) '
-          'the view graph falls apart, and no part knows its scale. In the '
-          'picture each model is moved so that its first camera is where it '
-          'truly is, and not scaled.' % (command(world),
-                                         view_graph_words(record)), '',
+          'the view graph falls apart. In the picture each model is moved so '
+          'that its first camera is where it truly is, and not scaled.' %
+          (command(world), view_graph_words(record)), '',
           '![View graph, and coarse models without and with sensor edges]'
           '(../images/paper_view_graph.png)', '', *view_graph_table(record), '']
 
