@@ -54,6 +54,25 @@ class BlockMatrix {
     }
   }
 
+  // The blocks below the diagonal of a column of blocks, ascending.
+  const std::vector<int>& RowsOf(int col_block) const {
+    return columns_[col_block].rows;
+  }
+  // Adds to the k-th of RowsOf a block of two factors, kNumRows x 3 and
+  // 3 x kNumCols: without a search, for many additions to one column.
+  template <int kNumRows, int kNumCols>
+  void AddProduct(int col_block, int k,
+                  const Eigen::Matrix<double, kNumRows, 3>& left,
+                  const Eigen::Matrix<double, 3, kNumCols>& right) {
+    const int offset = offsets_[col_block][k];
+    const int* begin = matrix_.outerIndexPtr() + first_[col_block];
+    for (int col = 0; col < kNumCols; ++col) {
+      double* start = matrix_.valuePtr() + begin[col] + kNumCols - col + offset;
+      Eigen::Map<Eigen::Matrix<double, kNumRows, 1>>(start).noalias() +=
+          left * right.col(col);
+    }
+  }
+
   const Eigen::SparseMatrix<double>& Matrix() const { return matrix_; }
   Eigen::SparseMatrix<double>& Matrix() { return matrix_; }
 

@@ -3,21 +3,16 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
-#include <optional>
 #include <stdexcept>
 
-#include "colmap_ext/bundle_adjustment/block_ordering.h"
 #include "colmap_ext/bundle_adjustment/bundle_problem.h"
+#include "colmap_ext/bundle_adjustment/factor_plan.h"
 #include "colmap_ext/bundle_adjustment/inertial_factors.h"
 #include "colmap_ext/bundle_adjustment/minimize_bundle.h"
 #include "colmap_ext/bundle_adjustment/position_priors.h"
 #include "colmap_ext/bundle_adjustment/reduced_system.h"
-#include "colmap_ext/scene/covisibility.h"
-#include "core/median.h"
 #include "core/option_checker.h"
 #include "core/parallel.h"
-#include "core/release_memory.h"
 #include "core/stopwatch.h"
 
 namespace adasfm {
@@ -30,24 +25,8 @@ constexpr double kGaugeLengthRatio = 1e-3;
 // (radius 1e4) would let them go a little at each of many steps, and an
 // adjustment end before they are where they belong.
 constexpr double kInitialTrustRegionRadius = 1e10;
-// Of priors: beyond, a direction is nearly any; below, there is no motion.
-constexpr double kMaxDirectionSigmaRad = 0.5;
-constexpr double kMinLengthM = 1e-9;
 // Problems with fewer residuals are solved faster by one thread.
 constexpr int kMinNumResidualsForThreads = 20000;
-// Beyond so many blocks (1.2 GB) of the factor a point is one for each group of
-// its images of which any two share three points: of 30,000 images 12 to 37 %
-// of the pairs that see points together share fewer, which tell little of each
-// other, but take much of the memory (docs/reference/math.md). Where memory is
-// bounded they must share more, in steps of two, up to the last number.
-constexpr size_t kMaxNumBlocksWhole = 4000000;
-constexpr int kMinNumSharedPoints = 3;
-constexpr int kMaxMinNumSharedPoints = 48;
-// Measured on 30,000 images: a block of the equations, with the rows of its
-// numbers, one of their factor, and an observation with its part of its point.
-constexpr double kBytesPerBlock = 440.0;
-constexpr double kBytesPerFactorBlock = 380.0;
-constexpr double kBytesPerObservation = 100.0;
 
 bool HasMeasuredLengths(const std::vector<PosePriorEdge>& priors) {
   return std::any_of(priors.begin(), priors.end(), [](const auto& edge) {
@@ -61,105 +40,6 @@ void FixGauge(bool has_lengths, BundleProblem* problem) {
   if (constant_images.empty()) problem->FixFirstPose();
   if (has_lengths || constant_images.size() >= 2) return;
   problem->FixDistanceToFarthestPose(kGaugeLengthRatio);
-}
-
-// Numbers the windows of one of the shared errors.
-void AssignWindows(double window_s, int SharedErrorWindows::*number,
-                   std::vector<PosePriorEdge>* edges) {
-  int window = -1;
-  double elapsed_s = 0.0;
-  image_t last_image = kInvalidImageId;
-  for (PosePriorEdge& edge : *edges) {
-    if (edge.dt_s < 0.0) continue;
-    if (window < 0 || edge.image_id1 != last_image || elapsed_s > window_s) {
-      ++window;
-      elapsed_s = 0.0;
-    }
-    edge.windows.*number = window;
-    elapsed_s += edge.dt_s;
-    last_image = edge.image_id2;
-  }
-}
-
-// Once for the windows of each error, and what drifts in them.
-void AssignWindows(const SharedErrorOptions& options,
-                   std::vector<PosePriorEdge>* edges) {
-  AssignWindows(options.gyroscope_window_s, &SharedErrorWindows::gyroscope,
-                edges);
-  AssignWindows(options.direction_window_s, &SharedErrorWindows::direction,
-                edges);
-  const double direction_sigma_rad = MedianDirectionSigma(*edges);
-  if (!(direction_sigma_rad > 0.0)) return;
-  for (PosePriorEdge& edge : *edges) {
-    edge.windows.length_per_direction =
-        options.length_drift_ratio / direction_sigma_rad;
-  }
-}
-
-// The reduced camera system. Priors tie images of one drive that see points
-// together anyway.
-struct SystemSize {
-  explicit SystemSize(const Covisibility& covisibility)
-      : num_factor_blocks(
-            FindBlockOrdering(covisibility.Neighbors()).num_factor_blocks) {
-    for (const std::vector<int>& neighbors : covisibility.Neighbors()) {
-      num_blocks += 1 + neighbors.size();
-    }
-  }
-
-  double Bytes() const {
-    return kBytesPerBlock * num_blocks +
-           kBytesPerFactorBlock * num_factor_blocks;
-  }
-
-  size_t num_blocks = 0;
-  size_t num_factor_blocks = 0;
-};
-
-// How it is solved.
-struct FactorPlan {
-  // Whether its factor is no larger than that of max_num_images_sparse images
-  // that all see each other. Drives, nearly banded, stay far below.
-  bool is_small = true;
-  // Where points must be cut for it.
-  std::optional<Covisibility> cut;
-};
-
-// What the points leave of the memory that the process may take.
-double MaxSystemBytes(double max_memory_gb, const std::set<image_t>& images,
-                      const colmap::Reconstruction& reconstruction) {
-  if (max_memory_gb < 0.0) return std::numeric_limits<double>::infinity();
-  ReleaseFreedMemory();
-  double num_observations = 0.0;
-  for (const image_t image_id : images) {
-    num_observations += reconstruction.Image(image_id).NumPoints3D();
-  }
-  return 1e9 * max_memory_gb - ResidentMemoryBytes() -
-         kBytesPerObservation * num_observations;
-}
-
-FactorPlan PlanFactor(const PriorBundleAdjustmentOptions& options,
-                      const std::set<image_t>& images,
-                      const colmap::Reconstruction& reconstruction) {
-  FactorPlan plan;
-  const size_t max_num_images = options.max_num_images_sparse;
-  if (images.size() <= max_num_images && options.max_memory_gb < 0.0) {
-    return plan;
-  }
-  const double max_bytes =
-      MaxSystemBytes(options.max_memory_gb, images, reconstruction);
-  SystemSize size(Covisibility(images, reconstruction));
-  if (size.num_factor_blocks > kMaxNumBlocksWhole || size.Bytes() > max_bytes) {
-    for (int min_num_shared = kMinNumSharedPoints;; min_num_shared *= 2) {
-      plan.cut.emplace(images, reconstruction, min_num_shared);
-      size = SystemSize(*plan.cut);
-      if (size.Bytes() <= max_bytes) break;
-      if (min_num_shared >= kMaxMinNumSharedPoints) break;
-    }
-  }
-  plan.is_small =
-      size.num_factor_blocks <= max_num_images * (max_num_images - 1) / 2;
-  return plan;
 }
 
 int NumThreads(const PriorBundleAdjustmentOptions& options,
@@ -232,58 +112,6 @@ void SolveByPoints(const PriorBundleAdjustmentOptions& options,
 
 }  // namespace
 
-PosePriorEdge PosePriorEdgeFromPrior(const RelativePosePrior& prior) {
-  PosePriorEdge edge;
-  edge.image_id1 = prior.image_id1;
-  edge.image_id2 = prior.image_id2;
-  edge.cam2_from_cam1 = prior.cam2_from_cam1;
-  // Within a frame of a rig no time passes, and no log measured the motion.
-  if (prior.dt_ns > 0) edge.dt_s = SecondsFromNs(prior.dt_ns);
-  const auto sigma_or_infinity = [](double variance) {
-    return std::isfinite(variance) && variance > 0.0
-               ? std::sqrt(variance)
-               : std::numeric_limits<double>::infinity();
-  };
-  if (prior.HasRotation()) {
-    edge.rotation_sigma_rad =
-        sigma_or_infinity(prior.covariance.topLeftCorner<3, 3>().trace() / 3.0);
-  }
-  const Eigen::Vector3d& translation = prior.cam2_from_cam1.translation;
-  const double length = std::max(kMinLengthM, translation.norm());
-  if (!std::isfinite(length)) return edge;
-  const Eigen::Matrix3d covariance = prior.covariance.bottomRightCorner<3, 3>();
-  const Eigen::Vector3d direction = translation / length;
-  const double variance_along = direction.dot(covariance * direction);
-  const double variance_across = (covariance.trace() - variance_along) / 2.0;
-  // What the accelerometer tells of the unit is given back to the adjusted
-  // model as a whole (KeepInertialUnit); but across a gap it is a measurement.
-  if (prior.HasOwnLength()) {
-    edge.length_sigma_m = sigma_or_infinity(variance_along);
-  }
-  if (prior.HasDirection()) {
-    edge.direction_sigma_rad = sigma_or_infinity(variance_across) / length;
-  }
-  // A motion that drowns in its own noise has no direction.
-  if (edge.direction_sigma_rad > kMaxDirectionSigmaRad) {
-    edge.direction_sigma_rad = std::numeric_limits<double>::infinity();
-    if (prior.HasTranslation()) {
-      edge.translation_sigma_m = sigma_or_infinity(covariance.trace() / 3.0);
-      edge.length_sigma_m = std::numeric_limits<double>::infinity();
-    }
-  }
-  return edge;
-}
-
-double MedianDirectionSigma(const std::vector<PosePriorEdge>& edges) {
-  std::vector<double> sigmas;
-  for (const PosePriorEdge& edge : edges) {
-    if (edge.dt_s >= 0.0 && std::isfinite(edge.direction_sigma_rad)) {
-      sigmas.push_back(edge.direction_sigma_rad);
-    }
-  }
-  return UpperMedian(&sigmas);
-}
-
 bool PriorBundleAdjustmentOptions::IsValid(std::string* error) const {
   return OptionChecker(error)
              .Positive({{"keypoint_sigma_px", keypoint_sigma_px},
@@ -315,12 +143,15 @@ PriorBundleAdjustmentSummary AdjustBundle(
   summary.keypoint_sigma_ratios = options.keypoint_sigma_ratios;
   summary.prior_sigma_factors = options.prior_sigma_factors;
   PriorBundleAdjustmentProblem with_windows = problem;
-  AssignWindows(options.shared_errors, &with_windows.priors);
-  FactorPlan plan = PlanFactor(options, problem.images, *reconstruction);
+  AssignSharedErrorWindows(options.shared_errors, &with_windows.priors);
+  FactorPlan plan =
+      PlanFactor(problem.images, *reconstruction, options.max_num_images_sparse,
+                 options.max_memory_gb);
   BundleProblem bundle(options, with_windows, *reconstruction,
                        /*may_keep_points_apart=*/plan.is_small,
                        plan.cut ? &*plan.cut : nullptr);
   plan.cut.reset();
+  summary.min_num_shared_points = plan.min_num_shared_points;
   const InertialTerms inertial =
       AddInertialFactors(options, problem.inertial_motions, &bundle);
   summary.accelerometer_noise = inertial.noise;
@@ -352,18 +183,6 @@ PriorBundleAdjustmentSummary AdjustBundle(
     if (system != nullptr) *system = BuildReducedSystem(&bundle, inertial.unit);
   }
   return summary;
-}
-
-std::vector<PosePriorEdge> CorrectSharedErrors(
-    const SharedErrorOptions& options, const SharedErrors& shared_errors,
-    std::vector<PosePriorEdge> priors) {
-  AssignWindows(options, &priors);
-  for (PosePriorEdge& edge : priors) {
-    if (edge.dt_s < 0.0) continue;
-    edge.cam2_from_cam1 =
-        shared_errors.Correct(edge.cam2_from_cam1, edge.dt_s, edge.windows);
-  }
-  return priors;
 }
 
 }  // namespace adasfm

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <array>
 #include <limits>
 #include <map>
 #include <memory>
@@ -9,77 +8,15 @@
 #include <string>
 #include <vector>
 
-#include "colmap_ext/bundle_adjustment/shared_errors.h"
+#include "colmap_ext/cost_functions/pose_prior_edge.h"
+#include "colmap_ext/cost_functions/shared_errors.h"
 #include "colmap_ext/host/colmap.h"
 #include "core/camera_rig.h"
 #include "core/inertial_motion.h"
 #include "core/position_prior.h"
-#include "core/relative_pose_prior.h"
-#include "core/rigid3d.h"
 #include "core/types.h"
 
 namespace adasfm {
-
-enum class PriorTerm {
-  kRotation,
-  kDirection,
-  kLength,
-  kTranslation,
-  kVelocity
-};
-inline constexpr int kNumPriorTerms = 5;
-
-// What the sigmas that sensors state are multiplied by, by PriorTerm.
-using PriorSigmaFactors = std::array<double, kNumPriorTerms>;
-inline constexpr PriorSigmaFactors kStatedPriorSigmas = {1.0, 1.0, 1.0, 1.0,
-                                                         1.0};
-
-// A relative-pose term of the adjustment for one edge of the augmented graph
-// (paper, eq. 8; docs/reference/math.md). With P = P_j P_i^-1 of the current
-// poses:
-//   rotation   Log(R R^^T) / rotation_sigma_rad            3 residuals
-//   direction  angle between t and t^ / direction_sigma_rad 2 residuals
-//   length     (|t| - |t^|) / length_sigma_m                1 residual
-//   translation  (t - t^) / translation_sigma_m             3 residuals
-// A term with an infinite sigma is left out. What an accelerometer says of
-// three images (kVelocity) is no edge's (inertial_factors.h).
-struct PosePriorEdge {
-  image_t image_id1 = kInvalidImageId;
-  image_t image_id2 = kInvalidImageId;
-  Rigid3d cam2_from_cam1;
-  double rotation_sigma_rad = std::numeric_limits<double>::infinity();
-  double direction_sigma_rad = std::numeric_limits<double>::infinity();
-  double length_sigma_m = std::numeric_limits<double>::infinity();
-  // In place of direction and length where the motion is too short to have a
-  // direction: with its length alone, every position around it would fit.
-  double translation_sigma_m = std::numeric_limits<double>::infinity();
-  // Whether keypoints hold both images too. An edge that bridges a gap by
-  // itself keeps its full weight, as dropping it would open the gap, and says
-  // nothing of the balance between keypoints and priors.
-  bool is_held_by_points = true;
-  // Whether a sensor measured the length: otherwise it ties images to others
-  // and says nothing of the unit, nor of its own noise.
-  bool is_length_measured = true;
-  // Duration of a motion that sensors measured: it has part in the errors that
-  // their whole log shares (shared_errors.h). Negative: it has none of them.
-  double dt_s = -1.0;
-  // Set by AdjustBundle.
-  SharedErrorWindows windows;
-
-  double SigmaOf(PriorTerm term) const {
-    return std::array<double, kNumPriorTerms>{
-        rotation_sigma_rad, direction_sigma_rad, length_sigma_m,
-        translation_sigma_m,
-        std::numeric_limits<double>::infinity()}[static_cast<size_t>(term)];
-  }
-};
-
-// The edge of a sensor prior with the sigmas of its covariance; what its flags
-// do not claim stays infinite.
-PosePriorEdge PosePriorEdgeFromPrior(const RelativePosePrior& prior);
-
-// Of the directions that the motions of sensors state; 0 when none does.
-double MedianDirectionSigma(const std::vector<PosePriorEdge>& edges);
 
 struct PriorBundleAdjustmentOptions {
   // 1 sigma of a keypoint's position; the unit in which priors and keypoints
@@ -119,8 +56,8 @@ struct PriorBundleAdjustmentOptions {
   int max_num_iterations = 50;
   // Relative change of the cost at which the adjustment has converged.
   double function_tolerance = 1e-5;
-  // Several threads of the solver add in changing order: results then agree up
-  // to rounding only. One thread repeats them bit by bit. -1: all.
+  // -1: all. The result does not depend on it; where Ceres solves, up to
+  // rounding.
   int num_threads = 1;
   // Where Ceres solves (docs/reference/math.md), up to so many images densely;
   // what has a larger factor than the second number of them iteratively.
@@ -177,6 +114,8 @@ struct PriorBundleAdjustmentSummary {
   double initial_cost = 0.0;
   double final_cost = 0.0;
   double seconds = 0.0;
+  // Images that share fewer points counted as sharing none (FactorPlan).
+  int min_num_shared_points = 1;
   // The sigmas that were used.
   double keypoint_sigma_px = 0.0;
   std::map<camera_t, double> keypoint_sigma_ratios;
@@ -209,10 +148,5 @@ PriorBundleAdjustmentSummary AdjustBundle(
     const PriorBundleAdjustmentProblem& problem,
     colmap::Reconstruction* reconstruction,
     std::unique_ptr<ReducedSystem>* system = nullptr);
-
-// The priors of an adjustment without the shared errors that it found.
-std::vector<PosePriorEdge> CorrectSharedErrors(
-    const SharedErrorOptions& options, const SharedErrors& shared_errors,
-    std::vector<PosePriorEdge> priors);
 
 }  // namespace adasfm

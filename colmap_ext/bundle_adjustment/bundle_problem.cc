@@ -3,13 +3,11 @@
 
 #include <ceres/normal_prior.h>
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <functional>
 #include <utility>
 
-#include "colmap_ext/bundle_adjustment/create_reprojection_cost.h"
 #include "colmap_ext/bundle_adjustment/prior_components.h"
 #include "colmap_ext/host/pose_conversion.h"
 
@@ -21,6 +19,7 @@ BundleProblem::BundleProblem(const PriorBundleAdjustmentOptions& options,
                              bool may_keep_points_apart,
                              const Covisibility* covisibility)
     : options_(options),
+      shared_errors_(options.shared_errors, problem.priors),
       prior_loss_(
           std::make_unique<ceres::CauchyLoss>(options.prior_loss_scale)) {
   if (options.reproj_loss_scale_px > 0.0) {
@@ -39,7 +38,7 @@ BundleProblem::BundleProblem(const PriorBundleAdjustmentOptions& options,
   AddPoints(reconstruction, points_apart_ ? covisibility : nullptr);
   AddPriors(problem.priors);
   AddMountPriors(problem.rigs);
-  AddSharedErrorPriors(problem.priors);
+  shared_errors_.AddPriors(problem_.get());
   SetConstantBlocks(reconstruction);
 }
 
@@ -146,143 +145,8 @@ ceres::ResidualBlockId BundleProblem::AddCost(
   return problem_->AddResidualBlock(cost, loss, parameters);
 }
 
-double BundleProblem::KeypointSigmaPx(camera_t camera_id) const {
-  const auto ratio = options_.keypoint_sigma_ratios.find(camera_id);
-  return ratio == options_.keypoint_sigma_ratios.end()
-             ? options_.keypoint_sigma_px
-             : options_.keypoint_sigma_px * ratio->second;
-}
-
-std::vector<BundleProblem::Observation> BundleProblem::FindObservations(
-    const colmap::Reconstruction& reconstruction,
-    const colmap::Point3D& point) const {
-  std::vector<Observation> observations;
-  bool is_adjusted = false;
-  for (const colmap::TrackElement& element : TrackOf(point).Elements()) {
-    const auto block = images_.find(element.image_id);
-    if (block == images_.end()) continue;
-    const AdjustedPose& pose = *block->second.pose;
-    const double depth = pose.rotation.row(2).dot(XyzOf(point) - pose.center);
-    if (!(depth > kMinProjectionDepth)) continue;
-    const colmap::Image& image = reconstruction.Image(element.image_id);
-    Observation observation;
-    observation.image_id = element.image_id;
-    observation.xy = XyOf(image.Point2D(element.point2D_idx));
-    if (!NormalizeKeypoint(reconstruction.Camera(image.CameraId()),
-                           observation.xy, KeypointSigmaPx(image.CameraId()),
-                           &observation.keypoint)) {
-      continue;
-    }
-    observations.push_back(observation);
-    is_adjusted = is_adjusted || !block->second.is_constant;
-  }
-  if (observations.size() < 2 || !is_adjusted) return {};
-  std::stable_sort(observations.begin(), observations.end(),
-                   [](const Observation& a, const Observation& b) {
-                     return a.image_id < b.image_id;
-                   });
-  return observations;
-}
-
-// One alone says nothing.
-std::vector<std::vector<BundleProblem::Observation>> BundleProblem::CutTrack(
-    const Covisibility& covisibility,
-    const std::vector<Observation>& observations) {
-  std::vector<image_t> images;
-  for (const Observation& observation : observations) {
-    images.push_back(observation.image_id);
-  }
-  const std::vector<int> group_of = covisibility.CutTrack(images);
-  std::vector<std::vector<Observation>> groups(
-      *std::max_element(group_of.begin(), group_of.end()) + 1);
-  for (size_t i = 0; i < observations.size(); ++i) {
-    groups[group_of[i]].push_back(observations[i]);
-  }
-  groups.erase(std::remove_if(groups.begin(), groups.end(),
-                              [](const std::vector<Observation>& group) {
-                                return group.size() < 2;
-                              }),
-               groups.end());
-  return groups;
-}
-
-void BundleProblem::AddPoints(const colmap::Reconstruction& reconstruction,
-                              const Covisibility* covisibility) {
-  std::vector<colmap::point3D_t> point_ids;
-  for (const auto& [image_id, block] : images_) {
-    if (block.is_constant) continue;
-    for (const auto& point2D : reconstruction.Image(image_id).Points2D()) {
-      if (point2D.HasPoint3D()) point_ids.push_back(PointIdOf(point2D));
-    }
-  }
-  std::sort(point_ids.begin(), point_ids.end());
-  point_ids.erase(std::unique(point_ids.begin(), point_ids.end()),
-                  point_ids.end());
-  points_.reserve(point_ids.size());
-  if (points_apart_) {
-    size_t num_observations = 0;
-    for (const colmap::point3D_t point_id : point_ids) {
-      num_observations += TrackOf(reconstruction.Point3D(point_id)).Length();
-    }
-    observations_.reserve(num_observations);
-  }
-  for (const colmap::point3D_t point_id : point_ids) {
-    const colmap::Point3D& point = reconstruction.Point3D(point_id);
-    if (!XyzOf(point).allFinite()) continue;
-    const std::vector<Observation> observations =
-        FindObservations(reconstruction, point);
-    if (observations.empty()) continue;
-    const auto add = [&](const std::vector<Observation>& group) {
-      points_.push_back({point_id, XyzOf(point), observations_.size()});
-      for (const Observation& observation : group) {
-        AddObservation(reconstruction, observation, &points_.back());
-      }
-    };
-    if (covisibility == nullptr) {
-      add(observations);
-    } else {
-      for (const auto& group : CutTrack(*covisibility, observations)) {
-        add(group);
-      }
-    }
-  }
-}
-
-void BundleProblem::AddObservation(const colmap::Reconstruction& reconstruction,
-                                   const Observation& observation,
-                                   PointBlock* point) {
-  ImageBlock& block = images_.at(observation.image_id);
-  block.num_observations += 1;
-  if (points_apart_) {
-    observations_.push_back({observation.keypoint, block.pose});
-    return;
-  }
-  const camera_t camera_id =
-      reconstruction.Image(observation.image_id).CameraId();
-  CameraBlock& camera = cameras_.at(camera_id);
-  if (camera.is_constant) {
-    reprojection_costs_.emplace_back(observation.keypoint, block.pose);
-    AddCost(&reprojection_costs_.back(), reprojection_loss_.get(), {&block},
-            {point->xyz.data()});
-    return;
-  }
-  camera.is_used = true;
-  other_costs_.push_back(
-      CreateCameraCost(reconstruction.Camera(camera_id), observation.xy,
-                       KeypointSigmaPx(camera_id), block.pose));
-  AddCost(other_costs_.back().get(), reprojection_loss_.get(), {&block},
-          {point->xyz.data(), camera.params.data()});
-}
-
 void BundleProblem::AddPriors(const std::vector<PosePriorEdge>& edges) {
   using Term = PosePriorCost::Term;
-  SharedErrorWindows last;
-  for (const PosePriorEdge& edge : edges) {
-    last.gyroscope = std::max(last.gyroscope, edge.windows.gyroscope);
-    last.direction = std::max(last.direction, edge.windows.direction);
-  }
-  direction_drift_ = kGyroscopeBias + last.gyroscope + 1;
-  shared_.resize(direction_drift_ + last.direction + 1);
   for (const PosePriorEdge& edge : edges) {
     const auto image1 = images_.find(edge.image_id1);
     const auto image2 = images_.find(edge.image_id2);
@@ -314,7 +178,8 @@ ceres::ResidualBlockId BundleProblem::AddPrior(const PosePriorEdge& edge,
                       : options_.prior_sigma_factors[static_cast<size_t>(term)];
   auto cost = std::make_unique<PosePriorCost>(edge, term, sigma_factor,
                                               image1->pose, image2->pose);
-  const std::vector<double*> shared = SharedParameters(edge, *cost, term);
+  const std::vector<double*> shared =
+      shared_errors_.ParametersOf(edge, *cost, term);
   other_costs_.push_back(std::move(cost));
   image1->num_priors += 1;
   image2->num_priors += 1;
@@ -353,13 +218,6 @@ void BundleProblem::SetConstantBlocks(
   }
 }
 
-BundleProblem::ObservationRange BundleProblem::ObservationsOf(size_t k) const {
-  const PointObservation* data = observations_.data();
-  const size_t end = k + 1 < points_.size() ? points_[k + 1].first_observation
-                                            : observations_.size();
-  return {data + points_[k].first_observation, data + end};
-}
-
 bool BundleProblem::IsPoint(const double* parameters) const {
   if (points_.empty()) return false;
   const std::less<const void*> is_before;
@@ -382,8 +240,8 @@ std::shared_ptr<ceres::ParameterBlockOrdering> BundleProblem::Ordering() {
   }
   // A group of its own: which of the arrays has the lower addresses differs
   // from run to run.
-  for (SharedBlock& block : shared_) {
-    if (block.is_used) ordering->AddElementToGroup(block.values, 2);
+  for (double* values : shared_errors_.Used()) {
+    ordering->AddElementToGroup(values, 2);
   }
   for (auto& [camera_id, mount] : mounts_) {
     if (problem_->HasParameterBlock(mount.parameters)) {
@@ -414,34 +272,6 @@ bool BundleProblem::IsFinite() const {
     if (!all_finite(block.params.data(), block.params.size())) return false;
   }
   return true;
-}
-
-Eigen::Vector3d BundleProblem::PositionOf(size_t begin, size_t end) const {
-  Eigen::Vector3d xyz = points_[begin].xyz;
-  if (end == begin + 1) return xyz;
-  // The robust weights settle slowly where observations disagree.
-  constexpr int kNumIterations = 10;
-  for (int iteration = 0; iteration < kNumIterations; ++iteration) {
-    Eigen::Matrix3d information = Eigen::Matrix3d::Zero();
-    Eigen::Vector3d gradient = Eigen::Vector3d::Zero();
-    for (size_t k = begin; k < end; ++k) {
-      for (const PointObservation& observation : ObservationsOf(k)) {
-        Eigen::Vector2d residual;
-        Eigen::Matrix<double, 2, 3, Eigen::RowMajor> by_point;
-        observation.Evaluate(xyz, residual.data(), nullptr, by_point.data());
-        double rho[3] = {0.0, 1.0, 0.0};
-        if (reprojection_loss_ != nullptr) {
-          reprojection_loss_->Evaluate(residual.squaredNorm(), rho);
-        }
-        information += rho[1] * by_point.transpose() * by_point;
-        gradient += rho[1] * by_point.transpose() * residual;
-      }
-    }
-    const Eigen::Vector3d step = information.ldlt().solve(gradient);
-    if (!step.allFinite()) break;
-    xyz -= step;
-  }
-  return xyz;
 }
 
 void BundleProblem::WriteTo(colmap::Reconstruction* reconstruction) const {

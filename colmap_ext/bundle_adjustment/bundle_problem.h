@@ -8,17 +8,19 @@
 #include <memory>
 #include <vector>
 
-#include "colmap_ext/bundle_adjustment/adjusted_pose.h"
 #include "colmap_ext/bundle_adjustment/bundle_adjustment.h"
-#include "colmap_ext/bundle_adjustment/pose_prior_cost.h"
-#include "colmap_ext/bundle_adjustment/reprojection_cost.h"
-#include "colmap_ext/bundle_adjustment/rig_cost.h"
+#include "colmap_ext/bundle_adjustment/shared_error_blocks.h"
+#include "colmap_ext/cost_functions/adjusted_pose.h"
+#include "colmap_ext/cost_functions/pose_prior_cost.h"
+#include "colmap_ext/cost_functions/reprojection_cost.h"
+#include "colmap_ext/cost_functions/rig_cost.h"
 #include "colmap_ext/scene/covisibility.h"
 
 namespace adasfm {
 
 // The adjustment as a Ceres problem on copies of the poses, points and
-// intrinsics that take part. Blocks are added in the order of ids.
+// intrinsics that take part. Images are added in the order of ids, points in
+// that of the first images that see them.
 class BundleProblem final : private ceres::EvaluationCallback {
  public:
   // The options are valid. Images without a residual do not take part, nor do
@@ -57,7 +59,9 @@ class BundleProblem final : private ceres::EvaluationCallback {
   const AdjustedPose* UsedPose(image_t image_id) const;
   bool IsConstant(image_t image_id) const;
   // The rotation by which T_cam_imu is wrong (shared_errors.h).
-  double* ExtrinsicRotation();
+  double* ExtrinsicRotation() {
+    return shared_errors_.ExtrinsicRotation(problem_.get());
+  }
   // Parameters of the caller's own.
   double* AddParameters(std::vector<double> values);
   // Adds a residual on such poses and parameters and takes both over.
@@ -111,7 +115,9 @@ class BundleProblem final : private ceres::EvaluationCallback {
   std::shared_ptr<ceres::ParameterBlockOrdering> Ordering();
   ceres::Problem* CeresProblem() { return problem_.get(); }
   bool IsFinite() const;
-  SharedErrors EstimatedSharedErrors() const;
+  SharedErrors EstimatedSharedErrors() const {
+    return shared_errors_.Estimated();
+  }
   void WriteTo(colmap::Reconstruction* reconstruction) const;
 
  private:
@@ -132,10 +138,6 @@ class BundleProblem final : private ceres::EvaluationCallback {
   struct CameraBlock {
     std::vector<double> params;
     bool is_constant = false;
-    bool is_used = false;
-  };
-  struct SharedBlock {
-    double values[3] = {0, 0, 0};
     bool is_used = false;
   };
   struct Observation {
@@ -181,20 +183,6 @@ class BundleProblem final : private ceres::EvaluationCallback {
                                   PosePriorCost::Term term, ImageBlock* image1,
                                   ImageBlock* image2,
                                   ceres::LossFunction* loss);
-  // The parameters of the shared errors that the edge has part in.
-  std::vector<double*> SharedParameters(const PosePriorEdge& edge,
-                                        const PosePriorCost& cost,
-                                        PosePriorCost::Term term);
-  // What is believed of the shared errors; errors that no prior has part in do
-  // not take part.
-  void AddSharedErrorPriors(const std::vector<PosePriorEdge>& edges);
-  void AddGyroscopePriors();
-  void AddDirectionDriftPriors(double sigma_rad);
-  // A normal prior around zero; sigma 0 holds the values.
-  void AddSharedErrorPrior(double sigma, SharedBlock* block);
-  // A normal prior of the change from decay * before to block.
-  void AddSharedErrorStep(double sigma, double decay, SharedBlock* before,
-                          SharedBlock* block);
   void SetConstantBlocks(const colmap::Reconstruction& reconstruction);
 
   const PriorBundleAdjustmentOptions options_;
@@ -207,13 +195,7 @@ class BundleProblem final : private ceres::EvaluationCallback {
   std::vector<PointBlock> points_;
   bool points_apart_ = false;
   std::vector<PointObservation> observations_;  // Kept apart.
-  // Parameters of shared_errors.h; those used by a prior take part.
-  static constexpr size_t kExtrinsicRotation = 0;
-  static constexpr size_t kDrivingDirection = 1;
-  static constexpr size_t kGyroscopeBias = 2;  // of the first window
-  std::vector<SharedBlock> shared_;
-  // Where the windows of the direction's drift begin in it.
-  size_t direction_drift_ = kGyroscopeBias;
+  SharedErrorBlocks shared_errors_;
   std::deque<std::vector<double>> other_parameters_;
   std::deque<ReprojectionCost> reprojection_costs_;
   std::vector<std::unique_ptr<ceres::CostFunction>> other_costs_;

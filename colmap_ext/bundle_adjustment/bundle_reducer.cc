@@ -16,7 +16,7 @@ BundleReducer::BundleReducer(BundleProblem* bundle, int num_threads)
   FindPattern();
   OrderBlocks();
   matrix_.Allocate();
-  column_mutexes_ = std::vector<std::mutex>(matrix_.NumBlocks());
+  column_of_block_.assign(matrix_.NumBlocks(), -1);
 }
 
 int BundleReducer::AddBlock(double* parameters, int size) {

@@ -4,8 +4,8 @@
 #include <ceres/ceres.h>
 
 #include <Eigen/Core>
-#include <mutex>
 #include <unordered_map>
+#include <utility>
 #include <vector>
 
 #include "colmap_ext/bundle_adjustment/block_matrix.h"
@@ -27,7 +27,7 @@ namespace adasfm {
 class BundleReducer {
  public:
   // The problem is complete, its gauge too. num_threads: of the points that it
-  // keeps apart; several add in changing order.
+  // keeps apart; any number adds in the same order.
   BundleReducer(BundleProblem* bundle, int num_threads);
 
   // Sets Matrix() and Gradient(); the cost, with the robust weights of all
@@ -76,13 +76,23 @@ class BundleReducer {
     };
     // Those not constant.
     std::vector<Image> images;
+    // Their places in ascending order of blocks, by SortImages.
+    std::vector<int> order;
     Eigen::Matrix3d information;
     Eigen::Vector3d gradient;
     double cost = 0.0;
     // Of the damped information.
     Eigen::Matrix3d covariance;
+
+    void SortImages();
   };
-  // What a range of points adds up to.
+  // What the points at hand add to one column of blocks.
+  struct PointColumn {
+    int block = 0;
+    // A point's place, and that of its image in the point's order.
+    std::vector<std::pair<int, int>> images;
+  };
+  // What a part of the points adds up to.
   struct Totals {
     double cost = 0.0;
     double largest_gradient = 0.0;
@@ -95,14 +105,24 @@ class BundleReducer {
   void OrderBlocks();
   void AddPairsOf(const std::vector<int>& blocks);
 
-  // Calls function(point, scratch, totals) for the points kept apart; the sum
-  // of the totals does not depend on the threads.
+  // Calls function(point, scratch, totals) for points kept apart, from `begin`,
+  // where a part begins, to `end`; appends to the totals of the parts.
   template <typename Function>
-  Totals ForEachPoint(const Function& function) const;
+  void ForEachPoint(size_t begin, size_t end, const Function& function,
+                    std::vector<Totals>* parts) const;
+  static Totals AddUp(const std::vector<Totals>& parts);
   Totals LinearizePoints();
+  // Of the points from `begin` on.
+  void LinearizePoints(size_t begin, std::vector<PointSums>* points,
+                       std::vector<Totals>* parts);
   void Sum(size_t point, PointSums* sums) const;
   void Damp(size_t point, PointSums* sums) const;
-  void EliminatePoint(const PointSums& sums);
+  // Adds what is left of the points to the equations of the poses.
+  void Eliminate(const std::vector<PointSums>& points);
+  // Sets num_columns_ and the columns.
+  void ListColumns(const std::vector<PointSums>& points);
+  void AddToColumn(const std::vector<PointSums>& points,
+                   const PointColumn& column);
   // By the step of the poses; adds to `total`.
   void MovePoint(const Eigen::VectorXd& step, size_t point,
                  const PointSums& sums, Step* total);
@@ -124,12 +144,17 @@ class BundleReducer {
   std::vector<double*> parameters_of_;  // By block.
   std::vector<int> block_of_pose_;      // -1: constant.
   BlockMatrix matrix_;
-  std::vector<std::mutex> column_mutexes_;
   Eigen::VectorXd gradient_;
   // Before the elimination.
   Eigen::VectorXd whole_gradient_;
   Eigen::VectorXd diagonal_;
   double largest_gradient_ = 0.0;
+
+  // Of the points at hand. The first num_columns_ are in use; by block, the
+  // place of its column, or -1.
+  std::vector<PointColumn> columns_;
+  size_t num_columns_ = 0;
+  std::vector<int> column_of_block_;
 
   // Of the damping.
   double inverse_radius_ = 0.0;

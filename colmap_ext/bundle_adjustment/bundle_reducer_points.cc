@@ -3,26 +3,30 @@
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 #include "colmap_ext/bundle_adjustment/bundle_reducer.h"
 #include "core/parallel.h"
 
 namespace adasfm {
+namespace {
 
-template <typename Function>
-BundleReducer::Totals BundleReducer::ForEachPoint(
-    const Function& function) const {
-  constexpr size_t kNumPointsAtOnce = 256;
-  const size_t num_points = bundle_.NumPointsApart();
-  std::vector<Totals> parts((num_points + kNumPointsAtOnce - 1) /
-                            kNumPointsAtOnce);
-  ParallelFor(num_threads_, parts.size(), [&](size_t k) {
-    PointSums sums;
-    const size_t end = std::min(num_points, (k + 1) * kNumPointsAtOnce);
-    for (size_t point = k * kNumPointsAtOnce; point < end; ++point) {
-      function(point, &sums, &parts[k]);
-    }
-  });
+// Added up one by one, then by parts: the same for any number of threads.
+constexpr size_t kNumPointsOfPart = 32;
+// Whose sums, some 10 kB a point, are in memory at the same time: as much as
+// the cache of a core holds.
+constexpr size_t kNumPartsOfThread = 2;
+
+}  // namespace
+
+void BundleReducer::PointSums::SortImages() {
+  order.resize(images.size());
+  std::iota(order.begin(), order.end(), 0);
+  std::sort(order.begin(), order.end(),
+            [&](int a, int b) { return images[a].block < images[b].block; });
+}
+
+BundleReducer::Totals BundleReducer::AddUp(const std::vector<Totals>& parts) {
   Totals all;
   for (const Totals& part : parts) {
     all.cost += part.cost;
@@ -35,21 +39,56 @@ BundleReducer::Totals BundleReducer::ForEachPoint(
   return all;
 }
 
+template <typename Function>
+void BundleReducer::ForEachPoint(size_t begin, size_t end,
+                                 const Function& function,
+                                 std::vector<Totals>* parts) const {
+  parts->resize((end + kNumPointsOfPart - 1) / kNumPointsOfPart);
+  const size_t first_part = begin / kNumPointsOfPart;
+  ParallelFor(num_threads_, parts->size() - first_part, [&](size_t k) {
+    PointSums sums;
+    const size_t first = (first_part + k) * kNumPointsOfPart;
+    const size_t last = std::min(end, first + kNumPointsOfPart);
+    for (size_t point = first; point < last; ++point) {
+      function(point, &sums, &(*parts)[first_part + k]);
+    }
+  });
+}
+
 BundleReducer::Totals BundleReducer::LinearizePoints() {
-  const bool is_first = point_scales_.empty();
-  if (is_first) point_scales_.resize(bundle_.NumPointsApart());
-  return ForEachPoint([&](size_t point, PointSums* sums, Totals* part) {
-    Sum(point, sums);
+  const size_t num_points = bundle_.NumPointsApart();
+  const size_t num_at_once =
+      kNumPointsOfPart * kNumPartsOfThread * EffectiveNumThreads(num_threads_);
+  point_scales_.resize(num_points);
+  std::vector<PointSums> points;
+  std::vector<Totals> parts;
+  for (size_t begin = 0; begin < num_points; begin += num_at_once) {
+    points.resize(std::min(num_at_once, num_points - begin));
+    LinearizePoints(begin, &points, &parts);
+    Eliminate(points);
+  }
+  return AddUp(parts);
+}
+
+void BundleReducer::LinearizePoints(size_t begin,
+                                    std::vector<PointSums>* points,
+                                    std::vector<Totals>* parts) {
+  // The scales of the poses are found at the end of the first call.
+  const bool is_first = scales_.size() == 0;
+  const auto linearize = [&](size_t point, PointSums*, Totals* part) {
+    PointSums& sums = (*points)[point - begin];
+    Sum(point, &sums);
     if (is_first) {
       point_scales_[point] =
-          DampingScales<Eigen::Vector3d>(sums->information.diagonal());
+          DampingScales<Eigen::Vector3d>(sums.information.diagonal());
     }
-    Damp(point, sums);
-    EliminatePoint(*sums);
-    part->cost += sums->cost;
+    Damp(point, &sums);
+    sums.SortImages();
+    part->cost += sums.cost;
     part->largest_gradient = std::max(part->largest_gradient,
-                                      sums->gradient.lpNorm<Eigen::Infinity>());
-  });
+                                      sums.gradient.lpNorm<Eigen::Infinity>());
+  };
+  ForEachPoint(begin, begin + points->size(), linearize, parts);
 }
 
 void BundleReducer::Sum(size_t point, PointSums* sums) const {
@@ -61,7 +100,10 @@ void BundleReducer::Sum(size_t point, PointSums* sums) const {
   Eigen::Vector2d residual;
   Eigen::Matrix<double, 2, 6, Eigen::RowMajor> by_pose;
   Eigen::Matrix<double, 2, 3, Eigen::RowMajor> by_point;
-  for (const PointObservation& observation : bundle_.ObservationsOf(point)) {
+  const BundleProblem::ObservationRange observations =
+      bundle_.ObservationsOf(point);
+  sums->images.reserve(observations.last - observations.first);
+  for (const PointObservation& observation : observations) {
     observation.Evaluate(bundle_.PointApart(point), residual.data(),
                          by_pose.data(), by_point.data());
     double rho[3] = {residual.squaredNorm(), 1.0, 0.0};
@@ -106,33 +148,76 @@ void BundleReducer::Damp(size_t point, PointSums* sums) const {
   if (!sums->covariance.allFinite()) sums->covariance.setZero();
 }
 
-void BundleReducer::EliminatePoint(const PointSums& sums) {
-  for (const PointSums::Image& col : sums.images) {
-    const Eigen::Matrix<double, 6, 3> weighted = col.mixed * sums.covariance;
-    const Eigen::Matrix<double, 3, 6> negative = -weighted.transpose();
-    const std::lock_guard<std::mutex> lock(column_mutexes_[col.block]);
-    const int first = matrix_.FirstColumnOf(col.block);
-    whole_gradient_.segment<6>(first) += col.gradient;
-    diagonal_.segment<6>(first) += col.information.diagonal();
-    gradient_.segment<6>(first) += col.gradient - weighted * sums.gradient;
-    Eigen::Matrix<double, 6, 6> values = col.information;
-    values.noalias() += col.mixed * negative;
-    matrix_.Add(col.block, col.block, values);
-    for (const PointSums::Image& row : sums.images) {
-      if (row.block <= col.block) continue;
-      values.noalias() = row.mixed * negative;
-      matrix_.Add(row.block, col.block, values);
+// Column by column: each is added to by one thread, in the order of the points,
+// and stays in the processor's cache meanwhile.
+void BundleReducer::Eliminate(const std::vector<PointSums>& points) {
+  ListColumns(points);
+  ParallelFor(num_threads_, num_columns_,
+              [&](size_t k) { AddToColumn(points, columns_[k]); });
+  for (size_t k = 0; k < num_columns_; ++k) {
+    column_of_block_[columns_[k].block] = -1;
+  }
+}
+
+void BundleReducer::ListColumns(const std::vector<PointSums>& points) {
+  num_columns_ = 0;
+  for (size_t point = 0; point < points.size(); ++point) {
+    const PointSums& sums = points[point];
+    for (size_t i = 0; i < sums.order.size(); ++i) {
+      const int block = sums.images[sums.order[i]].block;
+      int& column = column_of_block_[block];
+      if (column < 0) {
+        column = static_cast<int>(num_columns_++);
+        if (num_columns_ > columns_.size()) columns_.emplace_back();
+        columns_[column].block = block;
+        columns_[column].images.clear();
+      }
+      columns_[column].images.emplace_back(point, i);
+    }
+  }
+}
+
+void BundleReducer::AddToColumn(const std::vector<PointSums>& points,
+                                const PointColumn& column) {
+  // By the place of another block's column, that of its row in this one.
+  std::vector<int> row_of_column(num_columns_, -1);
+  const std::vector<int>& rows = matrix_.RowsOf(column.block);
+  for (size_t k = 0; k < rows.size(); ++k) {
+    const int other = column_of_block_[rows[k]];
+    if (other >= 0) row_of_column[other] = k;
+  }
+  const int first = matrix_.FirstColumnOf(column.block);
+  for (const auto& [point, i] : column.images) {
+    const PointSums& sums = points[point];
+    const PointSums::Image& image = sums.images[sums.order[i]];
+    const Eigen::Matrix<double, 3, 6> negative =
+        -(image.mixed * sums.covariance).transpose();
+    diagonal_.segment<6>(first) += image.information.diagonal();
+    whole_gradient_.segment<6>(first) += image.gradient;
+    gradient_.segment<6>(first) +=
+        image.gradient + negative.transpose() * sums.gradient;
+    Eigen::Matrix<double, 6, 6> diagonal = image.information;
+    diagonal.noalias() += image.mixed * negative;
+    matrix_.Add(column.block, column.block, diagonal);
+    for (size_t j = i + 1; j < sums.order.size(); ++j) {
+      const PointSums::Image& row = sums.images[sums.order[j]];
+      matrix_.AddProduct<6, 6>(column.block,
+                               row_of_column[column_of_block_[row.block]],
+                               row.mixed, negative);
     }
   }
 }
 
 BundleReducer::Step BundleReducer::Move(const Eigen::VectorXd& step) {
   last_points_.resize(bundle_.NumPointsApart());
-  Step total = ForEachPoint([&](size_t point, PointSums* sums, Totals* part) {
-                 Sum(point, sums);
-                 Damp(point, sums);
-                 MovePoint(step, point, *sums, &part->step);
-               }).step;
+  std::vector<Totals> parts;
+  const auto move = [&](size_t point, PointSums* sums, Totals* part) {
+    Sum(point, sums);
+    Damp(point, sums);
+    MovePoint(step, point, *sums, &part->step);
+  };
+  ForEachPoint(0, bundle_.NumPointsApart(), move, &parts);
+  Step total = AddUp(parts).step;
   MoveOthers(step, &total);
   return total;
 }
@@ -197,17 +282,19 @@ void BundleReducer::TakeBack() {
 double BundleReducer::Cost() {
   bundle_.UpdatePoses();
   const ceres::LossFunction* loss = bundle_.ReprojectionLoss();
-  double cost = ForEachPoint([&](size_t point, PointSums*, Totals* part) {
-                  for (const PointObservation& observation :
-                       bundle_.ObservationsOf(point)) {
-                    Eigen::Vector2d residual;
-                    observation.Evaluate(bundle_.PointApart(point),
-                                         residual.data(), nullptr, nullptr);
-                    double rho[3] = {residual.squaredNorm(), 1.0, 0.0};
-                    if (loss != nullptr) loss->Evaluate(rho[0], rho);
-                    part->cost += 0.5 * rho[0];
-                  }
-                }).cost;
+  std::vector<Totals> parts;
+  const auto add_cost = [&](size_t point, PointSums*, Totals* part) {
+    for (const PointObservation& observation : bundle_.ObservationsOf(point)) {
+      Eigen::Vector2d residual;
+      observation.Evaluate(bundle_.PointApart(point), residual.data(), nullptr,
+                           nullptr);
+      double rho[3] = {residual.squaredNorm(), 1.0, 0.0};
+      if (loss != nullptr) loss->Evaluate(rho[0], rho);
+      part->cost += 0.5 * rho[0];
+    }
+  };
+  ForEachPoint(0, bundle_.NumPointsApart(), add_cost, &parts);
+  double cost = AddUp(parts).cost;
   for (const ceres::ResidualBlockId id : ids_) cost += Evaluate(id, true);
   return cost;
 }

@@ -7,7 +7,7 @@
 #include <set>
 #include <vector>
 
-#include "colmap_ext/bundle_adjustment/adjusted_pose.h"
+#include "colmap_ext/cost_functions/adjusted_pose.h"
 #include "core/inertial_motion.h"
 #include "core/relative_pose_prior.h"
 

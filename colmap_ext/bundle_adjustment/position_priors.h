@@ -5,8 +5,8 @@
 
 #include <Eigen/Core>
 
-#include "colmap_ext/bundle_adjustment/adjusted_pose.h"
 #include "colmap_ext/bundle_adjustment/bundle_adjustment.h"
+#include "colmap_ext/cost_functions/adjusted_pose.h"
 #include "core/position_prior.h"
 
 namespace adasfm {

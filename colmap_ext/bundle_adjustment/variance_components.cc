@@ -129,9 +129,11 @@ class VarianceComponentAdjustment {
   }
 
   void Add(const PriorBundleAdjustmentSummary& summary) {
-    const int num_iterations = summary_.num_iterations;
+    const PriorBundleAdjustmentSummary before = summary_;
     summary_ = summary;
-    summary_.num_iterations += num_iterations;
+    summary_.num_iterations += before.num_iterations;
+    summary_.min_num_shared_points =
+        std::max(summary.min_num_shared_points, before.min_num_shared_points);
   }
 
   // The linear system's factorisation has been timed on less than that only.

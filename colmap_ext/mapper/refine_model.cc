@@ -207,6 +207,8 @@ class ModelRefiner {
         AdjustBundleWithVarianceComponents(
             balance, options, problem, &reconstruction_, keypoint_sigma_factor);
     summary_.num_iterations += adjustment.num_iterations;
+    summary_.min_num_shared_points = std::max(summary_.min_num_shared_points,
+                                              adjustment.min_num_shared_points);
     summary_.keypoint_sigma_px = adjustment.keypoint_sigma_px;
     summary_.keypoint_sigma_ratios = adjustment.keypoint_sigma_ratios;
     summary_.prior_chi2_per_dof = adjustment.prior_chi2_per_dof;

@@ -32,6 +32,8 @@ struct RefineModelOptions {
 
 struct RefineModelSummary {
   int num_iterations = 0;
+  // The most that an adjustment asked for (PriorBundleAdjustmentSummary).
+  int min_num_shared_points = 1;
   // By which the keypoints' sigma is multiplied in balance with the priors.
   // The first rounds begin with what the parts had, the last one with 1.
   double keypoint_sigma_factor = 1.0;

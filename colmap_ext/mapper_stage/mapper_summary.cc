@@ -54,6 +54,7 @@ nlohmann::json MapperSummaryToJson(const MapperStageSummary& summary) {
       {"num_images_put_back", summary.refine.num_images_put_back},
       {"num_images_left_out", summary.refine.num_images_left_out},
       {"num_refinement_iterations", summary.refine.num_iterations},
+      {"min_num_shared_points", summary.refine.min_num_shared_points},
       {"keypoint_sigma_px", summary.refine.keypoint_sigma_px},
       {"prior_chi2_per_dof", summary.refine.prior_chi2_per_dof},
       {"num_parallel_parts", summary.num_parallel_parts},
@@ -113,6 +114,11 @@ std::string FormatMapperSummaryText(const MapperStageSummary& summary) {
   if (summary.started_from_coarse_poses) {
     text << "the merged parts contradicted the priors: the model was refined "
             "from the coarse poses\n";
+  }
+  if (summary.refine.min_num_shared_points > 1) {
+    text << "to save memory, adjustments took images that share fewer than "
+         << summary.refine.min_num_shared_points
+         << " points for images that share none\n";
   }
   text << "seconds: plan " << summary.plan_seconds << ", parts "
        << summary.parts_seconds << ", merge " << summary.merge_seconds

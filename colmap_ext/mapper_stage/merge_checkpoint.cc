@@ -36,6 +36,7 @@ void VisitSummary(Summary& summary, const Visit& visit) {
   visit("num_points", summary.merge.num_points);
   visit("num_merged_points", summary.merge.num_merged_points);
   visit("num_iterations", summary.refine.num_iterations);
+  visit("min_num_shared_points", summary.refine.min_num_shared_points);
   visit("keypoint_sigma_factor", summary.refine.keypoint_sigma_factor);
   visit("keypoint_sigma_px", summary.refine.keypoint_sigma_px);
   visit("keypoint_sigma_ratios", summary.refine.keypoint_sigma_ratios);

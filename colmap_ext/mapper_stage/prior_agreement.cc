@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <utility>
 
-#include "colmap_ext/bundle_adjustment/shared_errors.h"
+#include "colmap_ext/cost_functions/shared_errors.h"
 #include "core/median.h"
 #include "core/so3.h"
 

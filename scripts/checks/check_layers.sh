@@ -41,15 +41,16 @@ colmap_ext/host                colmap_ext/host/v3 colmap_ext/host/v4 core global
 colmap_ext/features            core colmap_ext/host
 colmap_ext/database            core colmap_ext/io colmap_ext/host global/calibration
 colmap_ext/scene               core colmap_ext/io colmap_ext/host colmap_ext/database global/view_graph global/two_view
-colmap_ext/bundle_adjustment   core colmap_ext/host colmap_ext/scene
+colmap_ext/cost_functions      core colmap_ext/host
+colmap_ext/bundle_adjustment   core colmap_ext/host colmap_ext/scene colmap_ext/cost_functions
 colmap_ext/priors              core colmap_ext/host colmap_ext/database colmap_ext/scene sensors sensors/... global/two_view
-colmap_ext/coarse              core colmap_ext/host colmap_ext/bundle_adjustment colmap_ext/scene global global/...
-colmap_ext/mapper              core colmap_ext/host colmap_ext/bundle_adjustment colmap_ext/scene partition
+colmap_ext/coarse              core colmap_ext/host colmap_ext/bundle_adjustment colmap_ext/cost_functions colmap_ext/scene global global/...
+colmap_ext/mapper              core colmap_ext/host colmap_ext/bundle_adjustment colmap_ext/cost_functions colmap_ext/scene partition
 colmap_ext/pairs               core colmap_ext/matching colmap_ext/host colmap_ext/database colmap_ext/scene sensors/io global/odometry
 colmap_ext/evaluation          core colmap_ext/host colmap_ext/scene sensors/io
 colmap_ext/datasets            core colmap_ext/io colmap_ext/host synthetic
 colmap_ext/bags                core sensors/bags sensors/io colmap_ext/io colmap_ext/datasets
-colmap_ext/mapper_stage        core colmap_ext/io colmap_ext/host colmap_ext/bundle_adjustment colmap_ext/scene colmap_ext/mapper partition global/odometry
+colmap_ext/mapper_stage        core colmap_ext/io colmap_ext/host colmap_ext/bundle_adjustment colmap_ext/cost_functions colmap_ext/scene colmap_ext/mapper partition global/odometry
 colmap_ext/report              core colmap_ext/io colmap_ext/host colmap_ext/database colmap_ext/evaluation
 colmap_ext                     core colmap_ext/io colmap_ext/host colmap_ext/database colmap_ext/scene colmap_ext/priors colmap_ext/coarse colmap_ext/mapper_stage
 colmap_ext/workspace           core sensors/io colmap_ext colmap_ext/bags colmap_ext/io colmap_ext/features colmap_ext/host colmap_ext/database colmap_ext/coarse colmap_ext/pairs colmap_ext/datasets colmap_ext/report

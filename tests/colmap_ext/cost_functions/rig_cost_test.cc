@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "colmap_ext/bundle_adjustment/rig_cost.h"
+#include "colmap_ext/cost_functions/rig_cost.h"
 
 #include <gtest/gtest.h>
 
 #include <deque>
 
-#include "colmap_ext/bundle_adjustment/pose_prior_cost.h"
-#include "colmap_ext/bundle_adjustment/reprojection_cost.h"
+#include "colmap_ext/cost_functions/pose_prior_cost.h"
+#include "colmap_ext/cost_functions/reprojection_cost.h"
 #include "core/random.h"
 #include "tests/testing/colmap_ext/bundle_world.h"
 

@@ -6,8 +6,8 @@
 #include <Eigen/Core>
 #include <memory>
 
-#include "colmap_ext/bundle_adjustment/adjusted_pose.h"
-#include "colmap_ext/bundle_adjustment/reprojection_cost.h"
+#include "colmap_ext/cost_functions/adjusted_pose.h"
+#include "colmap_ext/cost_functions/reprojection_cost.h"
 #include "colmap_ext/host/colmap.h"
 
 namespace adasfm {

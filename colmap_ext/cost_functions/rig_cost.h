@@ -5,7 +5,7 @@
 
 #include <vector>
 
-#include "colmap_ext/bundle_adjustment/adjusted_pose.h"
+#include "colmap_ext/cost_functions/adjusted_pose.h"
 
 namespace adasfm {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "colmap_ext/bundle_adjustment/pose_prior_cost.h"
+#include "colmap_ext/cost_functions/pose_prior_cost.h"
 
 #include <cmath>
 

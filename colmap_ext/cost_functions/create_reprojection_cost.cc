@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "colmap_ext/bundle_adjustment/create_reprojection_cost.h"
+#include "colmap_ext/cost_functions/create_reprojection_cost.h"
 
 #include <ceres/autodiff_cost_function.h>
 

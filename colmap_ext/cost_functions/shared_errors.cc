@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "colmap_ext/bundle_adjustment/shared_errors.h"
+#include "colmap_ext/cost_functions/shared_errors.h"
 
 #include "core/option_checker.h"
 #include "core/so3.h"

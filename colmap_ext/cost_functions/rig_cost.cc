@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "colmap_ext/bundle_adjustment/rig_cost.h"
+#include "colmap_ext/cost_functions/rig_cost.h"
 
 #include <algorithm>
 

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "colmap_ext/bundle_adjustment/pose_prior_cost.h"
+#include "colmap_ext/cost_functions/pose_prior_cost.h"
 
 #include <gtest/gtest.h>
 
 #include <functional>
 
-#include "colmap_ext/bundle_adjustment/reprojection_cost.h"
+#include "colmap_ext/cost_functions/reprojection_cost.h"
 #include "core/random.h"
 
 namespace adasfm {

@@ -7,8 +7,8 @@
 #include <Eigen/Core>
 #include <vector>
 
-#include "colmap_ext/bundle_adjustment/adjusted_pose.h"
-#include "colmap_ext/bundle_adjustment/bundle_adjustment.h"
+#include "colmap_ext/cost_functions/adjusted_pose.h"
+#include "colmap_ext/cost_functions/pose_prior_edge.h"
 
 namespace adasfm {
 

@@ -8,7 +8,7 @@
 #include <Eigen/Core>
 #include <algorithm>
 
-#include "colmap_ext/bundle_adjustment/adjusted_pose.h"
+#include "colmap_ext/cost_functions/adjusted_pose.h"
 
 namespace adasfm {
 

@@ -1,0 +1,85 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "colmap_ext/bundle_adjustment/factor_plan.h"
+
+#include <limits>
+#include <vector>
+
+#include "colmap_ext/bundle_adjustment/block_ordering.h"
+#include "core/release_memory.h"
+
+namespace adasfm {
+namespace {
+
+// Beyond so many blocks (1.2 GB) of the factor a point is one for each group of
+// its images of which any two share three points: of 30,000 images 12 to 37 %
+// of the pairs that see points together share fewer, which tell little of each
+// other, but take much of the memory (docs/reference/math.md). Where memory is
+// bounded they must share more, in steps of two, up to the last number.
+constexpr size_t kMaxNumBlocksWhole = 4000000;
+constexpr int kMinNumSharedPoints = 3;
+constexpr int kMaxMinNumSharedPoints = 48;
+// Measured on 30,000 images: a block of the equations, with the rows of its
+// numbers, one of their factor, and an observation with its part of its point.
+constexpr double kBytesPerBlock = 440.0;
+constexpr double kBytesPerFactorBlock = 380.0;
+constexpr double kBytesPerObservation = 100.0;
+
+// The reduced camera system. Priors tie images of one drive that see points
+// together anyway.
+struct SystemSize {
+  explicit SystemSize(const Covisibility& covisibility)
+      : num_factor_blocks(
+            FindBlockOrdering(covisibility.Neighbors()).num_factor_blocks) {
+    for (const std::vector<int>& neighbors : covisibility.Neighbors()) {
+      num_blocks += 1 + neighbors.size();
+    }
+  }
+
+  double Bytes() const {
+    return kBytesPerBlock * num_blocks +
+           kBytesPerFactorBlock * num_factor_blocks;
+  }
+
+  size_t num_blocks = 0;
+  size_t num_factor_blocks = 0;
+};
+
+// What the points leave of the memory that the process may take.
+double MaxSystemBytes(double max_memory_gb, const std::set<image_t>& images,
+                      const colmap::Reconstruction& reconstruction) {
+  if (max_memory_gb < 0.0) return std::numeric_limits<double>::infinity();
+  ReleaseFreedMemory();
+  double num_observations = 0.0;
+  for (const image_t image_id : images) {
+    num_observations += reconstruction.Image(image_id).NumPoints3D();
+  }
+  return 1e9 * max_memory_gb - ResidentMemoryBytes() -
+         kBytesPerObservation * num_observations;
+}
+
+}  // namespace
+
+FactorPlan PlanFactor(const std::set<image_t>& images,
+                      const colmap::Reconstruction& reconstruction,
+                      int max_num_images_sparse, double max_memory_gb) {
+  FactorPlan plan;
+  const size_t max_num_images = max_num_images_sparse;
+  if (images.size() <= max_num_images && max_memory_gb < 0.0) return plan;
+  const double max_bytes =
+      MaxSystemBytes(max_memory_gb, images, reconstruction);
+  SystemSize size(Covisibility(images, reconstruction));
+  if (size.num_factor_blocks > kMaxNumBlocksWhole || size.Bytes() > max_bytes) {
+    for (int min_num_shared = kMinNumSharedPoints;; min_num_shared *= 2) {
+      plan.min_num_shared_points = min_num_shared;
+      plan.cut.emplace(images, reconstruction, min_num_shared);
+      size = SystemSize(*plan.cut);
+      if (size.Bytes() <= max_bytes) break;
+      if (min_num_shared >= kMaxMinNumSharedPoints) break;
+    }
+  }
+  plan.is_small =
+      size.num_factor_blocks <= max_num_images * (max_num_images - 1) / 2;
+  return plan;
+}
+
+}  // namespace adasfm

@@ -1,0 +1,32 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <optional>
+#include <set>
+
+#include "colmap_ext/host/colmap.h"
+#include "colmap_ext/scene/covisibility.h"
+#include "core/types.h"
+
+namespace adasfm {
+
+// How the reduced camera system of an adjustment is solved, by the size of its
+// Cholesky factor.
+struct FactorPlan {
+  // Whether the factor is no larger than that of max_num_images_sparse images
+  // that all see each other. Drives, nearly banded, stay far below.
+  bool is_small = true;
+  // Images that share fewer points count as sharing none: 1, or more where the
+  // factor is large (docs/reference/math.md).
+  int min_num_shared_points = 1;
+  // The pairs that do share them, by which the tracks of points are cut; only
+  // where min_num_shared_points is above 1.
+  std::optional<Covisibility> cut;
+};
+
+// max_memory_gb: of the process, in GB (1e9 bytes); negative: no limit.
+FactorPlan PlanFactor(const std::set<image_t>& images,
+                      const colmap::Reconstruction& reconstruction,
+                      int max_num_images_sparse, double max_memory_gb);
+
+}  // namespace adasfm

@@ -1,0 +1,66 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <ceres/cost_function.h>
+#include <ceres/problem.h>
+
+#include <cstddef>
+#include <memory>
+#include <vector>
+
+#include "colmap_ext/cost_functions/pose_prior_cost.h"
+#include "colmap_ext/cost_functions/pose_prior_edge.h"
+#include "colmap_ext/cost_functions/shared_errors.h"
+
+namespace adasfm {
+
+// The errors that the priors of an adjustment share, as parameters of three
+// numbers each (shared_errors.h). Errors that no prior has part in do not take
+// part.
+class SharedErrorBlocks {
+ public:
+  // The edges' windows are set (AssignSharedErrorWindows).
+  SharedErrorBlocks(const SharedErrorOptions& options,
+                    const std::vector<PosePriorEdge>& edges);
+  SharedErrorBlocks(const SharedErrorBlocks&) = delete;
+  SharedErrorBlocks& operator=(const SharedErrorBlocks&) = delete;
+
+  // Those that the term of an edge has part in.
+  std::vector<double*> ParametersOf(const PosePriorEdge& edge,
+                                    const PosePriorCost& cost,
+                                    PosePriorCost::Term term);
+  // What is believed of the errors that terms have part in. The problem owns no
+  // costs; these live as long as this object.
+  void AddPriors(ceres::Problem* problem);
+  // The rotation by which T_cam_imu is wrong; it takes part from then on.
+  double* ExtrinsicRotation(ceres::Problem* problem);
+
+  std::vector<double*> Used();
+  SharedErrors Estimated() const;
+
+ private:
+  struct Block {
+    double values[3] = {0, 0, 0};
+    bool is_used = false;
+  };
+
+  void AddGyroscopePriors(ceres::Problem* problem);
+  void AddDirectionDriftPriors(ceres::Problem* problem);
+  // A normal prior around zero; sigma 0 holds the values.
+  void AddPrior(double sigma, Block* block, ceres::Problem* problem);
+  // A normal prior of the change from decay * before to block.
+  void AddStep(double sigma, double decay, Block* before, Block* block,
+               ceres::Problem* problem);
+
+  static constexpr size_t kExtrinsicRotation = 0;
+  static constexpr size_t kDrivingDirection = 1;
+  static constexpr size_t kGyroscopeBias = 2;  // of the first window
+  const SharedErrorOptions options_;
+  double direction_drift_sigma_rad_ = 0.0;
+  // Where the windows of the direction's drift begin.
+  size_t direction_drift_ = kGyroscopeBias;
+  std::vector<Block> blocks_;
+  std::vector<std::unique_ptr<ceres::CostFunction>> costs_;
+};
+
+}  // namespace adasfm
