@@ -13,6 +13,9 @@ void LengthPropagation::Spread(int min_num_shared) {
   std::priority_queue<std::pair<int, int>> queue;
   std::vector<int> num_shared(graph_.edges.size(), 0);
   std::vector<char> has_depth(num_known_.size(), false);
+  // Edges that share more than when they were last put into the queue.
+  std::vector<int> grown;
+  std::vector<char> has_grown(graph_.edges.size(), false);
   const auto announce = [&](int edge) {
     for (size_t o = edge_begin_[edge]; o < edge_begin_[edge + 1]; ++o) {
       const int keypoint = observations_[o].keypoint;
@@ -22,16 +25,24 @@ void LengthPropagation::Spread(int min_num_shared) {
            ++k) {
         const int other = observations_[links_[k]].edge;
         if (is_known_[other]) continue;
-        if (++num_shared[other] >= min_num_shared) {
-          queue.emplace(num_shared[other], -other);
-        }
+        if (++num_shared[other] < min_num_shared || has_grown[other]) continue;
+        has_grown[other] = true;
+        grown.push_back(other);
       }
     }
+  };
+  const auto enqueue = [&] {
+    for (const int edge : grown) {
+      queue.emplace(num_shared[edge], -edge);
+      has_grown[edge] = false;
+    }
+    grown.clear();
   };
   const int num_edges = graph_.edges.size();
   for (int e = 0; e < num_edges; ++e) {
     if (is_known_[e]) announce(e);
   }
+  enqueue();
   // How many keypoints an edge shared when it was last refused.
   std::vector<int> num_refused(num_edges, 0);
   while (!queue.empty()) {
@@ -41,6 +52,7 @@ void LengthPropagation::Spread(int min_num_shared) {
     if (is_known_[e] || count <= num_refused[e]) continue;
     if (LearnFromStart(e)) {
       announce(e);
+      enqueue();
     } else {
       num_refused[e] = num_shared[e];
     }
