@@ -90,6 +90,12 @@ int CountTornPriors(const MapperScene& scene) {
       });
 }
 
+// An image that is put back holds on the priors alone and tears none of them.
+int CountContradictions(const MapperScene& scene,
+                        const RefineModelSummary& refined) {
+  return CountTornPriors(scene) + refined.num_images_put_back;
+}
+
 }  // namespace
 
 Status MapperStage::ReadPartReports(bool require_all_parts) {
@@ -154,12 +160,12 @@ Status MapperStage::MergePartModels(const std::string& fingerprint) {
 
 void MapperStage::FallBackToCoarsePoses(std::unique_ptr<MapperScene>* scene) {
   if (!options_.local.use_priors_in_adjustment) return;
-  const int num_torn = CountTornPriors(**scene);
-  if (num_torn == 0) return;
+  const int num_contradictions = CountContradictions(**scene, summary_.refine);
+  if (num_contradictions == 0) return;
   auto coarse_scene = BuildMapperScene(data_, coarse_, (*scene)->images);
   RegisterAtCoarsePoses(coarse_scene.get());
   // Priors that tear in the coarse model too are wrong themselves.
-  if (num_torn <= CountTornPriors(*coarse_scene)) return;
+  if (num_contradictions <= CountTornPriors(*coarse_scene)) return;
   Report("the parts contradict the priors; refining the coarse poses", 0.9);
   RefineModelOptions options = options_.refine;
   options.join_parts = false;
@@ -172,7 +178,7 @@ void MapperStage::FallBackToCoarsePoses(std::unique_ptr<MapperScene>* scene) {
     }
     RefineModel(options, options_.local, round, coarse_scene.get(), &refined);
   }
-  if (CountTornPriors(*coarse_scene) >= num_torn) return;
+  if (CountContradictions(*coarse_scene, refined) >= num_contradictions) return;
   summary_.refine = refined;
   summary_.started_from_coarse_poses = true;
   *scene = std::move(coarse_scene);
