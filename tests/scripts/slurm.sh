@@ -314,6 +314,8 @@ check_database() {
   same_model "$work/plain" "$work/drive300"
   grep -q 'AdaSfmMapper.max_memory_gb' "$work"/drive300/logs/merge-*.log ||
     fail 'the merge does not know what memory it has'
+  grep -q 'AdaSfmGlobal.max_memory_gb' "$work"/drive300/logs/global*.log ||
+    fail 'the global stage does not know what memory it has'
   [ "$(num_runs "$work/drive300" global)" = 1 ] || fail 'the global stage ran twice'
   says "$work/drive300" -E '^parts +[0-9]+ +[0-9]+ +[0-9]+ ' ||
     fail 'the table has no parts'

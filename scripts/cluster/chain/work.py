@@ -237,11 +237,22 @@ def priors(work):
     work.run('adasfm_prior_importer', *arguments)
 
 
+def memory_budget(settings, group, options):
+    """The adjustments of a large model keep to what Slurm gives: MiB, which are
+    5 % more than a thousandth of a GB, for the task itself."""
+    given_mb = float(os.environ.get('SLURM_MEM_PER_NODE', 0))
+    if (given_mb < costs.whole_mb(prepare.expected(settings)) or
+            'max_memory_gb' in options):
+        return []
+    return ['--%s.max_memory_gb' % group, '%.3f' % (given_mb / 1e3)]
+
+
 def global_stage(work):
     settings = work.settings
     work.run('adasfm_global', '--database_path', settings.path('database.db'),
              '--output_path', settings.path('global'),
              '--AdaSfmGlobal.num_threads', settings.threads,
+             *memory_budget(settings, 'AdaSfmGlobal', settings.global_options),
              options=settings.global_options)
 
 
@@ -277,12 +288,6 @@ def parts(work):
 
 
 def merge(work):
-    """The adjustment of a large model keeps to what Slurm gives: MiB, which
-    are 5 % more than a thousandth of a GB, for the task itself."""
     settings = work.settings
-    budget = []
-    given_mb = float(os.environ.get('SLURM_MEM_PER_NODE', 0))
-    if (given_mb >= costs.whole_mb(prepare.expected(settings)) and
-            'max_memory_gb' not in settings.mapper_options):
-        budget = ['--AdaSfmMapper.max_memory_gb', '%.3f' % (given_mb / 1e3)]
-    mapper(work, 'merge', settings.threads, *budget)
+    mapper(work, 'merge', settings.threads,
+           *memory_budget(settings, 'AdaSfmMapper', settings.mapper_options))
