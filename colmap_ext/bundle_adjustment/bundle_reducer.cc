@@ -46,23 +46,37 @@ void BundleReducer::NumberBlocks() {
   }
 }
 
-void BundleReducer::AddPairsOf(const std::vector<int>& blocks) {
-  for (size_t i = 0; i < blocks.size(); ++i) {
-    for (size_t j = 0; j < i; ++j) matrix_.AddPair(blocks[i], blocks[j]);
+// Image by image, each pair once: most points of an image are seen by the same
+// others.
+void BundleReducer::AddPairsOfPoints() {
+  const size_t num_points = bundle_.NumPointsApart();
+  const auto block_of = [&](const PointObservation& observation) {
+    return block_of_pose_[observation.pose - bundle_.Poses().data()];
+  };
+  std::vector<std::vector<int>> points_of(matrix_.NumBlocks());
+  for (size_t k = 0; k < num_points; ++k) {
+    for (const PointObservation& observation : bundle_.ObservationsOf(k)) {
+      const int block = block_of(observation);
+      if (block >= 0) points_of[block].push_back(k);
+    }
+  }
+  std::vector<int> last_pair(matrix_.NumBlocks(), -1);
+  for (int block = 0; block < matrix_.NumBlocks(); ++block) {
+    for (const int k : points_of[block]) {
+      for (const PointObservation& observation : bundle_.ObservationsOf(k)) {
+        const int other = block_of(observation);
+        if (other <= block || last_pair[other] == block) continue;
+        last_pair[other] = block;
+        matrix_.AddPair(block, other);
+      }
+    }
+    points_of[block] = {};
   }
 }
 
 void BundleReducer::FindPattern() {
+  AddPairsOfPoints();
   std::vector<int> blocks;
-  for (size_t k = 0; k < bundle_.NumPointsApart(); ++k) {
-    blocks.clear();
-    for (const PointObservation& observation : bundle_.ObservationsOf(k)) {
-      blocks.push_back(
-          block_of_pose_[observation.pose - bundle_.Poses().data()]);
-    }
-    blocks.erase(std::remove(blocks.begin(), blocks.end(), -1), blocks.end());
-    AddPairsOf(blocks);
-  }
   const double* last_point = nullptr;
   blocks.clear();
   for (const ceres::ResidualBlockId id : ids_) {

@@ -103,7 +103,7 @@ class BundleReducer {
   void NumberBlocks();
   void FindPattern();
   void OrderBlocks();
-  void AddPairsOf(const std::vector<int>& blocks);
+  void AddPairsOfPoints();
 
   // Calls function(point, scratch, totals) for points kept apart, from `begin`,
   // where a part begins, to `end`; appends to the totals of the parts.
