@@ -78,7 +78,6 @@ void BundleReducer::FindPattern() {
   AddPairsOfPoints();
   std::vector<int> blocks;
   const double* last_point = nullptr;
-  blocks.clear();
   for (const ceres::ResidualBlockId id : ids_) {
     problem_.GetParameterBlocksForResidualBlock(id, &parameters_);
     const double* point = nullptr;
