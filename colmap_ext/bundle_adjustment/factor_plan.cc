@@ -14,7 +14,7 @@ namespace {
 // its images of which any two share three points: of 30,000 images 12 to 37 %
 // of the pairs that see points together share fewer, which tell little of each
 // other, but take much of the memory (docs/reference/math.md). Where memory is
-// bounded they must share more, in steps of two, up to the last number.
+// bounded they must share twice as many, and again, up to the last number.
 constexpr size_t kMaxNumBlocksWhole = 4000000;
 constexpr int kMinNumSharedPoints = 3;
 constexpr int kMaxMinNumSharedPoints = 48;

@@ -17,7 +17,7 @@ struct FactorPlan {
   // that all see each other. Drives, nearly banded, stay far below.
   bool is_small = true;
   // Images that share fewer points count as sharing none: 1, or more where the
-  // factor is large (docs/reference/math.md).
+  // factor is large or memory short (docs/reference/math.md).
   int min_num_shared_points = 1;
   // The pairs that do share them, by which the tracks of points are cut; only
   // where min_num_shared_points is above 1.

@@ -445,6 +445,11 @@ TEST_F(MapperStageTest, SummaryIsJsonWithEveryPart) {
   EXPECT_NE(json.find("separator_rmse_after"), std::string::npos);
   EXPECT_NE(FormatMapperSummaryText(summary_).find("60 images"),
             std::string::npos);
+  EXPECT_EQ(FormatMapperSummaryText(summary_).find("to save memory"),
+            std::string::npos);
+  summary_.refine.min_num_shared_points = 12;
+  EXPECT_NE(FormatMapperSummaryText(summary_).find("fewer than 12 points"),
+            std::string::npos);
 }
 
 TEST_F(MapperStageTest, WrongOptionsAreNamed) {
