@@ -11,6 +11,7 @@
 #include "colmap_ext/bundle_adjustment/block_matrix.h"
 #include "colmap_ext/bundle_adjustment/bundle_problem.h"
 #include "colmap_ext/bundle_adjustment/reduced_system.h"
+#include "colmap_ext/bundle_adjustment/settle_point.h"
 
 namespace adasfm {
 
@@ -55,7 +56,8 @@ class BundleReducer {
   // Moves all parameters by the solution of the last equations.
   Step Move(const Eigen::VectorXd& step);
   void TakeBack();
-  double Cost();
+  // Moves each point to its best place by the poses (settle_point.h). The cost.
+  double SettlePoints(const SettlePointOptions& options);
 
  private:
   using RowMajorMatrix =

@@ -279,21 +279,15 @@ void BundleReducer::TakeBack() {
   }
 }
 
-double BundleReducer::Cost() {
+double BundleReducer::SettlePoints(const SettlePointOptions& options) {
   bundle_.UpdatePoses();
-  const ceres::LossFunction* loss = bundle_.ReprojectionLoss();
   std::vector<Totals> parts;
-  const auto add_cost = [&](size_t point, PointSums*, Totals* part) {
-    for (const PointObservation& observation : bundle_.ObservationsOf(point)) {
-      Eigen::Vector2d residual;
-      observation.Evaluate(bundle_.PointApart(point), residual.data(), nullptr,
-                           nullptr);
-      double rho[3] = {residual.squaredNorm(), 1.0, 0.0};
-      if (loss != nullptr) loss->Evaluate(rho[0], rho);
-      part->cost += 0.5 * rho[0];
-    }
+  const auto settle = [&](size_t point, PointSums*, Totals* part) {
+    part->cost +=
+        SettlePoint(options, bundle_.ObservationsOf(point),
+                    bundle_.ReprojectionLoss(), &bundle_.PointApart(point));
   };
-  ForEachPoint(0, bundle_.NumPointsApart(), add_cost, &parts);
+  ForEachPoint(0, bundle_.NumPointsApart(), settle, &parts);
   double cost = AddUp(parts).cost;
   for (const ceres::ResidualBlockId id : ids_) cost += Evaluate(id, true);
   return cost;

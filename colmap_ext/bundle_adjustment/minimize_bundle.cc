@@ -165,13 +165,20 @@ class BundleMinimizer {
       return EndsWithInvalidStep();
     }
     num_invalid_steps_ = 0;
-    const double new_cost = reducer_.Cost();
+    const double new_cost = reducer_.SettlePoints(
+        {options_.max_num_point_iterations, options_.function_tolerance});
     const double decrease = cost_ - new_cost;
     const bool is_short = std::sqrt(moved.squared_length) <=
                           options_.tolerance * (std::sqrt(moved.squared_norm) +
                                                 options_.tolerance);
     if (is_short || std::abs(decrease) <= options_.function_tolerance * cost_) {
-      reducer_.TakeBack();
+      // Ceres goes without the last step; the softest directions are nearer to
+      // the minimum with it.
+      if (decrease > 0.0) {
+        cost_ = new_cost;
+      } else {
+        reducer_.TakeBack();
+      }
       Finish(true, "converged");
       return true;
     }

@@ -16,7 +16,9 @@ struct MinimizeBundleOptions {
   // Of the trust region at first; the damping is its inverse.
   double initial_radius = 1e4;
   int max_num_invalid_steps = 10;  // One after another.
-  int num_threads = 1;             // 1: OpenMP has none either.
+  // Of a point alone, after each step of all (settle_point.h).
+  int max_num_point_iterations = 20;
+  int num_threads = 1;  // 1: OpenMP has none either.
 };
 
 struct MinimizeBundleSummary {
@@ -34,10 +36,11 @@ struct MinimizeBundleSummary {
 // of its cost.
 //
 // Method: Levenberg-Marquardt with the rules of Ceres for damping, acceptance
-// and end, so that both make the same steps; the normal equations of
-// bundle_reducer.h, factorised by CHOLMOD or, where that takes longer, solved
-// by conjugate gradients with the last factor as preconditioner. On failure,
-// where no step is possible, the parameters are the best found.
+// and end; the normal equations of bundle_reducer.h, factorised by CHOLMOD or,
+// where that takes longer, solved by conjugate gradients with the last factor
+// as preconditioner. Unlike in Ceres points go on alone after each step, and
+// the last step is kept. On failure, where no step is possible, the parameters
+// are the best found.
 MinimizeBundleSummary MinimizeBundle(const MinimizeBundleOptions& options,
                                      BundleProblem* bundle);
 

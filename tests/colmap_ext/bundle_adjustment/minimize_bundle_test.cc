@@ -5,7 +5,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <set>
+#include <utility>
 
 #include "colmap_ext/bundle_adjustment/bundle_problem.h"
 #include "tests/testing/colmap_ext/bundle_world_problem.h"
@@ -59,16 +61,15 @@ Solutions SolveBoth(const BundleWorldOptions& world,
   EXPECT_EQ(apart.NumResiduals(), listed.NumResiduals());
   solutions.summary = MinimizeBundle(minimize, &apart);
   EXPECT_TRUE(solutions.summary.success);
-  EXPECT_EQ(solutions.summary.num_iterations,
-            solutions.expected.num_successful_steps +
-                solutions.expected.num_unsuccessful_steps);
   EXPECT_NEAR(solutions.summary.initial_cost, solutions.expected.initial_cost,
               1e-10 * solutions.expected.initial_cost);
-  EXPECT_NEAR(solutions.summary.final_cost, solutions.expected.final_cost,
-              1e-8 * solutions.expected.final_cost);
   listed.WriteTo(&solutions.models[0]);
   apart.WriteTo(&solutions.models[1]);
   return solutions;
+}
+
+int NumIterations(const ceres::Solver::Summary& summary) {
+  return summary.num_successful_steps + summary.num_unsuccessful_steps;
 }
 
 // The reprojection error of a point of the model, were it there, with the
@@ -159,22 +160,60 @@ TEST(MinimizeBundleTest, PointsMayBeCutWhereImagesShareFew) {
   }
 }
 
-// From near the minimum, and from where steps are refused.
+// From near the minimum, and from where steps are refused; before either ends.
 TEST(MinimizeBundleTest, MakesTheStepsOfCeres) {
   BundleWorldOptions world;
   world.pixel_noise_px = 0.5;
   MinimizeBundleOptions minimize;
   minimize.initial_radius = 1e7;
-  for (const double position_error_m : {0.05, 2.0}) {
+  minimize.function_tolerance = 0.0;
+  minimize.max_num_point_iterations = 0;
+  for (const auto& [position_error_m, num_iterations] :
+       {std::pair(0.05, 4), std::pair(2.0, 20)}) {
     SCOPED_TRACE(position_error_m);
+    minimize.max_num_iterations = num_iterations;
     const Solutions solutions =
         SolveBoth(world, minimize, 2e-2, position_error_m);
-    EXPECT_GT(solutions.summary.num_iterations, 3);
+    EXPECT_EQ(solutions.summary.num_iterations, num_iterations + 1);
+    EXPECT_EQ(NumIterations(solutions.expected), num_iterations + 1);
+    EXPECT_NEAR(solutions.summary.final_cost, solutions.expected.final_cost,
+                1e-8 * solutions.expected.final_cost);
     const auto& [by_ceres, by_points] = solutions.models;
     for (const image_t id : by_ceres.RegImageIds()) {
       EXPECT_LT((by_points.Image(id).Tvec() - by_ceres.Image(id).Tvec()).norm(),
                 1e-6);
     }
+  }
+}
+
+// Where Ceres ends, which goes without its last step.
+TEST(MinimizeBundleTest, KeepsItsLastStep) {
+  BundleWorldOptions world;
+  world.pixel_noise_px = 0.5;
+  MinimizeBundleOptions minimize;
+  minimize.initial_radius = 1e7;
+  minimize.max_num_point_iterations = 0;
+  MinimizeBundleOptions fully = minimize;
+  fully.function_tolerance = 1e-12;
+  for (const double position_error_m : {0.05, 2.0}) {
+    SCOPED_TRACE(position_error_m);
+    const Solutions solutions =
+        SolveBoth(world, minimize, 2e-2, position_error_m);
+    EXPECT_EQ(solutions.summary.num_iterations,
+              NumIterations(solutions.expected));
+    EXPECT_LT(solutions.summary.final_cost, solutions.expected.final_cost);
+    EXPECT_GT(
+        solutions.summary.final_cost,
+        (1.0 - minimize.function_tolerance) * solutions.expected.final_cost);
+    const auto& [by_ceres, by_points] = solutions.models;
+    const Solutions best = SolveBoth(world, fully, 2e-2, position_error_m);
+    double distance = 0.0, distance_of_ceres = 0.0;
+    for (const image_t id : by_ceres.RegImageIds()) {
+      const auto& at_best = best.models[1].Image(id).Tvec();
+      distance += (by_points.Image(id).Tvec() - at_best).squaredNorm();
+      distance_of_ceres += (by_ceres.Image(id).Tvec() - at_best).squaredNorm();
+    }
+    EXPECT_LT(distance, distance_of_ceres);
   }
 }
 
@@ -184,6 +223,7 @@ TEST(MinimizeBundleTest, ReusesAFactorThatTakesLong) {
   MinimizeBundleOptions minimize;
   minimize.function_tolerance = 1e-8;
   minimize.initial_radius = 1e10;
+  minimize.max_num_point_iterations = 0;
   for (uint64_t seed = 1; seed <= 3; ++seed) {
     SCOPED_TRACE(seed);
     BundleWorldOptions world;
@@ -192,8 +232,106 @@ TEST(MinimizeBundleTest, ReusesAFactorThatTakesLong) {
     world.pixel_noise_px = 0.5;
     world.seed = seed;
     const Solutions solutions = SolveBoth(world, minimize, 2e-3, 0.05);
+    EXPECT_NEAR(solutions.summary.final_cost, solutions.expected.final_cost,
+                1e-8 * solutions.expected.final_cost);
+    EXPECT_EQ(solutions.summary.num_iterations,
+              NumIterations(solutions.expected));
     EXPECT_LT(solutions.summary.num_factorizations,
               solutions.summary.num_iterations);
+  }
+}
+
+// Exchanges two tracks in a third of the images that see both.
+void ExchangeInPart(colmap::point3D_t id1, colmap::point3D_t id2,
+                    colmap::Reconstruction* model) {
+  std::map<image_t, colmap::TrackElement> of_first;
+  for (const auto& element : TrackOf(model->Point3D(id1)).Elements()) {
+    of_first.emplace(element.image_id, element);
+  }
+  std::vector<std::pair<colmap::TrackElement, colmap::TrackElement>> common;
+  for (const auto& element : TrackOf(model->Point3D(id2)).Elements()) {
+    const auto other = of_first.find(element.image_id);
+    if (other != of_first.end()) common.emplace_back(other->second, element);
+  }
+  for (size_t k = 0; k < common.size() / 3; ++k) {
+    const auto& [first, second] = common[k];
+    model->DeleteObservation(first.image_id, first.point2D_idx);
+    model->DeleteObservation(second.image_id, second.point2D_idx);
+    model->AddObservation(id1, second);
+    model->AddObservation(id2, first);
+  }
+}
+
+// Of points with long tracks whose keypoints are near each other in an image.
+void SpoilTracks(int num_pairs, colmap::Reconstruction* model) {
+  constexpr size_t kMinLength = 6;
+  constexpr double kMaxDistancePx = 20.0;
+  const size_t num_spoilt = 2 * num_pairs;
+  std::set<colmap::point3D_t> spoilt;
+  for (const image_t image_id : model->RegImageIds()) {
+    const colmap::Image& image = model->Image(image_id);
+    std::vector<std::pair<Eigen::Vector2d, colmap::point3D_t>> seen;
+    for (const auto& point2D : image.Points2D()) {
+      if (!point2D.HasPoint3D()) continue;
+      const colmap::point3D_t id = PointIdOf(point2D);
+      if (spoilt.count(id) > 0) continue;
+      if (TrackOf(model->Point3D(id)).Length() < kMinLength) continue;
+      seen.emplace_back(XyOf(point2D), id);
+    }
+    for (size_t a = 0; a < seen.size(); ++a) {
+      for (size_t b = a + 1; b < seen.size(); ++b) {
+        const auto& [xy1, id1] = seen[a];
+        const auto& [xy2, id2] = seen[b];
+        if (spoilt.size() >= num_spoilt) return;
+        if ((xy1 - xy2).norm() > kMaxDistancePx) continue;
+        if (spoilt.count(id1) > 0 || spoilt.count(id2) > 0) continue;
+        ExchangeInPart(id1, id2, model);
+        spoilt.insert({id1, id2});
+      }
+    }
+  }
+  FAIL() << "fewer pairs than asked for";
+}
+
+MinimizeBundleSummary MinimizeSpoilt(uint64_t seed, int num_spoilt_pairs,
+                                     int max_num_point_iterations) {
+  BundleWorldOptions world;
+  world.num_images = 60;
+  world.pixel_noise_px = 0.5;
+  world.seed = seed;
+  colmap::Reconstruction model = BuildBundleWorld(world);
+  SpoilTracks(num_spoilt_pairs, &model);
+  PerturbBundleWorld(2e-3, 0.05, seed, &model);
+  PriorBundleAdjustmentProblem problem = ProblemOfAll(model);
+  problem.priors = TruePriors(world);
+  BundleProblem bundle({}, problem, model, /*may_keep_points_apart=*/true);
+  bundle.FixFirstPose();
+  MinimizeBundleOptions minimize;
+  minimize.initial_radius = 1e10;
+  minimize.function_tolerance = 1e-8;
+  minimize.max_num_point_iterations = max_num_point_iterations;
+  const MinimizeBundleSummary summary = MinimizeBundle(minimize, &bundle);
+  EXPECT_TRUE(summary.success);
+  return summary;
+}
+
+// A few points whose observations contradict each other take many steps, but
+// not of all: those are as few as without such points, and lead to the same
+// minimum.
+TEST(MinimizeBundleTest, ContradictedPointsDoNotHoldUpTheRest) {
+  const int max_num_iterations =
+      MinimizeBundleOptions().max_num_point_iterations;
+  for (uint64_t seed = 1; seed <= 4; ++seed) {
+    SCOPED_TRACE(seed);
+    const MinimizeBundleSummary clean =
+        MinimizeSpoilt(seed, 0, max_num_iterations);
+    const MinimizeBundleSummary together = MinimizeSpoilt(seed, 10, 0);
+    const MinimizeBundleSummary alone =
+        MinimizeSpoilt(seed, 10, max_num_iterations);
+    EXPECT_LE(alone.num_iterations, clean.num_iterations + 1);
+    EXPECT_LT(alone.num_iterations, together.num_iterations);
+    EXPECT_NEAR(alone.final_cost, together.final_cost,
+                1e-6 * together.final_cost);
   }
 }
 
