@@ -2,6 +2,7 @@
 #include "colmap_ext/bundle_adjustment/factor_plan.h"
 
 #include <limits>
+#include <utility>
 #include <vector>
 
 #include "colmap_ext/bundle_adjustment/block_ordering.h"
@@ -67,15 +68,17 @@ FactorPlan PlanFactor(const std::set<image_t>& images,
   if (images.size() <= max_num_images && max_memory_gb < 0.0) return plan;
   const double max_bytes =
       MaxSystemBytes(max_memory_gb, images, reconstruction);
-  SystemSize size(Covisibility(images, reconstruction));
+  Covisibility covisibility(images, reconstruction);
+  SystemSize size(covisibility);
   if (size.num_factor_blocks > kMaxNumBlocksWhole || size.Bytes() > max_bytes) {
     for (int min_num_shared = kMinNumSharedPoints;; min_num_shared *= 2) {
       plan.min_num_shared_points = min_num_shared;
-      plan.cut.emplace(images, reconstruction, min_num_shared);
-      size = SystemSize(*plan.cut);
+      covisibility.Cut(min_num_shared);
+      size = SystemSize(covisibility);
       if (size.Bytes() <= max_bytes) break;
       if (min_num_shared >= kMaxMinNumSharedPoints) break;
     }
+    plan.cut = std::move(covisibility);
   }
   plan.is_small =
       size.num_factor_blocks <= max_num_images * (max_num_images - 1) / 2;

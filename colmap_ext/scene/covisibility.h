@@ -17,6 +17,8 @@ class Covisibility {
   Covisibility(const std::set<image_t>& images,
                const colmap::Reconstruction& reconstruction,
                int min_num_shared_points = 1);
+  // Raises that number.
+  void Cut(int min_num_shared_points);
 
   // Of each image, in order of ids, the places of those behind it that share
   // points with it; sorted.
@@ -28,10 +30,14 @@ class Covisibility {
   std::vector<int> CutTrack(const std::vector<image_t>& images) const;
 
  private:
-  bool SharePoints(image_t image_id1, image_t image_id2) const;
+  // -1: not among the images.
+  int IndexOf(image_t image_id) const;
+  bool SharePoints(int index1, int index2) const;
 
   std::unordered_map<image_t, int> index_of_;
   std::vector<std::vector<int>> neighbors_;
+  // Points, by neighbor.
+  std::vector<std::vector<int>> num_shared_;
 };
 
 }  // namespace adasfm

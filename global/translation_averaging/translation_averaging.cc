@@ -106,9 +106,12 @@ class PositionSolver {
     if (!(unit_ > 0.0)) unit_ = 1.0;
   }
 
-  // IRLS until the centres rest. hold_soft: lengths of soft edges are fixed
-  // too. The number of iterations is added up in the result.
+  // IRLS until the centres rest, or nearly where the refinement follows.
+  // hold_soft: lengths of soft edges are fixed too. The number of iterations is
+  // added up in the result.
   bool Run(bool hold_soft, Vectors* centers, GlobalPositions* result) {
+    const double convergence_ratio =
+        options_.convergence_ratio * (options_.refine ? 10.0 : 1.0);
     result->converged = false;
     for (int k = 0; k < options_.max_num_iterations; ++k) {
       Vectors next;
@@ -119,7 +122,7 @@ class PositionSolver {
               : std::numeric_limits<double>::infinity();
       *centers = next;
       ++result->num_iterations;
-      if (result->last_change < options_.convergence_ratio) {
+      if (result->last_change < convergence_ratio) {
         result->converged = true;
         break;
       }

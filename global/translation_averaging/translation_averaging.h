@@ -17,7 +17,8 @@ namespace adasfm {
 struct TranslationAveragingOptions {
   int max_num_iterations = 100;
   // Iterations stop when the mean movement of the centres falls below this
-  // share of the median edge length.
+  // share of the median edge length; those before the refinement below ten
+  // times as much, as it moves the centres further.
   double convergence_ratio = 1e-4;
   // Sigmas of directions and of relative lengths below this are taken as this.
   double min_sigma = 2e-3;
