@@ -182,12 +182,13 @@ class VarianceComponentAdjustment {
     redundancies_factor_ = factor_;
   }
 
-  // The search needs no last digits.
+  // Mostly there is nothing to raise, and the first adjustment is the last. The
+  // search needs no last digits.
   void RaiseKeypointSigma() {
     const double tolerance =
         std::max(given_.function_tolerance, kSearchFunctionTolerance);
     if (!HasEstimate()) {
-      if (!Adjust(tolerance)) return;
+      if (!Adjust(given_.function_tolerance)) return;
       components_ = Components();
     }
     while (true) {
