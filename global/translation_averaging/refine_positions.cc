@@ -101,7 +101,7 @@ class RefinementSystem {
     if (edge.i == 0 || edge.j == 0) return;
     const int first = FirstColumnOf(std::min(edge.i, edge.j));
     for (int col = 0; col < 3; ++col) {
-      // A column has one value less above the others than the one before.
+      // The diagonal's block has one value less in each further column.
       Eigen::Map<Eigen::Vector3d>(StartOf(first + col) + offsets_[edge_index] -
                                   col) -= term.information.col(col);
     }
