@@ -3,6 +3,8 @@
 
 #include <string>
 
+#include "colmap_ext/bundle_adjustment/settle_point.h"
+
 namespace adasfm {
 
 class BundleProblem;
@@ -17,7 +19,7 @@ struct MinimizeBundleOptions {
   double initial_radius = 1e4;
   int max_num_invalid_steps = 10;  // One after another.
   // Of a point alone, after each step of all (settle_point.h).
-  int max_num_point_iterations = 20;
+  int max_num_point_iterations = SettlePointOptions().max_num_iterations;
   int num_threads = 1;  // 1: OpenMP has none either.
 };
 

@@ -182,8 +182,8 @@ class VarianceComponentAdjustment {
     redundancies_factor_ = factor_;
   }
 
-  // Mostly there is nothing to raise, and the first adjustment is the last. The
-  // search needs no last digits.
+  // Where nothing is to be raised, the first adjustment is the last. The search
+  // needs no last digits.
   void RaiseKeypointSigma() {
     const double tolerance =
         std::max(given_.function_tolerance, kSearchFunctionTolerance);

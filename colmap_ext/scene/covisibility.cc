@@ -6,34 +6,6 @@
 #include "colmap_ext/host/pose_conversion.h"
 
 namespace adasfm {
-namespace {
-
-// Lists of numbers, one behind the other.
-struct Lists {
-  std::vector<size_t> begin = {0};
-  std::vector<int> values;
-};
-
-// Of each number in the lists, those of the lists that have it.
-Lists Invert(const Lists& lists, size_t num_values) {
-  Lists inverse;
-  inverse.begin.assign(num_values + 1, 0);
-  for (const int value : lists.values) ++inverse.begin[value + 1];
-  for (size_t k = 0; k < num_values; ++k) {
-    inverse.begin[k + 1] += inverse.begin[k];
-  }
-  inverse.values.resize(lists.values.size());
-  std::vector<size_t> end = inverse.begin;
-  for (size_t list = 0; list + 1 < lists.begin.size(); ++list) {
-    for (size_t k = lists.begin[list]; k < lists.begin[list + 1]; ++k) {
-      inverse.values[end[lists.values[k]]++] = static_cast<int>(list);
-    }
-  }
-  return inverse;
-}
-
-}  // namespace
-
 Covisibility::Covisibility(const std::set<image_t>& images,
                            const colmap::Reconstruction& reconstruction,
                            int min_num_shared_points) {
@@ -42,26 +14,17 @@ Covisibility::Covisibility(const std::set<image_t>& images,
   }
   neighbors_.resize(images.size());
   num_shared_.resize(images.size());
-  // An image of a point once for each of its keypoints.
-  Lists images_of;
-  for (const auto& [point_id, point] : reconstruction.Points3D()) {
-    for (const auto& element : TrackOf(point).Elements()) {
-      const int index = IndexOf(element.image_id);
-      if (index >= 0) images_of.values.push_back(index);
-    }
-    images_of.begin.push_back(images_of.values.size());
-  }
-  const Lists points_of = Invert(images_of, images.size());
   std::vector<int> num_shared(images.size(), 0);
-  for (size_t index = 0; index < images.size(); ++index) {
+  for (const image_t image_id : images) {
+    if (!reconstruction.ExistsImage(image_id)) continue;
+    const int index = IndexOf(image_id);
     std::vector<int>& neighbors = neighbors_[index];
-    for (size_t k = points_of.begin[index]; k < points_of.begin[index + 1];
-         ++k) {
-      const int point = points_of.values[k];
-      for (size_t i = images_of.begin[point]; i < images_of.begin[point + 1];
-           ++i) {
-        const int other = images_of.values[i];
-        if (other <= static_cast<int>(index)) continue;
+    for (const auto& point2D : reconstruction.Image(image_id).Points2D()) {
+      if (!point2D.HasPoint3D()) continue;
+      const auto& point = reconstruction.Point3D(PointIdOf(point2D));
+      for (const auto& element : TrackOf(point).Elements()) {
+        const int other = IndexOf(element.image_id);
+        if (other <= index) continue;
         if (++num_shared[other] == 1) neighbors.push_back(other);
       }
     }

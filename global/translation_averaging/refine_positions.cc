@@ -53,99 +53,62 @@ class QuietCholesky
   QuietCholesky() { cholmod().print = 0; }
 };
 
-// The normal equations of all centres but the first, in blocks of three.
 class RefinementSystem {
  public:
-  RefinementSystem(int num_nodes, const std::vector<PositionEdge>& edges)
-      : edges_(edges), matrix_(3 * (num_nodes - 1), 3 * (num_nodes - 1)) {
-    std::vector<Eigen::Triplet<double>> triplets;
-    triplets.reserve(9 * edges.size() + 6 * num_nodes);
-    for (int node = 1; node < num_nodes; ++node) {
-      ListBlock(node, node, &triplets);
-    }
-    for (const PositionEdge& edge : edges) {
-      if (edge.i == 0 || edge.j == 0) continue;
-      ListBlock(std::max(edge.i, edge.j), std::min(edge.i, edge.j), &triplets);
-    }
-    matrix_.setFromTriplets(triplets.begin(), triplets.end());
-    for (const PositionEdge& edge : edges) {
-      if (edge.i == 0 || edge.j == 0) {
-        offsets_.push_back(0);
-        continue;
-      }
-      const int col = FirstColumnOf(std::min(edge.i, edge.j));
-      const double* value =
-          &matrix_.coeffRef(FirstColumnOf(std::max(edge.i, edge.j)), col);
-      offsets_.push_back(static_cast<int>(value - StartOf(col)));
-    }
-    factorization_.analyzePattern(matrix_);
-    Clear();
+  explicit RefinementSystem(int num_nodes) : size_(3 * (num_nodes - 1)) {}
+
+  void Clear(size_t num_edges) {
+    triplets_.clear();
+    triplets_.reserve(27 * num_edges + size_);
+    right_side_ = Eigen::VectorXd::Zero(size_);
   }
 
-  void Clear() {
-    matrix_.coeffs().setZero();
-    right_side_ = Eigen::VectorXd::Zero(matrix_.rows());
-  }
-
-  void Add(size_t edge_index, const EdgeTerm& term) {
-    const PositionEdge& edge = edges_[edge_index];
+  void Add(const PositionEdge& edge, const EdgeTerm& term) {
+    const int i = edge.i - 1;
+    const int j = edge.j - 1;
     const Eigen::Vector3d flow = term.information * term.target;
-    if (edge.i > 0) {
-      AddToNode(edge.i, term.information);
-      right_side_.segment<3>(FirstColumnOf(edge.i)) -= flow;
+    if (i >= 0) {
+      AddBlock(i, i, term.information);
+      right_side_.segment<3>(3 * i) -= flow;
     }
-    if (edge.j > 0) {
-      AddToNode(edge.j, term.information);
-      right_side_.segment<3>(FirstColumnOf(edge.j)) += flow;
+    if (j >= 0) {
+      AddBlock(j, j, term.information);
+      right_side_.segment<3>(3 * j) += flow;
     }
-    if (edge.i == 0 || edge.j == 0) return;
-    const int first = FirstColumnOf(std::min(edge.i, edge.j));
-    for (int col = 0; col < 3; ++col) {
-      // The diagonal's block has one value less in each further column.
-      Eigen::Map<Eigen::Vector3d>(StartOf(first + col) + offsets_[edge_index] -
-                                  col) -= term.information.col(col);
+    if (i >= 0 && j >= 0) {
+      AddBlock(std::max(i, j), std::min(i, j), -term.information);
     }
   }
 
   bool Solve(Eigen::VectorXd* solution) {
-    factorization_.factorize(matrix_);
+    Eigen::SparseMatrix<double> matrix(size_, size_);
+    matrix.setFromTriplets(triplets_.begin(), triplets_.end());
+    if (!is_analyzed_) {
+      factorization_.analyzePattern(matrix);
+      is_analyzed_ = true;
+    }
+    factorization_.factorize(matrix);
     if (factorization_.info() != Eigen::Success) return false;
     *solution = factorization_.solve(right_side_);
     return solution->allFinite();
   }
 
  private:
-  static int FirstColumnOf(int node) { return 3 * (node - 1); }
-
-  // The lower triangle only.
-  static void ListBlock(int row_node, int col_node,
-                        std::vector<Eigen::Triplet<double>>* triplets) {
-    for (int col = 0; col < 3; ++col) {
-      for (int row = row_node == col_node ? col : 0; row < 3; ++row) {
-        triplets->emplace_back(FirstColumnOf(row_node) + row,
-                               FirstColumnOf(col_node) + col, 0.0);
+  void AddBlock(int row, int col, const Eigen::Matrix3d& block) {
+    for (int r = 0; r < 3; ++r) {
+      for (int c = 0; c < 3; ++c) {
+        // The lower triangle only.
+        if (row == col && c > r) continue;
+        triplets_.emplace_back(3 * row + r, 3 * col + c, block(r, c));
       }
     }
   }
 
-  double* StartOf(int col) {
-    return matrix_.valuePtr() + matrix_.outerIndexPtr()[col];
-  }
-
-  void AddToNode(int node, const Eigen::Matrix3d& information) {
-    for (int col = 0; col < 3; ++col) {
-      double* start = StartOf(FirstColumnOf(node) + col);
-      for (int row = col; row < 3; ++row)
-        start[row - col] += information(row, col);
-    }
-  }
-
-  const std::vector<PositionEdge>& edges_;
-  Eigen::SparseMatrix<double> matrix_;
-  // Of each edge, its place in the first of its columns.
-  std::vector<int> offsets_;
+  int size_;
+  std::vector<Eigen::Triplet<double>> triplets_;
   Eigen::VectorXd right_side_;
   QuietCholesky factorization_;
+  bool is_analyzed_ = false;
 };
 
 }  // namespace
@@ -162,13 +125,13 @@ bool RefinePositions(const TranslationAveragingOptions& options,
   const double unit = UpperMedian(&lengths);
   if (!(unit > 0.0)) return false;
 
-  RefinementSystem system(num_nodes, edges);
+  RefinementSystem system(num_nodes);
   for (int k = 0; k < options.max_num_refine_iterations; ++k) {
-    system.Clear();
-    for (size_t e = 0; e < edges.size(); ++e) {
+    system.Clear(edges.size());
+    for (const PositionEdge& edge : edges) {
       const Eigen::Vector3d difference =
-          (centers->row(edges[e].j) - centers->row(edges[e].i)).transpose();
-      system.Add(e, ComputeTerm(options, edges[e], difference, 0.02 * unit));
+          (centers->row(edge.j) - centers->row(edge.i)).transpose();
+      system.Add(edge, ComputeTerm(options, edge, difference, 0.02 * unit));
     }
     Eigen::VectorXd solution;
     if (!system.Solve(&solution)) return false;

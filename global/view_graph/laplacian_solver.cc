@@ -40,28 +40,6 @@ bool LaplacianSolver::Solve(const std::vector<double>& weights,
   return false;
 }
 
-void LaplacianSolver::FindPattern() {
-  const int size = num_nodes_ - 1;
-  std::vector<Eigen::Triplet<double>> triplets;
-  triplets.reserve(edges_.size() + size);
-  for (int i = 0; i < size; ++i) triplets.emplace_back(i, i, 0.0);
-  for (const auto& [i, j] : edges_) {
-    if (i == 0 || j == 0) continue;
-    triplets.emplace_back(std::max(i, j) - 1, std::min(i, j) - 1, 0.0);
-  }
-  laplacian_.resize(size, size);
-  laplacian_.setFromTriplets(triplets.begin(), triplets.end());
-  place_of_edge_.assign(edges_.size(), -1);
-  for (size_t e = 0; e < edges_.size(); ++e) {
-    const auto [i, j] = edges_[e];
-    if (i == 0 || j == 0) continue;
-    const double& value =
-        laplacian_.coeffRef(std::max(i, j) - 1, std::min(i, j) - 1);
-    place_of_edge_[e] = static_cast<int>(&value - laplacian_.valuePtr());
-  }
-  factorization_.analyzePattern(laplacian_);
-}
-
 bool LaplacianSolver::SolveWithRidge(const std::vector<double>& weights,
                                      const Vectors& right_side, double ridge,
                                      Vectors* solution) {
@@ -70,21 +48,25 @@ bool LaplacianSolver::SolveWithRidge(const std::vector<double>& weights,
     solution->resize(0, 3);
     return true;
   }
-  if (laplacian_.rows() == 0) FindPattern();
-  laplacian_.coeffs().setZero();
-  double* values = laplacian_.valuePtr();
-  const auto add_to_node = [&](int node, double weight) {
-    // The first of a column is on the diagonal.
-    values[laplacian_.outerIndexPtr()[node - 1]] += weight;
-  };
-  for (int node = 1; node < num_nodes_; ++node) add_to_node(node, ridge);
+  std::vector<Eigen::Triplet<double>> triplets;
+  triplets.reserve(3 * edges_.size() + size);
+  for (int i = 0; i < size; ++i) triplets.emplace_back(i, i, ridge);
   for (size_t e = 0; e < edges_.size(); ++e) {
-    const auto [i, j] = edges_[e];
-    if (i > 0) add_to_node(i, weights[e]);
-    if (j > 0) add_to_node(j, weights[e]);
-    if (place_of_edge_[e] >= 0) values[place_of_edge_[e]] -= weights[e];
+    const int i = std::min(edges_[e].first, edges_[e].second) - 1;
+    const int j = std::max(edges_[e].first, edges_[e].second) - 1;
+    triplets.emplace_back(j, j, weights[e]);
+    if (i < 0) continue;
+    triplets.emplace_back(i, i, weights[e]);
+    // The factorisation reads the lower triangle.
+    triplets.emplace_back(j, i, -weights[e]);
   }
-  factorization_.factorize(laplacian_);
+  Eigen::SparseMatrix<double> laplacian(size, size);
+  laplacian.setFromTriplets(triplets.begin(), triplets.end());
+  if (!is_analyzed_) {
+    factorization_.analyzePattern(laplacian);
+    is_analyzed_ = true;
+  }
+  factorization_.factorize(laplacian);
   if (factorization_.info() != Eigen::Success) return false;
   const Eigen::VectorXd pivots = factorization_.vectorD();
   if (!(pivots.minCoeff() > 1e-14 * pivots.maxCoeff())) return false;

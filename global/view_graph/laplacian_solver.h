@@ -26,19 +26,14 @@ class LaplacianSolver {
              Vectors* nodes);
 
  private:
-  void FindPattern();
   bool SolveWithRidge(const std::vector<double>& weights,
                       const Vectors& right_side, double ridge,
                       Vectors* solution);
 
   int num_nodes_;
   std::vector<std::pair<int, int>> edges_;
-  // Its lower triangle, without the first node.
-  Eigen::SparseMatrix<double> laplacian_;
-  // Of each edge, the place of its value, which all edges between its nodes
-  // share; -1 with the first node.
-  std::vector<int> place_of_edge_;
   Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>> factorization_;
+  bool is_analyzed_ = false;
 };
 
 }  // namespace adasfm

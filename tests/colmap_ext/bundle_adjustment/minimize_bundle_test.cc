@@ -8,6 +8,7 @@
 #include <map>
 #include <set>
 #include <utility>
+#include <vector>
 
 #include "colmap_ext/bundle_adjustment/bundle_problem.h"
 #include "tests/testing/colmap_ext/bundle_world_problem.h"
@@ -66,6 +67,13 @@ Solutions SolveBoth(const BundleWorldOptions& world,
   listed.WriteTo(&solutions.models[0]);
   apart.WriteTo(&solutions.models[1]);
   return solutions;
+}
+
+MinimizeBundleOptions WithoutPointIterations(double initial_radius) {
+  MinimizeBundleOptions options;
+  options.initial_radius = initial_radius;
+  options.max_num_point_iterations = 0;
+  return options;
 }
 
 int NumIterations(const ceres::Solver::Summary& summary) {
@@ -164,10 +172,8 @@ TEST(MinimizeBundleTest, PointsMayBeCutWhereImagesShareFew) {
 TEST(MinimizeBundleTest, MakesTheStepsOfCeres) {
   BundleWorldOptions world;
   world.pixel_noise_px = 0.5;
-  MinimizeBundleOptions minimize;
-  minimize.initial_radius = 1e7;
+  MinimizeBundleOptions minimize = WithoutPointIterations(1e7);
   minimize.function_tolerance = 0.0;
-  minimize.max_num_point_iterations = 0;
   for (const auto& [position_error_m, num_iterations] :
        {std::pair(0.05, 4), std::pair(2.0, 20)}) {
     SCOPED_TRACE(position_error_m);
@@ -190,9 +196,7 @@ TEST(MinimizeBundleTest, MakesTheStepsOfCeres) {
 TEST(MinimizeBundleTest, KeepsItsLastStep) {
   BundleWorldOptions world;
   world.pixel_noise_px = 0.5;
-  MinimizeBundleOptions minimize;
-  minimize.initial_radius = 1e7;
-  minimize.max_num_point_iterations = 0;
+  const MinimizeBundleOptions minimize = WithoutPointIterations(1e7);
   MinimizeBundleOptions fully = minimize;
   fully.function_tolerance = 1e-12;
   for (const double position_error_m : {0.05, 2.0}) {
@@ -220,10 +224,8 @@ TEST(MinimizeBundleTest, KeepsItsLastStep) {
 // Spacing so small that images see most of each other's points: a factorisation
 // takes longer than iterations with an earlier factor.
 TEST(MinimizeBundleTest, ReusesAFactorThatTakesLong) {
-  MinimizeBundleOptions minimize;
+  MinimizeBundleOptions minimize = WithoutPointIterations(1e10);
   minimize.function_tolerance = 1e-8;
-  minimize.initial_radius = 1e10;
-  minimize.max_num_point_iterations = 0;
   for (uint64_t seed = 1; seed <= 3; ++seed) {
     SCOPED_TRACE(seed);
     BundleWorldOptions world;
