@@ -39,7 +39,8 @@ demo_packages=(
   liblz4-dev libmetis-dev libgoogle-glog-dev libsqlite3-dev libglew-dev
   libgl1-mesa-dev libeigen3-dev libceres-dev libsuitesparse-dev
   # Faster than the ATLAS that libceres-dev brings; serial, so that results
-  # do not depend on the number of cores.
+  # do not depend on the number of cores. It has no locks, and errs now and
+  # then when two threads call it at once.
   libopenblas-serial-dev
   # Ours.
   libopencv-dev libyaml-cpp-dev nlohmann-json3-dev libzstd-dev)
