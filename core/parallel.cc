@@ -9,6 +9,8 @@
 #include <thread>
 #include <vector>
 
+#include "core/library_threads.h"
+
 namespace adasfm {
 
 namespace {
@@ -30,6 +32,7 @@ void ParallelFor(int num_threads, size_t count,
   const size_t num_workers =
       std::min<size_t>(EffectiveNumThreads(num_threads), count);
   if (num_workers <= 1) {
+    const OneOpenMpThread one_thread;
     for (size_t i = 0; i < count; ++i) function(i);
     return;
   }
@@ -41,6 +44,7 @@ void ParallelFor(int num_threads, size_t count,
   std::exception_ptr exception;
   size_t exception_index = count;
   const auto work = [&] {
+    const OneOpenMpThread one_thread;
     for (size_t begin = next.fetch_add(block); begin < count && !failed;
          begin = next.fetch_add(block)) {
       for (size_t i = begin; i < std::min(count, begin + block); ++i) {

@@ -38,10 +38,10 @@ demo_packages=(
   libboost-system-dev libboost-test-dev libfreeimage-dev libflann-dev
   liblz4-dev libmetis-dev libgoogle-glog-dev libsqlite3-dev libglew-dev
   libgl1-mesa-dev libeigen3-dev libceres-dev libsuitesparse-dev
-  # Faster than the ATLAS that libceres-dev brings; serial, so that results
-  # do not depend on the number of cores. It has no locks, and errs now and
-  # then when two threads call it at once.
-  libopenblas-serial-dev
+  # Faster than the ATLAS that libceres-dev brings. This build starts no
+  # threads before it is asked to, and our commands never ask; the serial one
+  # errs when two threads call it at once, for it has no locks.
+  libopenblas-openmp-dev
   # Ours.
   libopencv-dev libyaml-cpp-dev nlohmann-json3-dev libzstd-dev)
 more_packages=(

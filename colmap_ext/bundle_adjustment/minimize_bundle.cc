@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "colmap_ext/bundle_adjustment/minimize_bundle.h"
 
-#include <omp.h>
-
 #include <Eigen/IterativeLinearSolvers>
 #include <algorithm>
 #include <cmath>
@@ -29,19 +27,6 @@ constexpr double kOperationsPerEntry = 60.0;
 // What has been freed on the way to the equations of thousands of images takes
 // as much as a tenth of all memory, beside the factor.
 constexpr int kMinNumResidualsToRelease = 1000000;
-
-// CHOLMOD takes OpenMP's threads, however many its caller may use.
-class WithoutOpenMpThreads {
- public:
-  explicit WithoutOpenMpThreads(bool is_wanted)
-      : max_active_levels_(omp_get_max_active_levels()) {
-    if (is_wanted) omp_set_max_active_levels(0);
-  }
-  ~WithoutOpenMpThreads() { omp_set_max_active_levels(max_active_levels_); }
-
- private:
-  const int max_active_levels_;
-};
 
 class TrustRegion {
  public:
@@ -217,7 +202,6 @@ class BundleMinimizer {
 
 MinimizeBundleSummary MinimizeBundle(const MinimizeBundleOptions& options,
                                      BundleProblem* bundle) {
-  const WithoutOpenMpThreads serial(options.num_threads == 1);
   return BundleMinimizer(options, bundle).Run();
 }
 

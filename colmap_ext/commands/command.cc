@@ -22,6 +22,7 @@
 
 #include "colmap_ext/commands/progress_display.h"
 #include "core/interruption.h"
+#include "core/library_threads.h"
 #include "sensors/io/log_file.h"
 
 namespace adasfm {
@@ -148,10 +149,19 @@ Status CheckAddressSpace() {
                        std::to_string(needed >> 10) + "; raise the limit");
 }
 
+constexpr char kUnsafeBlas[] =
+    "WARNING: this OpenBLAS has no locks, and errs now and then when several "
+    "threads multiply at once; install another build of it (Debian: "
+    "libopenblas0-pthread or libopenblas0-openmp in place of "
+    "libopenblas0-serial)";
+
 // The exit code of the command.
 int CatchAndRun(const Command& command, int argc, char** argv) {
   try {
     Status status = CheckAddressSpace();
+    const OneOpenMpThread one_thread;
+    UseOneBlasThread();
+    if (!IsBlasSafeInThreads()) std::cerr << kUnsafeBlas << std::endl;
     if (status.ok()) status = command.run(argc, argv);
     if (status.ok()) return EXIT_SUCCESS;
     PrintError(status.message());

@@ -92,19 +92,16 @@ def with_threads(arguments):
 
 def inject(world, shim, command, fault):
   """The command with a call that fails, then without; how it ended."""
-  # Sums of several threads differ in their last bits, and with them the
-  # checkpoints that the second run goes on from.
-  has_threads = fault.startswith('thread')
   arguments = CASES[command][1]
-  if has_threads:
+  if fault.startswith('thread'):
     arguments = with_threads(arguments)
   world.begin(command)
   try:
     outcome = world.start(command, arguments, {
         'LD_PRELOAD': shim, 'ADASFM_FAULT': fault}).wait()
-    if outcome.require_answer() and not has_threads:
+    if outcome.require_answer():
       world.check(command)
-    world.check_after_rerun(command, may_round=has_threads)
+    world.check_after_rerun(command)
   except Wrong as error:
     raise Wrong('ADASFM_FAULT=%s: %s' % (fault, error)) from None
   return outcome

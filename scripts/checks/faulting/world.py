@@ -7,7 +7,6 @@ import resource
 import shutil
 import signal
 import sqlite3
-import struct
 import subprocess
 import threading
 import time
@@ -15,11 +14,9 @@ import time
 NUM_IMAGES = '30'
 # Far more than any command takes on such a world [s].
 TIMEOUT_S = 120
-# Of a pose: 3e-9 is what other threads change on such a world [m, -].
-MAX_ROUNDING = 1e-6
 # No command needs half as much on such a world; runaway memory stops there.
 MAX_ADDRESS_SPACE = 8 << 30
-# Small parts, so that there are several; one thread, so that sums are repeatable.
+# Small parts, so that there are several.
 ONE_THREAD = ['--num_threads', '1']
 SMALL_PARTS = ['--AdaSfmPartition.max_num_images_undivided', '12',
                '--AdaSfmPartition.max_part_size', '16',
@@ -157,34 +154,6 @@ def digest(path):
   return sha.hexdigest()
 
 
-def read_poses(path):
-  """{image: its pose} of COLMAP's images.bin."""
-  with open(path, 'rb') as file:
-    content = file.read()
-  poses = {}
-  offset = 8
-  for _ in range(struct.unpack_from('<Q', content)[0]):
-    image, *pose = struct.unpack_from('<I7d', content, offset)
-    end = content.index(b'\0', offset + 64) + 1
-    offset = end + 8 + 24 * struct.unpack_from('<Q', content, end)[0]
-    poses[image] = pose
-  return poses
-
-
-def is_close(path1, path2):
-  """Whether two files of a model or a checkpoint agree but for rounding, as
-  made by other numbers of threads."""
-  if path1.endswith('images.bin'):
-    poses1, poses2 = read_poses(path1), read_poses(path2)
-    return poses1.keys() == poses2.keys() and all(
-        abs(a - b) < MAX_ROUNDING for image in poses1
-        for a, b in zip(poses1[image], poses2[image]))
-  # With costs in the state of a checkpoint.
-  return path1.endswith('state.json') or (
-      path1.endswith('points3D.bin') and
-      os.path.getsize(path1) == os.path.getsize(path2))
-
-
 def digests(folder):
   """Of all files but locks and what SQLite keeps beside a database. Logs count
   as being there: they tell how long the work took, and what was done twice."""
@@ -274,22 +243,20 @@ class World:
           found.get(os.path.basename(name)) != value):
         raise Wrong('%s: %s is not as undisturbed' % (command, name))
 
-  def check(self, command, may_round=False):
+  def check(self, command):
     """Wrong unless the trial's folder is as after the undisturbed command."""
     found = digests(self.folder)
     for name, value in self.expected[command].items():
       if name not in found:
         raise Wrong('%s: %s is missing' % (command, name))
-      if found[name] != value and not (may_round and is_close(
-          os.path.join(self.folder, name),
-          os.path.join(self.state(command), name))):
+      if found[name] != value:
         raise Wrong('%s: %s is not as undisturbed' % (command, name))
     strange = set(found) ^ self.names[command]
     if strange:
       raise Wrong('%s: other files than undisturbed: %s' %
                   (command, ' '.join(sorted(strange)[:5])))
 
-  def check_after_rerun(self, command, may_round=False):
+  def check_after_rerun(self, command):
     """The same command once more must end as if nothing had been."""
     self.start(command).wait().require_success()
-    self.check(command, may_round)
+    self.check(command)

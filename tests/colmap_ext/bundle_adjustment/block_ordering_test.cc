@@ -4,7 +4,10 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cstdlib>
 #include <vector>
+
+#include "core/parallel.h"
 
 namespace adasfm {
 namespace {
@@ -60,6 +63,38 @@ TEST(BlockOrderingTest, GrowsWithTheStreetsThatCross) {
     crossing[i].push_back((i * 7 + 190) % num_images);
   }
   EXPECT_GT(NumFactorBlocks(crossing), band);
+}
+
+// A mower's lanes, each image tied to those around it: dissection fills less
+// than minimum degree.
+Neighbors MakeLanes(int num_lanes, int lane_length) {
+  const int num_images = num_lanes * lane_length;
+  Neighbors lanes(num_images);
+  for (int i = 0; i < num_images; ++i) {
+    for (const int step : {1, lane_length - 1, lane_length, lane_length + 1}) {
+      if (i + step < num_images) lanes[i].push_back(i + step);
+    }
+  }
+  return lanes;
+}
+
+// METIS draws from rand(), which COLMAP's threads seed.
+TEST(BlockOrderingTest, OrdersSideBySideAreThoseOfOneThread) {
+  std::vector<Neighbors> graphs;
+  std::vector<std::vector<int>> expected;
+  for (int i = 0; i < 4; ++i) {
+    graphs.push_back(MakeLanes(12 + i, 20));
+    expected.push_back(FindBlockOrdering(graphs[i]).block_of_number);
+  }
+  std::vector<int> num_others(graphs.size(), 0);
+  ParallelFor(4, graphs.size(), [&](size_t i) {
+    for (int k = 0; k < 100; ++k) {
+      std::srand(k);
+      num_others[i] +=
+          FindBlockOrdering(graphs[i]).block_of_number != expected[i];
+    }
+  });
+  EXPECT_EQ(num_others, std::vector<int>(graphs.size(), 0));
 }
 
 }  // namespace

@@ -2,6 +2,7 @@
 #include "colmap_ext/commands/command.h"
 
 #include <gtest/gtest.h>
+#include <omp.h>
 
 #include <atomic>
 #include <cstdlib>
@@ -27,6 +28,17 @@ TEST(RunCommandDeathTest, NothingEndsInACoreDump) {
       testing::ExitedWithCode(1), "ERROR: adasfm_test: out of memory");
   EXPECT_EXIT(RunThat([](int, char**) -> Status { std::abort(); }),
               testing::ExitedWithCode(1), "ERROR: a library aborted");
+}
+
+TEST(RunCommand, LibrariesBringNoThreads) {
+  omp_set_num_threads(3);
+  static int num_threads = 0;
+  EXPECT_EQ(RunThat([](int, char**) {
+              num_threads = omp_get_max_threads();
+              return Status::Ok();
+            }),
+            0);
+  EXPECT_EQ(num_threads, 1);
 }
 
 // As OpenMP does when its threads cannot be had.
