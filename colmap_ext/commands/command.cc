@@ -158,11 +158,13 @@ constexpr char kUnsafeBlas[] =
 // The exit code of the command.
 int CatchAndRun(const Command& command, int argc, char** argv) {
   try {
-    Status status = CheckAddressSpace();
     const OneOpenMpThread one_thread;
-    UseOneBlasThread();
     if (!IsBlasSafeInThreads()) std::cerr << kUnsafeBlas << std::endl;
-    if (status.ok()) status = command.run(argc, argv);
+    Status status = CheckAddressSpace();
+    if (status.ok()) {
+      UseOneBlasThread();  // OpenBLAS takes a buffer for it.
+      status = command.run(argc, argv);
+    }
     if (status.ok()) return EXIT_SUCCESS;
     PrintError(status.message());
   } catch (const Interruption&) {
