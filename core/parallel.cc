@@ -1,15 +1,23 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "core/parallel.h"
 
+#include <dlfcn.h>
+
 #include <algorithm>
 #include <atomic>
+#include <cstdlib>
 #include <exception>
 #include <mutex>
 #include <system_error>
 #include <thread>
 #include <vector>
 
-#include "core/library_threads.h"
+// In place of the C library's, which all threads draw from: see the header.
+namespace {
+thread_local unsigned state_of_rand = 1;
+}  // namespace
+extern "C" void srand(unsigned seed) noexcept { state_of_rand = seed; }
+extern "C" int rand() noexcept { return rand_r(&state_of_rand); }
 
 namespace adasfm {
 
@@ -18,6 +26,33 @@ namespace {
 // More threads for each of the machine's only cost time: 10,000 took nine times
 // as long as 2.
 constexpr int kMaxThreadsEach = 16;
+
+// What openblas_get_parallel returns for a build without threads.
+constexpr int kSequential = 0;
+
+// Of whatever library the process has it from, since any BLAS may be installed
+// in the place of another; null if there is none.
+template <typename Function>
+Function* FindFunction(const char* name) {
+  return reinterpret_cast<Function*>(dlsym(RTLD_DEFAULT, name));
+}
+
+// How many threads loops have, unless they ask for a number, and how deep loops
+// in loops may have threads.
+struct OpenMp {
+  int (*get_num_threads)() = FindFunction<int()>("omp_get_max_threads");
+  void (*set_num_threads)(int) = FindFunction<void(int)>("omp_set_num_threads");
+  int (*get_levels)() = FindFunction<int()>("omp_get_max_active_levels");
+  void (*set_levels)(int) =
+      FindFunction<void(int)>("omp_set_max_active_levels");
+  const bool is_there =
+      get_num_threads && set_num_threads && get_levels && set_levels;
+};
+
+const OpenMp& FindOpenMp() {
+  static const OpenMp openmp;
+  return openmp;
+}
 
 }  // namespace
 
@@ -72,6 +107,32 @@ void ParallelFor(int num_threads, size_t count,
   work();
   for (std::thread& worker : workers) worker.join();
   if (exception) std::rethrow_exception(exception);
+}
+
+OneOpenMpThread::OneOpenMpThread() {
+  const OpenMp& openmp = FindOpenMp();
+  if (!openmp.is_there) return;
+  num_threads_ = openmp.get_num_threads();
+  max_active_levels_ = openmp.get_levels();
+  openmp.set_num_threads(1);
+  openmp.set_levels(0);
+}
+
+OneOpenMpThread::~OneOpenMpThread() {
+  const OpenMp& openmp = FindOpenMp();
+  if (!openmp.is_there) return;
+  openmp.set_num_threads(num_threads_);
+  openmp.set_levels(max_active_levels_);
+}
+
+void UseOneBlasThread() {
+  const auto set = FindFunction<void(int)>("openblas_set_num_threads");
+  if (set != nullptr) set(1);
+}
+
+bool IsBlasSafeInThreads() {
+  const auto get = FindFunction<int()>("openblas_get_parallel");
+  return get == nullptr || get() != kSequential;
 }
 
 }  // namespace adasfm

@@ -39,8 +39,8 @@ demo_packages=(
   liblz4-dev libmetis-dev libgoogle-glog-dev libsqlite3-dev libglew-dev
   libgl1-mesa-dev libeigen3-dev libceres-dev libsuitesparse-dev
   # Faster than the ATLAS that libceres-dev brings. This build starts no
-  # threads before it is asked to, and our commands never ask; the serial one
-  # errs when two threads call it at once, for it has no locks.
+  # threads before it is asked to, and our commands never ask, but takes buffers
+  # for each core. The serial one errs when two threads call it at once.
   libopenblas-openmp-dev
   # Ours.
   libopencv-dev libyaml-cpp-dev nlohmann-json3-dev libzstd-dev)

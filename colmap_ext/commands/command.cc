@@ -22,7 +22,7 @@
 
 #include "colmap_ext/commands/progress_display.h"
 #include "core/interruption.h"
-#include "core/library_threads.h"
+#include "core/parallel.h"
 #include "sensors/io/log_file.h"
 
 namespace adasfm {

@@ -16,8 +16,8 @@ NUM_IMAGES = '30'
 TIMEOUT_S = 120
 # No command needs half as much on such a world; runaway memory stops there.
 MAX_ADDRESS_SPACE = 8 << 30
-# Small parts, so that there are several.
 ONE_THREAD = ['--num_threads', '1']
+# So that there are several.
 SMALL_PARTS = ['--AdaSfmPartition.max_num_images_undivided', '12',
                '--AdaSfmPartition.max_part_size', '16',
                '--AdaSfmPartition.min_part_size', '8']

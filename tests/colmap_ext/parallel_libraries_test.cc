@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "core/library_threads.h"
-
 #include <gtest/gtest.h>
 #include <omp.h>
 
@@ -27,7 +25,7 @@ Eigen::SparseMatrix<double> MakeMatrix(int size, int seed) {
 }
 
 // With Debian's OpenBLAS without locks 3 of the first 20,000 were wrong.
-TEST(LibraryThreads, FactorisationsSideBySideAreThoseOfOneThread) {
+TEST(ParallelLibraries, FactorisationsSideBySideAreThoseOfOneThread) {
   constexpr int kSize = 96;
   constexpr int kNumMatrices = 4;
   constexpr int kNumRepetitions = 20000;
@@ -55,7 +53,7 @@ TEST(LibraryThreads, FactorisationsSideBySideAreThoseOfOneThread) {
 }
 
 // As CHOLMOD does, some ask for a number of threads.
-TEST(LibraryThreads, OpenMpLoopsStayOnTheThreadsOfParallelFor) {
+TEST(ParallelLibraries, OpenMpLoopsStayOnTheThreadsOfParallelFor) {
   omp_set_num_threads(3);
   const int max_active_levels = omp_get_max_active_levels();
   for (const int num_threads : {1, 4}) {
@@ -72,7 +70,7 @@ TEST(LibraryThreads, OpenMpLoopsStayOnTheThreadsOfParallelFor) {
   }
 }
 
-TEST(LibraryThreads, BlasIsSafe) { EXPECT_TRUE(IsBlasSafeInThreads()); }
+TEST(ParallelLibraries, BlasIsSafe) { EXPECT_TRUE(IsBlasSafeInThreads()); }
 
 }  // namespace
 }  // namespace adasfm
