@@ -2,6 +2,9 @@
 // The `colmap` that users call: runs the adasfm_* commands itself and hands
 // every other command line, unchanged, to the host's colmap.
 
+#include <alloca.h>
+#include <limits.h>
+#include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -21,6 +24,85 @@ using adasfm::IsProgram;
 using adasfm::IsThisProgram;
 
 constexpr char kHostVariable[] = "ADASFM_HOST_COLMAP";
+
+// OpenBLAS built with OpenMP takes a buffer for each thread before main begins,
+// and waits for ever where a limit of address space denies it one. Our commands
+// need the buffer of one thread only: under a limit the program begins anew
+// with a single thread for OpenMP, and main puts the user's variable back.
+constexpr char kThreadsVariable[] = "OMP_NUM_THREADS";
+constexpr char kOneThread[] = "OMP_NUM_THREADS=1";
+constexpr char kUsersThreadsVariable[] = "ADASFM_USERS_OMP_NUM_THREADS";
+
+// Sanitizers' own libraries have not begun yet when it runs.
+#define ADASFM_NOT_SANITIZED \
+  __attribute__((no_sanitize("address", "thread", "undefined")))
+
+// What follows the name and "=" in an entry of the environment; null in that of
+// another variable.
+ADASFM_NOT_SANITIZED
+const char* FindValue(const char* entry, const char* name) {
+  const size_t length = std::strlen(name);
+  const bool is_it =
+      std::strncmp(entry, name, length) == 0 && entry[length] == '=';
+  return is_it ? entry + length + 1 : nullptr;
+}
+
+// Called when libraries are loaded and none of their code has run, so that it
+// must do without most of them. Where it fails the program just goes on.
+ADASFM_NOT_SANITIZED
+void BeginWithOneOpenMpThread(int, char** argv, char** environment) {
+  rlimit limit;
+  if (getrlimit(RLIMIT_AS, &limit) != 0 || limit.rlim_cur == RLIM_INFINITY) {
+    return;
+  }
+  const char* users_value = "";
+  size_t size = 0;
+  for (; environment[size] != nullptr; ++size) {
+    if (FindValue(environment[size], kUsersThreadsVariable)) return;
+    const char* value = FindValue(environment[size], kThreadsVariable);
+    if (value != nullptr) users_value = value;
+  }
+  char program[PATH_MAX];
+  const ssize_t length = readlink("/proc/self/exe", program, PATH_MAX);
+  if (length <= 0 || length == PATH_MAX) return;
+  program[length] = '\0';
+
+  const size_t name_size = std::strlen(kUsersThreadsVariable);
+  const size_t value_size = std::strlen(users_value) + 1;  // And its end.
+  const auto users_entry =
+      static_cast<char*>(alloca(name_size + 1 + value_size));
+  std::memcpy(users_entry, kUsersThreadsVariable, name_size);
+  users_entry[name_size] = '=';
+  std::memcpy(users_entry + name_size + 1, users_value, value_size);
+
+  const auto entries =
+      static_cast<const char**>(alloca((size + 3) * sizeof(char*)));
+  size_t num_entries = 0;
+  for (size_t i = 0; i < size; ++i) {
+    if (FindValue(environment[i], kThreadsVariable)) continue;
+    entries[num_entries++] = environment[i];
+  }
+  entries[num_entries++] = kOneThread;
+  entries[num_entries++] = users_entry;
+  entries[num_entries] = nullptr;
+  execve(program, argv, const_cast<char**>(entries));
+}
+
+using Start = void(int, char**, char**);
+__attribute__((section(".preinit_array"), used)) Start* const kBeforeLibraries =
+    &BeginWithOneOpenMpThread;
+
+// For the programs that this one calls.
+void RestoreUsersThreads() {
+  const char* value = std::getenv(kUsersThreadsVariable);
+  if (value == nullptr) return;
+  if (*value == '\0') {
+    unsetenv(kThreadsVariable);
+  } else {
+    setenv(kThreadsVariable, value, /*overwrite=*/1);
+  }
+  unsetenv(kUsersThreadsVariable);
+}
 
 // The database that a command line names; empty without one.
 std::string FindDatabasePath(char** argv) {
@@ -99,6 +181,7 @@ int ShowHelp(char** argv) {
 }  // namespace
 
 int main(int argc, char** argv) {
+  RestoreUsersThreads();
   const std::string name = argc > 1 ? argv[1] : "help";
   if (name == "help" || name == "-h" || name == "--help") {
     return ShowHelp(argv);

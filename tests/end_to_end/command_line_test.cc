@@ -35,6 +35,15 @@ TEST_F(CommandLineTest, SignalsPass) {
   EXPECT_EQ(WTERMSIG(run.status), SIGTERM);
 }
 
+// Under a limit of address space our own commands have one thread of OpenMP.
+TEST_F(CommandLineTest, TheHostHasTheUsersThreads) {
+  const std::string host = "ulimit -v 4000000; ADASFM_HOST_COLMAP=" +
+                           WriteScript("env | grep -o 'OMP_NUM_THREADS=.*'\n");
+  EXPECT_EQ(Call("mapper", "unset OMP_NUM_THREADS; " + host).out, "");
+  EXPECT_EQ(Call("mapper", host + " OMP_NUM_THREADS=7").out,
+            "OMP_NUM_THREADS=7\n");
+}
+
 TEST_F(CommandLineTest, TheHostRuns) {
   const Run run = Call("mapper");
   EXPECT_EQ(run.ExitCode(), 1);
