@@ -33,6 +33,12 @@ constexpr char kThreadsVariable[] = "OMP_NUM_THREADS";
 constexpr char kOneThread[] = "OMP_NUM_THREADS=1";
 constexpr char kUsersThreadsVariable[] = "ADASFM_USERS_OMP_NUM_THREADS";
 
+// Below it there is no room for that buffer either (measured: below 390 MB).
+constexpr rlim_t kMinAddressSpaceToBegin = 400 << 20;
+constexpr char kNoRoomToBegin[] =
+    "ERROR: the limit of address space (ulimit -v) is below 409600 kB, in "
+    "which this program cannot begin; raise the limit\n";
+
 // Sanitizers' own libraries have not begun yet when it runs.
 #define ADASFM_NOT_SANITIZED \
   __attribute__((no_sanitize("address", "thread", "undefined")))
@@ -54,6 +60,12 @@ void BeginWithOneOpenMpThread(int, char** argv, char** environment) {
   rlimit limit;
   if (getrlimit(RLIMIT_AS, &limit) != 0 || limit.rlim_cur == RLIM_INFINITY) {
     return;
+  }
+  if (limit.rlim_cur < kMinAddressSpaceToBegin) {
+    if (write(STDERR_FILENO, kNoRoomToBegin, sizeof(kNoRoomToBegin) - 1) < 0) {
+      // There is nobody to tell.
+    }
+    _exit(EXIT_FAILURE);
   }
   const char* users_value = "";
   size_t size = 0;
