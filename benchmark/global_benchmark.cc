@@ -75,7 +75,7 @@ void BM_BuildTracks(benchmark::State& state) {
   for (auto _ : state) {
     benchmark::DoNotOptimize(SelectTracks(
         TrackOptions(),
-        JoinMatches(TrackOptions(), input.correspondences.matches)));
+        BuildTracks(TrackOptions(), input.correspondences.matches)));
   }
 }
 BENCHMARK(BM_BuildTracks)->Arg(500)->Unit(benchmark::kMillisecond);
@@ -148,7 +148,7 @@ void BM_TriangulateTracks(benchmark::State& state) {
   const Input input = BuildInput(state.range(0));
   const std::vector<Track> tracks =
       SelectTracks(TrackOptions(),
-                   JoinMatches(TrackOptions(), input.correspondences.matches));
+                   BuildTracks(TrackOptions(), input.correspondences.matches));
   for (auto _ : state) {
     benchmark::DoNotOptimize(
         TriangulateTracks(TrackTriangulationOptions(), input.cams_from_world,

@@ -29,11 +29,11 @@ namespace adasfm {
 namespace {
 
 bool ChangesDatabase(const GlobalStageOptions& options) {
-  return options.refinement.enabled || options.poses.camera_mount.enabled ||
-         options.write_pose_priors;
+  return options.refinement.enabled ||
+         options.poses.camera_imu_rotation.enabled || options.write_pose_priors;
 }
 
-// Of all models together.
+// Points of all models together.
 int CountPoints(const GlobalStageResult& result) {
   int num_points = 0;
   for (const CoarseModel& model : result.models) num_points += model.num_points;
@@ -70,12 +70,13 @@ Status CheckGlobalPaths(const GlobalStageOptions& options,
   return status.ok() ? CheckModelFolders(output_path) : status;
 }
 
-std::optional<Eigen::Quaterniond> FindCameraMount(const CoarsePoses& poses) {
-  if (!poses.camera_mount.corrected) return std::nullopt;
-  return ExpSo3(poses.camera_mount.turn_rad);
+std::optional<Eigen::Quaterniond> FindCameraImuCorrection(
+    const CoarsePoses& poses) {
+  if (!poses.camera_imu_rotation.corrected) return std::nullopt;
+  return poses.camera_imu_rotation.Correction();
 }
 
-// Waits for another writer, and gives up before anything is replaced.
+// Waits for another writer; an error before anything is replaced.
 Status CheckDatabaseIsFree(const std::string& database_path) {
   try {
     SqliteConnection database(database_path, SqliteConnection::Mode::kWrite);
@@ -91,8 +92,8 @@ Status CheckDatabaseIsFree(const std::string& database_path) {
 std::vector<NewPosePrior> CollectPosePriors(const GlobalStageOptions& options,
                                             const SceneData& scene,
                                             const GlobalStageResult& result) {
-  const Eigen::Quaterniond camera_mount =
-      FindCameraMount(result.poses).value_or(Eigen::Quaterniond::Identity());
+  const Eigen::Quaterniond camera_imu_correction =
+      result.poses.camera_imu_rotation.Correction();
   const double variance = options.pose_prior_sigma * options.pose_prior_sigma;
   std::vector<NewPosePrior> priors;
   for (size_t i = 0; i < result.models.size(); ++i) {
@@ -106,7 +107,7 @@ std::vector<NewPosePrior> CollectPosePriors(const GlobalStageOptions& options,
       prior.position = pose.TargetOriginInSource();
       prior.covariance = variance * Eigen::Matrix3d::Identity();
       if (image.gravity_in_cam) {
-        prior.gravity_in_cam = camera_mount * *image.gravity_in_cam;
+        prior.gravity_in_cam = camera_imu_correction * *image.gravity_in_cam;
       } else if (model.gravity_aligned) {
         prior.gravity_in_cam = pose.rotation * -Eigen::Vector3d::UnitZ();
       }
@@ -116,7 +117,7 @@ std::vector<NewPosePrior> CollectPosePriors(const GlobalStageOptions& options,
   return priors;
 }
 
-// Into a database whose COLMAP has such a table.
+// Writes to a database with COLMAP 4's table.
 Status WritePosePriorsTo(const std::string& database_path,
                          const std::vector<NewPosePrior>& priors) {
   try {
@@ -142,7 +143,7 @@ Status WriteGlobalResult(const GlobalStageOptions& options,
     const Status free = CheckDatabaseIsFree(database_path);
     if (!free.ok()) return free;
   }
-  // One of an earlier run would speak of other models.
+  // The summary of an earlier run would describe other models.
   std::error_code none;
   std::filesystem::remove(output_path + "/summary.json", none);
   std::vector<const colmap::Reconstruction*> models;
@@ -168,7 +169,7 @@ Status WriteGlobalResult(const GlobalStageOptions& options,
   if (status.ok() && ChangesDatabase(options)) {
     status = RewriteTwoViewGeometries(
         database_path, result.geometries, result.removed_pairs,
-        FindCameraMount(result.poses), result.inertial_lengths);
+        FindCameraImuCorrection(result.poses), result.inertial_lengths);
   }
   return status;
 }
@@ -239,7 +240,7 @@ StatusOr<CoarseModelReport> EstimateCoarseModel(
   scene_options.min_num_matches = options.poses.min_num_inliers;
   StatusOr<SceneData> scene = ReadSceneData(database_path, scene_options);
   if (!scene.ok()) return scene.status();
-  // The mapper could not know what is not written.
+  // Metres by the accelerometer reach the mapper through the database only.
   if (!ChangesDatabase(options)) scene->inertial_motions.clear();
   std::ostringstream text;
   text << scene->images.size() << " images, " << scene->pairs.size()

@@ -73,7 +73,7 @@ Status CheckMergeMemory(const MapOptions& options, const MapRequest& request,
                      warnings);
 }
 
-// What a stage wrote about itself; no object when it left no summary.
+// Reads the summary that a stage wrote; no JSON object when there is none.
 nlohmann::json ReadSummary(const std::string& path) {
   std::ifstream file(path);
   return nlohmann::json::parse(file, nullptr, /*allow_exceptions=*/false);
@@ -132,7 +132,7 @@ MapperStageOptions ResolveOptions(const MapOptions& options,
   return stage;
 }
 
-// Images with verified matches, those that adasfm_global removed among them.
+// Images with verified matches, including those that adasfm_global removed.
 StatusOr<std::set<image_t>> FindMatchedImages(
     const std::string& database_path) {
   std::set<image_t> images;
@@ -183,8 +183,8 @@ Verdict Assess(const MapRequest& request, const CoarseModels& coarse,
   return verdict;
 }
 
-// Moves the coarse poses into the frame of the scene's positions; positions
-// that do not fit them are left out.
+// Moves the coarse poses into the frame of the scene's positions; removes the
+// positions if that fails.
 void AlignCoarseModel(ComponentToMap* component,
                       std::vector<std::string>* warnings) {
   SceneData& data = component->data;
@@ -205,8 +205,8 @@ void AlignCoarseModel(ComponentToMap* component,
   data.positions.clear();
 }
 
-// The priors within the frames; relative poses that nobody knows come from the
-// coarse model, and measure no metres then.
+// Sets the priors within frames. Unknown relative poses of cameras come from
+// the coarse model; priors on these measure no metres.
 void CompleteRigs(const CoarsePoseMap& coarse, SceneData* data) {
   const CameraRigs known = data->rigs;
   EstimateUnknownRigCameras(coarse, &data->rigs);
@@ -256,7 +256,8 @@ Status AssessAndWrite(const MapRequest& request, const CoarseModels& coarse,
                                   coarse.components.size());
 }
 
-// What the models left out; also where the parts were mapped by other calls.
+// Maps the images that the models left out, also when the parts were mapped by
+// other calls.
 Status MapLeftovers(const MapperStageOptions& options,
                     const MapRequest& request, const MapperProgress& progress,
                     CoarseModels* coarse,

@@ -87,8 +87,8 @@ bool IsLargeEnough(const CoarseModelFile& model) {
   return model.poses.size() >= kMinImagesOfComponent && model.num_points > 0;
 }
 
-// Poses belong to the cameras that they were adjusted with. Another camera
-// model is only taken where the database does not say that it knows the camera.
+// Poses are valid for the cameras that they were adjusted with. Another camera
+// model is only taken where the database does not mark the camera as known.
 void TakeCameras(const CoarseModelFile& model, SceneData* scene,
                  std::vector<std::string>* warnings) {
   for (const auto& [camera_id, camera] : model.cameras) {
@@ -125,8 +125,8 @@ Status CheckCoarseModels(const std::string& input_path,
   if (!status.ok()) return status;
   std::error_code error;
   const fs::path input = fs::canonical(input_path, error);
-  // The models would replace those that they are made from, and summary.json
-  // what is said about them.
+  // The models would replace their own coarse models, and summary.json the
+  // summary of those.
   const bool is_beside =
       !error && !is_folder &&
       fs::equivalent(input.parent_path(), output_path, error);

@@ -13,7 +13,7 @@ namespace adasfm {
 
 // The coarse models that stage 3 starts from, as adasfm_global wrote them.
 
-// A path is that of one model, or of the folder that holds 0, 1, ...
+// Whether the path is a folder of models 0, 1, ..., and not a model itself.
 bool IsFolderOfModels(const std::string& input_path);
 
 // Before any work: an error when there is no coarse model at the path, or when
@@ -22,7 +22,7 @@ Status CheckCoarseModels(const std::string& input_path,
                          const std::string& output_path);
 
 struct CoarseModels {
-  // Each with its poses, and the part of the scene that is its own.
+  // Each with its poses and its own part of the scene.
   std::vector<ComponentToMap> components;
   // The images of the models that were passed over.
   std::set<image_t> images_of_small_components;
@@ -31,12 +31,12 @@ struct CoarseModels {
   std::vector<std::string> warnings;
 };
 
-// Reads the model, or all models of the folder in their order, and cuts the
-// scene into theirs (SplitScene); their cameras become the scenes'. Of a
-// folder, models of fewer than three images are passed over, since no third
-// image tests what two have in common, and so are models without points, which
-// the sensors alone hold; when all are such, the first is taken. An error when
-// a model's images are not the scene's.
+// Reads the model, or all models of the folder in their order, and splits the
+// scene among them (SplitScene); the models' cameras replace the scene's. In a
+// folder, models of fewer than three images are ignored, since no third image
+// tests what two have in common, and so are models without points, which rest
+// on the sensors alone; when all are such, the first is taken. An error when an
+// image of a model is not in the scene.
 StatusOr<CoarseModels> ReadCoarseModels(const std::string& input_path,
                                         SceneData scene);
 

@@ -15,18 +15,18 @@ namespace fs = std::filesystem;
 
 // The program and its libraries.
 constexpr double kBytesOfProgram = 65e6;
-// Of a log as text; measured (docs/results/growth.md), rounded up.
+// Memory for a log as text; measured (docs/results/growth.md), rounded up.
 constexpr double kImportBytesPerLogByte = 11.0;
-// Of adasfm_global and of adasfm_mapper, which peak where they hold the scene
-// with what they know of every keypoint and match, and again where the whole
-// is adjusted, in what the budget leaves. Measured on 51 to 30,000 images
-// (docs/reference/mapper.md), rounded up.
+// For adasfm_global and adasfm_mapper. Both peak with the scene and their data
+// on every keypoint and match, and again when the whole is adjusted, within the
+// remaining budget. Measured on 51 to 30,000 images (docs/reference/mapper.md),
+// rounded up.
 constexpr double kBytesOfStage = 30e6;
 constexpr double kBytesPerImage = 5e4;
 constexpr double kBytesPerKeypoint = 180.0;
 constexpr double kBytesPerMatch = 45.0;
 
-// Of a file, or of all files below a folder; 0 where there is none.
+// Size of a file, or of all files below a folder; 0 where there is none.
 double SizeOnDisk(const std::string& path) {
   std::error_code error;
   if (fs::is_regular_file(path, error)) {

@@ -10,8 +10,8 @@
 
 namespace adasfm {
 
-// The memory that each of the three stages takes at most, estimated before its
-// work from what it is given, and compared with a budget.
+// Upper estimates of the memory of each stage, made from the sizes of its
+// inputs before its work, and their comparison with a budget.
 
 // Sizes of a database.
 struct SceneSize {
@@ -22,15 +22,15 @@ struct SceneSize {
 
 StatusOr<SceneSize> MeasureScene(const std::string& database_path);
 
-// Of reading and smoothing the logs. Bags are not counted: nothing says before
-// they are read how much of them are logs.
+// For reading and smoothing the logs. Bags are not counted, as the share of
+// logs in a bag is unknown before it is read.
 double EstimateImportMemoryBytes(const PriorImportPaths& paths);
-// Of adasfm_global, and of adasfm_mapper beside the parts that it makes.
+// For adasfm_global, and for adasfm_mapper without the parts that it makes.
 double EstimateStageMemoryBytes(const SceneSize& size);
 
-// An error where `bytes` are more than a positive max_memory_gb (1e9 bytes).
-// Without a budget (-1) a warning where they are more than is available.
-// `option`: the budget's name.
+// An error where `bytes` exceed a positive max_memory_gb (1e9 bytes). Without a
+// budget (-1) a warning where they exceed the available memory. `option`: the
+// budget's name.
 Status CheckMemory(double bytes, double max_memory_gb,
                    const std::string& option,
                    std::vector<std::string>* warnings);

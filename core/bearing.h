@@ -5,8 +5,8 @@
 
 namespace adasfm {
 
-// A keypoint as a ray, with all that is needed to measure in the image without
-// knowing the camera model (pinhole and fisheye alike).
+// A keypoint as a ray, with the derivative that converts errors of directions
+// to pixels without the camera model (pinhole and fisheye alike).
 struct Bearing {
   // Unit vector in the camera frame.
   Eigen::Vector3d direction = Eigen::Vector3d::UnitZ();

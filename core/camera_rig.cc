@@ -13,12 +13,12 @@ namespace adasfm {
 namespace {
 
 constexpr size_t kMinNumFrames = 3;
-// A frame's own relative pose is no better than this, whatever the frames'
-// agreement says of their mean.
+// Lower bounds of the sigmas: errors of the relative pose in a single frame,
+// however well the frames agree.
 constexpr double kMinRotationSigmaRad = 1e-4;
 constexpr double kMinTranslationSigmaRatio = 1e-3;
 
-// cam_from_reference of a camera, one per frame of both.
+// cam_from_reference of a camera, one per frame with poses of both cameras.
 using Samples = std::map<camera_t, std::vector<Rigid3d>>;
 
 Samples CollectSamples(const std::map<image_t, Rigid3d>& cams_from_world,
@@ -64,6 +64,33 @@ Rigid3d ComputeMiddle(const std::vector<Rigid3d>& samples) {
   return Rigid3d(NearestRotation(sum), translation);
 }
 
+Eigen::Matrix<double, 6, 6> CovarianceOf(const RigCamera& camera) {
+  Eigen::Matrix<double, 6, 1> sigmas;
+  sigmas << Eigen::Vector3d::Constant(camera.rotation_sigma_rad),
+      Eigen::Vector3d::Constant(camera.translation_sigma_m);
+  return sigmas.cwiseAbs2().asDiagonal();
+}
+
+// Covariance of the camera's pose relative to the leader's, R = S2 S1^T and
+// t = b2 - R b1, by the errors of both poses; the reference camera has none.
+Eigen::Matrix<double, 6, 6> CovarianceFrom(const RigCamera& leader,
+                                           const RigCamera& camera) {
+  if (leader.is_reference) return CovarianceOf(camera);
+  const Eigen::Matrix3d rotation = (camera.cam_from_rig->rotation *
+                                    leader.cam_from_rig->rotation.conjugate())
+                                       .toRotationMatrix();
+  const Eigen::Vector3d& arm = leader.cam_from_rig->translation;
+  Eigen::Matrix<double, 6, 6> by_camera =
+      Eigen::Matrix<double, 6, 6>::Identity();
+  by_camera.bottomLeftCorner<3, 3>() = Hat(rotation * arm);
+  Eigen::Matrix<double, 6, 6> by_leader = Eigen::Matrix<double, 6, 6>::Zero();
+  by_leader.topLeftCorner<3, 3>() = -rotation;
+  by_leader.bottomLeftCorner<3, 3>() = -rotation * Hat(arm);
+  by_leader.bottomRightCorner<3, 3>() = -rotation;
+  return by_camera * CovarianceOf(camera) * by_camera.transpose() +
+         by_leader * CovarianceOf(leader) * by_leader.transpose();
+}
+
 }  // namespace
 
 std::map<uint32_t, image_t> FindFrameLeaders(const CameraRigs& rigs) {
@@ -100,10 +127,7 @@ std::vector<RelativePosePrior> ComputeFramePriors(const CameraRigs& rigs) {
     prior.image_id2 = image_id;
     prior.cam2_from_cam1 =
         ComputeCam2FromCam1(*leader_camera.cam_from_rig, *camera.cam_from_rig);
-    prior.covariance.diagonal().head<3>().setConstant(
-        camera.rotation_sigma_rad * camera.rotation_sigma_rad);
-    prior.covariance.diagonal().tail<3>().setConstant(
-        camera.translation_sigma_m * camera.translation_sigma_m);
+    prior.covariance = CovarianceFrom(leader_camera, camera);
     prior.flags = kPriorRotation | kPriorDirection | kPriorLength;
     priors[{image.frame_id, image_id}] = prior;
   }

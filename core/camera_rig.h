@@ -14,19 +14,20 @@
 
 namespace adasfm {
 
-// How well a good calibration knows the cameras of a rig against each other, 1
-// sigma, per axis.
+// Error of the relative poses of the cameras of a rig after a good calibration,
+// 1 sigma per axis.
 inline constexpr double kRigRotationSigmaDeg = 0.05;
 inline constexpr double kRigTranslationSigmaM = 2e-3;
 
-// A camera of a rig: cameras that are mounted together and take their images at
-// the same times. The reference camera's frame is the rig's.
+// A camera of a rig. Cameras of a rig are mounted together and take their
+// images at the same times. The frame of the reference camera is that of the
+// rig.
 struct RigCamera {
   uint32_t rig_id = 0;
   bool is_reference = false;
-  // The identity for the reference camera; none when nobody knows it.
+  // The identity for the reference camera; none when it is unknown.
   std::optional<Rigid3d> cam_from_rig;
-  // 1 sigma of its error, which all frames share, per axis.
+  // 1 sigma per axis of the error of cam_from_rig, which all frames share.
   double rotation_sigma_rad = DegToRad(kRigRotationSigmaDeg);
   double translation_sigma_m = kRigTranslationSigmaM;
 };
@@ -37,7 +38,7 @@ struct RigImage {
   uint32_t frame_id = 0;
 };
 
-// The rigs of several cameras; other cameras and their images are in neither
+// The rigs with several cameras; other cameras and their images are in neither
 // map.
 struct CameraRigs {
   std::map<camera_t, RigCamera> cameras;
@@ -46,21 +47,22 @@ struct CameraRigs {
   bool empty() const { return images.empty(); }
 };
 
-// The image that stands for each frame: the reference camera's or, where that
-// is missing, the one of the smallest camera id whose cam_from_rig is known.
-// Frames of unknown cameras alone have none.
+// The leader of each frame: the reference camera's image or, where that is
+// missing, the image of the smallest camera id among cameras with cam_from_rig.
+// Frames without such a camera have no leader.
 std::map<uint32_t, image_t> FindFrameLeaders(const CameraRigs& rigs);
 
-// The relative poses within the frames as priors: from each frame's leader to
-// each of its other images of a known camera, in order of the frames and
-// images. Their errors are shared, which no covariance of a single prior says.
+// The relative poses within the frames as priors: from the leader of each frame
+// to each other image of a camera with cam_from_rig, in order of frames and
+// images. All frames share the errors, which the covariance of a single prior
+// cannot express.
 std::vector<RelativePosePrior> ComputeFramePriors(const CameraRigs& rigs);
 
-// What: the cameras' relative poses from the frames of a model, for the cameras
-// without cam_from_rig: the rotation nearest to all frames' rotations and the
-// median of their translations, per axis, in the model's unit. Cameras that
-// share fewer than 3 frames with their reference camera stay unknown. The
-// sigmas become those of the mean over the frames.
+// Estimates cam_from_rig, for the cameras without it, from the frames of a
+// model: the rotation nearest to the rotations of all frames and the per-axis
+// median of the translations, in the unit of the model. Cameras that share
+// fewer than 3 frames with their reference camera stay unknown. The sigmas
+// become those of the mean over the frames.
 void EstimateUnknownRigCameras(
     const std::map<image_t, Rigid3d>& cams_from_world, CameraRigs* rigs);
 

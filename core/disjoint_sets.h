@@ -7,8 +7,8 @@
 
 namespace adasfm {
 
-// Union-find over 0, 1, ...; the second one's root stays, so callers choose
-// who represents a set.
+// Union-find over 0, 1, ...; Join keeps the root of its second argument, so
+// callers choose who represents a set.
 class DisjointSets {
  public:
   explicit DisjointSets(size_t size) : parent_(size) {

@@ -36,7 +36,7 @@ Eigen::Vector3d EcefFromGeodetic(const GeodeticPosition& position) {
 
 GeodeticPosition GeodeticFromEcef(const Eigen::Vector3d& ecef_m) {
   const double across = ecef_m.head<2>().norm();
-  // The reduced latitude, from which each step gets the geodetic one.
+  // The reduced latitude; each iteration computes the geodetic one from it.
   double reduced = std::atan2(ecef_m.z(), (1.0 - kF) * across);
   double latitude = 0.0;
   for (int iteration = 0; iteration < 5; ++iteration) {

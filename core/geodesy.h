@@ -8,10 +8,10 @@ namespace adasfm {
 
 // Positions on the Earth, all on the WGS 84 ellipsoid.
 //
-// Geodetic: latitude and longitude in degrees (north and east positive),
-// height above the ellipsoid in m. ECEF: Earth-centred, Earth-fixed, m. ENU:
-// east, north, up in m in the plane that touches the ellipsoid at an origin.
-// UTM: easting and northing in m of a zone, with the height as it is.
+// Geodetic: latitude and longitude in degrees (north and east positive), height
+// above the ellipsoid in m. ECEF: Earth-centred, Earth-fixed, m. ENU: east,
+// north, up in m in the tangent plane of the ellipsoid at an origin. UTM:
+// easting and northing in m of a zone, with the unchanged height.
 struct GeodeticPosition {
   double latitude_deg = 0.0;
   double longitude_deg = 0.0;
@@ -51,8 +51,8 @@ struct UtmZone {
   bool is_north = true;
 };
 
-// By the longitude alone: without the exceptions around Norway, which a
-// neighbouring zone's plane serves as well.
+// The zone by longitude alone. The exceptions around Norway are ignored: the
+// plane of a neighbouring zone serves as well.
 UtmZone FindUtmZone(const GeodeticPosition& position);
 
 // "EPSG:32632" and the like.

@@ -9,7 +9,8 @@
 
 namespace adasfm {
 
-// FNV-1a, 64 bits: tells whether data have changed, not who changed them.
+// FNV-1a hash, 64 bits: detects changed data, but is not secure against
+// forgery.
 class Fnv1aHash {
  public:
   void AddBytes(const void* data, size_t num_bytes) {
@@ -18,7 +19,7 @@ class Fnv1aHash {
       value_ = (value_ ^ bytes[i]) * 1099511628211ull;
     }
   }
-  // A number's bytes.
+  // Adds the bytes of a number.
   template <typename T>
   void Add(const T& number) {
     static_assert(std::is_arithmetic_v<T>, "padding has no fixed value");

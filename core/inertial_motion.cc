@@ -7,18 +7,20 @@
 
 namespace adasfm {
 
-void TurnInertialMotion(const Eigen::Quaterniond& turned_from_cam,
-                        InertialMotion* motion) {
-  const Eigen::Matrix3d turn = turned_from_cam.toRotationMatrix();
-  motion->delta_velocity = turn * motion->delta_velocity;
-  motion->delta_position = turn * motion->delta_position;
-  motion->velocity_by_bias = turn * motion->velocity_by_bias * turn.transpose();
-  motion->position_by_bias = turn * motion->position_by_bias * turn.transpose();
-  motion->camera_from_imu_origin = turn * motion->camera_from_imu_origin;
+void RotateInertialMotion(const Eigen::Quaterniond& rotated_from_cam,
+                          InertialMotion* motion) {
+  const Eigen::Matrix3d rotation = rotated_from_cam.toRotationMatrix();
+  motion->delta_velocity = rotation * motion->delta_velocity;
+  motion->delta_position = rotation * motion->delta_position;
+  motion->velocity_by_bias =
+      rotation * motion->velocity_by_bias * rotation.transpose();
+  motion->position_by_bias =
+      rotation * motion->position_by_bias * rotation.transpose();
+  motion->camera_from_imu_origin = rotation * motion->camera_from_imu_origin;
   if (!motion->by_wheels) return;
   MeasuredTranslation& by_wheels = *motion->by_wheels;
-  by_wheels.translation = turn * by_wheels.translation;
-  by_wheels.covariance = turn * by_wheels.covariance * turn.transpose();
+  by_wheels.translation = rotation * by_wheels.translation;
+  by_wheels.covariance = rotation * by_wheels.covariance * rotation.transpose();
 }
 
 void SetTranslation(const MeasuredTranslation& measured,

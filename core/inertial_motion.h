@@ -11,22 +11,21 @@
 
 namespace adasfm {
 
-// A translation that was measured, in the axes of one camera, and its
-// covariance (m^2).
+// A measured translation in the axes of one camera, and its covariance (m^2).
 struct MeasuredTranslation {
   Eigen::Vector3d translation = Eigen::Vector3d::Zero();  // m
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Identity();
 };
 
-// What an IMU integrated between two images, free of the velocity at the start
-// and of gravity (Forster 2015, eqs. 33-38), seen from the camera of the first
-// image. With Q the rotation world_from_cam1, p and v position and velocity of
-// the IMU, g the gravity of the world and b the accelerometer's bias in the
-// camera's axes (m/s^2):
+// IMU measurements integrated between two images, independent of the velocity
+// at the start and of gravity (Forster 2015, eqs. 33-38), in the axes of the
+// first camera. With Q the rotation world_from_cam1, p and v position and
+// velocity of the IMU, g the gravity of the world and b the bias of the
+// accelerometer in the axes of the camera (m/s^2):
 //   v2 = v1 + g dt + Q (delta_velocity + velocity_by_bias b)
 //   p2 = p1 + v1 dt + g dt^2 / 2 + Q (delta_position + position_by_bias b)
-// The camera is at p + Q camera_from_imu_origin. The gyroscope's bias is taken
-// off; that of the accelerometer is not.
+// The camera is at p + Q camera_from_imu_origin. The bias of the gyroscope is
+// removed; that of the accelerometer is not.
 struct InertialMotion {
   image_t image_id1 = kInvalidImageId;  // the earlier one
   image_t image_id2 = kInvalidImageId;
@@ -37,39 +36,43 @@ struct InertialMotion {
   Eigen::Matrix3d position_by_bias = Eigen::Matrix3d::Zero();  // s^2
   // From the IMU's origin to the camera's, in the camera's axes, m.
   Eigen::Vector3d camera_from_imu_origin = Eigen::Vector3d::Zero();
-  // The translation of P_12, in the axes of camera 2, by the wheels without the
-  // accelerometer: what is left of a prior's translation where the rest of this
-  // motion is used beside it. None without wheels, and where they slip.
+  // The translation of P_12, in the axes of camera 2, from the wheels without
+  // the accelerometer; replaces that of a prior where the rest of this motion
+  // is used beside the prior. None without wheels, and where they slip.
   std::optional<MeasuredTranslation> by_wheels;
 };
 
-// In place of the prior's; what is known of its rotation stays, and the flags.
+// Replaces translation and its covariance; the correlation with the rotation
+// becomes 0. Rotation and flags stay.
 void SetTranslation(const MeasuredTranslation& measured,
                     RelativePosePrior* prior);
 
-// The motion as a camera sees it that is turned against the stated one.
-void TurnInertialMotion(const Eigen::Quaterniond& turned_from_cam,
-                        InertialMotion* motion);
+// Expresses the motion in the axes of a camera that is rotated against the
+// stated one.
+void RotateInertialMotion(const Eigen::Quaterniond& rotated_from_cam,
+                          InertialMotion* motion);
 
-// Length of a prior's motion that vision and accelerometer found together.
+// The length of a prior's motion, estimated from vision and accelerometer
+// together.
 struct InertialLength {
   image_t image_id1 = kInvalidImageId;  // the earlier one
   image_t image_id2 = kInvalidImageId;
   double length_m = 0.0;
-  // 1 sigma that claims nothing of the shape: all of a model together tell its
-  // size to 100 % (colmap_ext/coarse/measure_size.h).
+  // 1 sigma, so large that the length does not constrain the shape: all lengths
+  // of a model together determine its size to 100 %
+  // (colmap_ext/coarse/measure_size.h).
   double sigma_m = 0.0;
-  // 1 sigma of the unit, as a ratio.
+  // 1 sigma of the unit of length, as a ratio.
   double scale_sigma = 0.0;
-  // Where vision ties the images to nothing, the translation that accelerometer
-  // and the velocities around tell: a measurement of this motion.
+  // Where vision does not connect the images: the translation from the
+  // accelerometer and the neighbouring velocities, a measurement of this
+  // motion.
   std::optional<MeasuredTranslation> bridge = std::nullopt;
 };
 
-// Gives the priors of the same images that have no length theirs, with the flag
-// kPriorInertialLength; without a bridge the direction stays unknown. Returns
-// the largest
-// scale_sigma of those given, 0 for none.
+// Adds the lengths to the priors of the same images that have no length, with
+// the flag kPriorInertialLength; without a bridge the direction stays unknown.
+// Returns the largest scale_sigma of the added lengths, 0 for none.
 double AddInertialLengths(const std::vector<InertialLength>& lengths,
                           std::vector<RelativePosePrior>* priors);
 

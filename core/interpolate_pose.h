@@ -10,8 +10,8 @@
 
 namespace adasfm {
 
-// world_from_body of a trajectory, sorted by time, at time_ns: the pose of that
-// time, or between two poses at most max_gap_s apart, rotations by slerp.
+// Interpolates world_from_body of a trajectory, sorted by time, rotations by
+// slerp. Nothing outside the trajectory or in a gap above max_gap_s.
 std::optional<Rigid3d> InterpolatePose(
     const std::vector<OdometryPose>& trajectory, timestamp_t time_ns,
     double max_gap_s);

@@ -3,17 +3,18 @@
 
 namespace adasfm {
 
-// Thrown where the user's wish to stop is followed. Not a std::exception: code
-// that answers an exception with another attempt must let it pass.
+// Thrown to stop the work at the user's request. Not a std::exception: code
+// that retries after an exception must let it pass.
 struct Interruption {};
 
-// The wish to stop. Safe in a signal handler; stays until it is withdrawn.
+// The user's request to stop. Safe in a signal handler; stays until it is
+// withdrawn.
 void RequestInterruption();
 void WithdrawInterruption();
 bool InterruptionRequested();
 
-// To be called between steps of work that may take long, where everything worth
-// keeping is kept: throws Interruption when one is requested.
+// Throws Interruption when one is requested. To be called between long steps of
+// work, where all results worth keeping are saved.
 void ThrowIfInterrupted();
 
 }  // namespace adasfm

@@ -5,14 +5,14 @@
 
 namespace adasfm {
 
-// The middle value, or the mean of the middle two; 0 of nothing.
+// The middle value, or the mean of the middle two; 0 for no values.
 double Median(std::vector<double> values);
 
-// The middle value, or the larger of the middle two; 0 of nothing. Reorders the
-// values: for inner loops.
+// The middle value, or the larger of the middle two; 0 for no values. Reorders
+// the values: for inner loops.
 double UpperMedian(std::vector<double>* values);
 
-// Of the norm of three standard normal variables.
+// The median of the norm of three standard normal variables.
 inline constexpr double kMedianNorm3 = 1.538;
 
 struct WeightedValue {
@@ -20,9 +20,9 @@ struct WeightedValue {
   double weight = 0.0;
 };
 
-// The first value, in ascending order, at which half of the weight is reached;
-// there must be one. Reorders the values. Halves the range around it while that
-// pays.
+// The smallest value at which, in ascending order, half of the weight is
+// reached; there must be at least one value. Reorders the values. Halves the
+// range before sorting it.
 double WeightedMedian(std::vector<WeightedValue>* values);
 
 }  // namespace adasfm

@@ -5,8 +5,8 @@
 
 namespace adasfm {
 
-// The rotation R that minimises the Frobenius norm of R - matrix. Of a sum of
-// rotations it is their chordal mean.
+// The rotation R that minimises the Frobenius norm of R - matrix. For a sum of
+// rotations, R is their chordal mean.
 Eigen::Matrix3d NearestRotation(const Eigen::Matrix3d& matrix);
 
 }  // namespace adasfm

@@ -9,11 +9,11 @@
 
 namespace adasfm {
 
-// Checks the options of one group. The first rule that does not hold gives the
-// message "GROUP.NAME = VALUE RULE": the option as the user types it, what it
-// is and what it should be; without the group where the commands name it
-// otherwise, and say so before the message. A rule is false of a value that is
-// no number, and all but Require's are of an infinite one.
+// Checks the options of one group. The first violated rule gives the message
+// "GROUP.NAME = VALUE RULE": the option as the user types it, its value and
+// what it should be. The group is omitted where the commands use another name
+// for the option and print it before the message. NaN violates every rule; an
+// infinite value violates all but Require's.
 class OptionChecker {
  public:
   using NamedValues = std::initializer_list<std::pair<const char*, double>>;

@@ -12,7 +12,8 @@
 #include <thread>
 #include <vector>
 
-// In place of the C library's, which all threads draw from: see the header.
+// Replaces rand() of the C library, whose sequence all threads share: see the
+// header.
 namespace {
 thread_local unsigned state_of_rand = 1;
 }  // namespace
@@ -23,22 +24,22 @@ namespace adasfm {
 
 namespace {
 
-// More threads for each of the machine's only cost time: 10,000 took nine times
-// as long as 2.
+// More threads for each thread of the machine only cost time: 10,000 took nine
+// times as long as 2.
 constexpr int kMaxThreadsEach = 16;
 
 // What openblas_get_parallel returns for a build without threads.
 constexpr int kSequential = 0;
 
-// Of whatever library the process has it from, since any BLAS may be installed
-// in the place of another; null if there is none.
+// Finds the function in any library of the process, since any BLAS may be
+// installed in place of another; null if there is none.
 template <typename Function>
 Function* FindFunction(const char* name) {
   return reinterpret_cast<Function*>(dlsym(RTLD_DEFAULT, name));
 }
 
-// How many threads loops have, unless they ask for a number, and how deep loops
-// in loops may have threads.
+// The default number of threads of a loop, and the depth to which nested loops
+// may have threads.
 struct OpenMp {
   int (*get_num_threads)() = FindFunction<int()>("omp_get_max_threads");
   void (*set_num_threads)(int) = FindFunction<void(int)>("omp_set_num_threads");
@@ -71,7 +72,7 @@ void ParallelFor(int num_threads, size_t count,
     for (size_t i = 0; i < count; ++i) function(i);
     return;
   }
-  // Blocks keep the counter cheap; small enough to balance the load.
+  // Large enough to keep the counter cheap, small enough to balance the load.
   const size_t block = std::max<size_t>(1, count / (num_workers * 16));
   std::atomic<size_t> next{0};
   std::atomic<bool> failed{false};
@@ -102,7 +103,7 @@ void ParallelFor(int num_threads, size_t count,
   try {
     for (size_t i = 1; i < num_workers; ++i) workers.emplace_back(work);
   } catch (const std::system_error&) {
-    // The system gives no more threads: those that run do the work.
+    // The system provides no more threads: those that run do the work.
   }
   work();
   for (std::thread& worker : workers) worker.join();

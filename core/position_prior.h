@@ -8,20 +8,20 @@
 
 namespace adasfm {
 
-// One position of a receiver: geodetic, with the covariance of its error in
-// east, north and up, m^2. Times are the receiver's.
+// One geodetic position of a receiver, with the covariance of its error in
+// east, north and up, m^2. Times are on the clock of the receiver.
 struct GnssFix {
   timestamp_t timestamp_ns = 0;
   GeodeticPosition position;
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Identity();
 };
 
-// Where the antenna of a positioning system was at one time, in a world whose
-// axes are metres:
+// Position of the antenna of a positioning system at one time, in a world with
+// axes in metres:
 //   position = (1 - share) A_1 + share A_2 + N(0, covariance),
 //   A_k = C_k + R_k^T antenna_in_cam,
 // with the pose (R_k, C_k) of image k. A position at the time of one image has
-// image_id2 = image_id1 and share = 0; a position between two images belongs to
+// image_id2 = image_id1 and share = 0; a position between two images constrains
 // both.
 struct PositionPrior {
   image_t image_id1 = kInvalidImageId;

@@ -8,22 +8,22 @@
 
 namespace adasfm {
 
-// What an import found of the size of the lengths that wheels log.
+// The scale of the lengths in a wheel log, as an import estimated it.
 struct WheelScale {
-  double scale = 1.0;  // metres a logged metre
-  double sigma = 0.0;  // 1 sigma of it
-  // Believed of 1 before any other sensor was asked.
+  double scale = 1.0;  // metres per logged metre
+  double sigma = 0.0;  // 1 sigma of scale
+  // 1 sigma of the scale 1 that is assumed before other sensors are used.
   double stated_sigma = 0.0;
 };
 
-// Whether any of the priors knows a length, and with it the metre.
+// Whether any prior has a length, so that the scale is metric.
 inline bool HasLengths(const std::vector<RelativePosePrior>& priors) {
   return std::any_of(
       priors.begin(), priors.end(),
       [](const RelativePosePrior& prior) { return prior.HasLength(); });
 }
 
-// Whether a sensor measured any of them, such as wheels.
+// Whether any prior has a length that a sensor measured, such as wheels.
 inline bool HasMeasuredLengths(const std::vector<RelativePosePrior>& priors) {
   return std::any_of(
       priors.begin(), priors.end(), [](const RelativePosePrior& prior) {
@@ -31,8 +31,8 @@ inline bool HasMeasuredLengths(const std::vector<RelativePosePrior>& priors) {
       });
 }
 
-// The same as HasLengths of the priors between images of a map or set: lengths
-// between other images, such as those of another coarse model, say nothing.
+// HasLengths for the priors between images of a map or set only: lengths
+// between other images, such as those of another coarse model, do not count.
 template <typename Images>
 bool HasLengthsBetween(const Images& images,
                        const std::vector<RelativePosePrior>& priors) {

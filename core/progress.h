@@ -6,9 +6,9 @@
 
 namespace adasfm {
 
-// How long work tells its caller where it is: what is being done, in a few
-// words, and the share of the whole that is finished, in [0, 1]. May be called
-// from any thread, and may throw, which ends the work.
+// Reports the progress of long work: a short description of the current step,
+// and the share of the whole that is finished, in [0, 1]. May be called from
+// any thread, and may throw, which ends the work.
 using ProgressCallback =
     std::function<void(const std::string& what, double share_done)>;
 

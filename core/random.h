@@ -8,9 +8,9 @@
 
 namespace adasfm {
 
-// The one door to randomness: seeded, passed by reference. The draws are our
-// own (the standard's distributions differ between libraries), so a seed means
-// the same everywhere.
+// The only source of random numbers: seeded, passed by reference. Distributions
+// are implemented here, since those of the standard library differ between
+// libraries; so a seed gives the same numbers everywhere.
 class Random {
  public:
   explicit Random(uint64_t seed) : engine_(seed) {}

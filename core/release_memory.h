@@ -12,17 +12,16 @@
 
 namespace adasfm {
 
-// Gives memory that is free back to the system. The allocator keeps what a
-// thread has freed for that thread, which the next stage, on another one,
-// cannot use. For the end of a stage. Does nothing without glibc.
+// Returns free memory to the system, at the end of a stage. The allocator keeps
+// freed memory for the thread that freed it, and the next stage, on another
+// thread, cannot use it. Does nothing without glibc.
 inline void ReleaseFreedMemory() {
 #if defined(__GLIBC__)
   malloc_trim(0);
 #endif
 }
 
-// What the process has of the machine's memory; 0 where the system does not
-// say.
+// Resident memory of the process; 0 where the system does not report it.
 inline double ResidentMemoryBytes() {
   double num_pages = 0.0;
   double num_resident_pages = 0.0;

@@ -49,7 +49,7 @@ inline Rigid3d operator*(const Rigid3d& c_from_b, const Rigid3d& b_from_a) {
                  c_from_b * b_from_a.translation);
 }
 
-// The pose of camera 2 in the frame of camera 1's edge, P_12 = P_2 P_1^-1.
+// The relative pose of two cameras, P_12 = P_2 P_1^-1.
 inline Rigid3d ComputeCam2FromCam1(const Rigid3d& cam1_from_world,
                                    const Rigid3d& cam2_from_world) {
   return cam2_from_world * cam1_from_world.Inverse();

@@ -30,7 +30,7 @@ enum class WheelType {
   kOdometry,      // a trajectory of poses instead of samples
 };
 
-// One wheel's speed or counter tells nothing of the yaw.
+// The speed or counter of a single wheel does not observe the yaw.
 inline bool ObservesYaw(WheelType type) {
   return type != WheelType::kSpeed && type != WheelType::kEncoder;
 }
@@ -56,8 +56,8 @@ struct ImageTime {
   std::string name;
 };
 
-// The first sample at time_ns or later, of samples sorted by timestamp_ns;
-// their end when there is none.
+// The first of the samples, sorted by timestamp_ns, at time_ns or later; the
+// end of the samples when there is none.
 template <typename Sample>
 typename std::vector<Sample>::const_iterator FirstNotBefore(
     const std::vector<Sample>& samples, timestamp_t time_ns) {
@@ -65,6 +65,36 @@ typename std::vector<Sample>::const_iterator FirstNotBefore(
                           [](const Sample& sample, timestamp_t time) {
                             return sample.timestamp_ns < time;
                           });
+}
+
+// The index of the first of the samples after time_ns; their number when there
+// is none.
+template <typename Sample>
+size_t IndexAfter(const std::vector<Sample>& samples, timestamp_t time_ns) {
+  return std::upper_bound(samples.begin(), samples.end(), time_ns,
+                          [](timestamp_t time, const Sample& sample) {
+                            return time < sample.timestamp_ns;
+                          }) -
+         samples.begin();
+}
+
+// Whether the samples (in order of time) cover [start, end] without a gap
+// longer than max_gap_s.
+template <typename Sample>
+bool CoversInterval(const std::vector<Sample>& samples, timestamp_t start_ns,
+                    timestamp_t end_ns, double max_gap_s) {
+  if (samples.empty() || start_ns > end_ns ||
+      start_ns < samples.front().timestamp_ns ||
+      end_ns > samples.back().timestamp_ns) {
+    return false;
+  }
+  for (size_t i = std::max<size_t>(IndexAfter(samples, start_ns), 1);
+       i < samples.size() && samples[i - 1].timestamp_ns < end_ns; ++i) {
+    const timestamp_t gap =
+        samples[i].timestamp_ns - samples[i - 1].timestamp_ns;
+    if (SecondsFromNs(gap) > max_gap_s) return false;
+  }
+  return true;
 }
 
 // White noise densities and bias random walks, continuous time.

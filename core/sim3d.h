@@ -41,8 +41,8 @@ inline Sim3d operator*(const Sim3d& c_from_b, const Sim3d& b_from_a) {
                c_from_b * b_from_a.translation);
 }
 
-// The pose of a camera after its world was moved by new_from_old; the camera
-// keeps its unit of length equal to the new world's.
+// The pose of a camera after its world was transformed by new_from_old; the
+// unit of length of the camera frame becomes that of the new world.
 inline Rigid3d TransformCamFromWorld(const Sim3d& new_from_old,
                                      const Rigid3d& cam_from_old) {
   const Eigen::Quaterniond cam_from_new =
@@ -57,9 +57,9 @@ struct AlignmentOptions {
 };
 
 // The least-squares similarity target_from_source between corresponding points
-// (Umeyama 1991). False with fewer than three points, or when the source
-// points coincide. Collinear points leave the turn about their line open; the
-// smallest such rotation is not guaranteed.
+// (Umeyama 1991). False with fewer than three points, or when the source points
+// coincide. Collinear points leave the rotation about their line undetermined;
+// the smallest such rotation is not guaranteed.
 bool EstimateSim3d(const std::vector<Eigen::Vector3d>& source,
                    const std::vector<Eigen::Vector3d>& target,
                    const AlignmentOptions& options, Sim3d* target_from_source);

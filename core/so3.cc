@@ -7,7 +7,7 @@
 namespace adasfm {
 namespace {
 
-// Below this angle the series is exact to double precision.
+// Below this angle a series is used; its error is below 1e-13.
 constexpr double kSmallAngleRad = 1e-4;
 
 }  // namespace

@@ -20,8 +20,7 @@ bool IsNonEmptyFile(const std::string& path) {
   return !error && size > 0;
 }
 
-// The path as an SQLite URI, with the characters that mean something there
-// escaped.
+// The path as an SQLite URI, with special characters escaped.
 std::string UriFromPath(const std::string& path, const std::string& query) {
   std::string uri = "file:";
   for (const char c : fs::absolute(path).string()) {

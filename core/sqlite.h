@@ -12,21 +12,21 @@ struct sqlite3_stmt;
 
 namespace adasfm {
 
-// What went wrong with a database, in SQLite's words. Functions that offer a
-// Status catch it.
+// An error of a database, with SQLite's message. Functions that return a Status
+// catch it.
 class SqliteError : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-// A connection of our own, so that a database can be looked at without being
-// changed: COLMAP's creates missing tables and converts the file when it opens
-// one.
+// A connection that can read a database without changing it. COLMAP's own
+// connection creates missing tables and converts the file when it opens one.
 class SqliteConnection {
  public:
   enum class Mode { kRead, kWrite };
 
-  // The file must exist. With kRead nothing is written, and no side files are
-  // left behind.
+  // The file must exist. With kRead nothing is written and no side files are
+  // left behind, unless there is a -wal or -journal file: then SQLite must
+  // write to recover the last committed state.
   SqliteConnection(const std::string& path, Mode mode);
   ~SqliteConnection();
   SqliteConnection(const SqliteConnection&) = delete;
@@ -45,7 +45,7 @@ class SqliteConnection {
   sqlite3* handle_ = nullptr;
 };
 
-// A value of a row as it stands there: NULL, integer, real, text or blob.
+// A value of a row with its stored type: NULL, integer, real, text or blob.
 using SqliteValue = std::variant<std::monostate, int64_t, double, std::string,
                                  std::vector<char>>;
 
@@ -57,7 +57,7 @@ class SqliteStatement {
   SqliteStatement(const SqliteStatement&) = delete;
   SqliteStatement& operator=(const SqliteStatement&) = delete;
 
-  // True when there is a row to look at.
+  // True when a row is available.
   bool Step();
   // Makes the statement ready for new parameters.
   void Reset();
@@ -84,7 +84,7 @@ class SqliteStatement {
   sqlite3_stmt* handle_ = nullptr;
 };
 
-// Everything between construction and Commit() takes place, or nothing does.
+// All changes between construction and Commit() take effect, or none.
 class SqliteTransaction {
  public:
   explicit SqliteTransaction(SqliteConnection* connection);

@@ -5,7 +5,7 @@
 
 namespace adasfm {
 
-// Runs from where it is made.
+// Measures the time since construction.
 class Stopwatch {
  public:
   double Seconds() const {

@@ -5,9 +5,9 @@
 
 namespace adasfm {
 
-// By itself a stream takes memory that it cannot get, or a disk that it cannot
-// read, for the end of the text, and what was read so far for the whole. Then
-// std::bad_alloc and std::ios_base::failure are thrown in place of that.
+// Makes a stream throw std::bad_alloc or std::ios_base::failure when memory or
+// the disk fails. By default a stream treats such a failure as the end of the
+// text, and the part read so far passes for the whole.
 template <typename Stream>
 void ThrowOnFailure(Stream* stream) {
   stream->exceptions(std::ios_base::badbit);

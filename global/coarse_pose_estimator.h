@@ -11,8 +11,8 @@
 
 namespace adasfm {
 
-// The state that the steps of EstimateCoarsePoses hand on; one member function
-// a step, which ends it with its name, time and summary.
+// The state that the steps of EstimateCoarsePoses share. Each step is a member
+// function that ends by recording its name, time and summary (EndStep).
 class CoarsePoseEstimator {
  public:
   CoarsePoseEstimator(const CoarsePoseOptions& options, const ViewGraph& graph,
@@ -34,7 +34,7 @@ class CoarsePoseEstimator {
   void BuildChain();
   std::vector<std::optional<RotationPrediction>> PredictRotations() const;
   void FilterLoops();
-  VisualSteps CompleteSteps() const;
+  VisualOdometryEdges CompleteOdometry() const;
   bool IsSequence(const OdometryChain& chain) const;
   TrajectoryOdometry BuildTrajectoryOdometry(std::string* summary) const;
   int AddSensors();

@@ -24,8 +24,8 @@ void CoarsePoseEstimator::EstimateTranslations() {
 
 void CoarsePoseEstimator::EstimatePositions() {
   lengths_ = EstimateLengths();
-  // Unit vectors throughout, as the paper has it: shared points must not
-  // bring the metres back.
+  // Unit vectors throughout, as in the paper: shared points would reintroduce
+  // metres.
   if (!options_.augmentation.use_metric_lengths) lengths_ = EdgeLengths();
   const int num_hinges = SplitWhereSizeIsUnknown();
   int num_images = 0;
@@ -49,7 +49,7 @@ void CoarsePoseEstimator::EstimatePositions() {
           std::to_string(num_closures) + " joins at one place only");
 }
 
-// Of the edges that have a direction; at least two images each.
+// Components by edges with a direction; at least two images each.
 std::vector<std::vector<image_t>> CoarsePoseEstimator::FindDirectedComponents()
     const {
   ViewGraph directed = graph_;
@@ -72,7 +72,7 @@ GlobalPositions CoarsePoseEstimator::EstimatePositionsOf(
                                  StartFromChain(images));
 }
 
-// Then all is of one size.
+// With metres everywhere, all parts have one scale.
 bool CoarsePoseEstimator::HasMetresEverywhere() const {
   std::vector<bool> has_metres(graph_.images.size(), false);
   for (const ViewGraphEdge& edge : graph_.edges) {
@@ -86,7 +86,7 @@ bool CoarsePoseEstimator::HasMetresEverywhere() const {
 
 // Returns the number of edges removed.
 int CoarsePoseEstimator::SplitWhereSizeIsUnknown() {
-  // Photos in any order have no parts that could stay apart.
+  // Photos in any order have no segments to keep apart.
   if (!result_.loop_closures.segments_were_split || lengths_.lengths.empty() ||
       HasMetresEverywhere()) {
     return 0;
@@ -113,9 +113,10 @@ int CoarsePoseEstimator::SplitWhereSizeIsUnknown() {
   return num_removed;
 }
 
-// Those that were made all the same, with the component that hangs on them.
+// Reports closures that were made unconfirmed, with their component. Returns
+// their number.
 int CoarsePoseEstimator::ReportUnconfirmedClosures() {
-  // Fewer images are no part of a drive.
+  // Smaller segments do not count as parts of a drive.
   constexpr int kMinNumImages = 10;
   int num_closures = 0;
   if (result_.loop_closures.segments_were_split) return num_closures;
@@ -180,22 +181,23 @@ int CoarsePoseEstimator::RemoveEdgesOffPositions() {
                             !(lengths[e] && lengths[e]->is_by_depth);
     if (!has_metres) lengths[e].reset();
   }
-  return num_removed + FilterEdgesByPosition(options_.position_filter,
-                                             rotations_, centers, lengths,
-                                             &graph_);
+  return num_removed +
+         FilterEdgesByPosition(rotations_, centers, lengths, &graph_);
 }
 
-// Metres of the priors that augment the graph, spread over shared points.
+// Metres of the priors that augment the graph, spread through shared points.
 EdgeLengths CoarsePoseEstimator::EstimateLengths() const {
   return EstimateEdgeLengths(options_.lengths, graph_, KnownLengths(),
                              correspondences_, lengths_);
 }
 
 std::map<ImagePair, double> CoarsePoseEstimator::KnownLengths() const {
+  // Shorter motions (standstill) do not constrain depths.
+  constexpr double kMinLengthM = 0.05;
   std::map<ImagePair, double> known_lengths_m;
   for (const RelativePosePrior& prior : AllPriors()) {
     const double length = prior.cam2_from_cam1.translation.norm();
-    if (prior.HasLength() && length >= options_.min_known_length_m &&
+    if (prior.HasLength() && length >= kMinLengthM &&
         IsKnownMotion(options_.augmentation, prior)) {
       known_lengths_m[ImagePair(prior.image_id1, prior.image_id2)] = length;
     }
@@ -216,7 +218,7 @@ std::vector<std::optional<EdgeLength>> CoarsePoseEstimator::SelectLengths(
   for (const ViewGraphEdge& edge : subgraph.edges) {
     while (graph_.edges[e].Pair() < edge.Pair()) ++e;
     selected.push_back(lengths_.lengths[e]);
-    // Guesses do not count beside metres.
+    // Lengths guessed by depth are not used beside metres.
     if (metric && selected.back() && selected.back()->is_by_depth) {
       selected.back().reset();
     }
@@ -224,8 +226,8 @@ std::vector<std::optional<EdgeLength>> CoarsePoseEstimator::SelectLengths(
   return selected;
 }
 
-// The priors' translations under the global rotations; empty unless they
-// reach all images.
+// The chain's translations under the global rotations; empty unless they reach
+// all images.
 std::map<image_t, Eigen::Vector3d> CoarsePoseEstimator::StartFromChain(
     std::vector<image_t> images) const {
   std::map<image_t, Eigen::Vector3d> centers;

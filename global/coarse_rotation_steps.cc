@@ -2,24 +2,45 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <map>
 #include <set>
 
+#include "core/disjoint_sets.h"
 #include "core/prior_lengths.h"
 #include "core/so3.h"
 #include "global/coarse_pose_estimator.h"
 #include "global/loop_closures/reject_visual_odometry.h"
-#include "global/odometry/visual_steps.h"
+#include "global/odometry/visual_odometry.h"
 #include "global/rotation_averaging/filter_edges_by_rotation.h"
 
 namespace adasfm {
 namespace {
 
-std::string DescribeCameraMount(const CameraMountReport& mount) {
-  if (!mount.corrected) return "";
+std::string DescribeCameraImuRotation(
+    const CameraImuRotationReport& camera_imu) {
+  if (!camera_imu.corrected) return "";
   char text[96];
   std::snprintf(text, sizeof(text), ", camera turned by %.2f +- %.2f deg",
-                RadToDeg(mount.turn_rad.norm()), RadToDeg(mount.sigma_rad));
+                RadToDeg(camera_imu.rotation_rad.norm()),
+                RadToDeg(camera_imu.sigma_rad));
   return text;
+}
+
+// Whether whole motions connect all images, perhaps through others.
+bool ConnectsAll(const std::vector<RelativePosePrior>& priors,
+                 const std::vector<image_t>& images) {
+  std::map<image_t, int> numbers;
+  const auto number = [&numbers](image_t image_id) {
+    return numbers.emplace(image_id, numbers.size()).first->second;
+  };
+  DisjointSets sets(images.size() + 2 * priors.size());
+  for (const RelativePosePrior& prior : priors) {
+    if (!prior.HasMotion()) continue;
+    sets.Join(number(prior.image_id1), number(prior.image_id2));
+  }
+  return std::all_of(images.begin(), images.end(), [&](image_t image_id) {
+    return sets.Find(number(image_id)) == sets.Find(number(images[0]));
+  });
 }
 
 }  // namespace
@@ -38,18 +59,19 @@ void CoarsePoseEstimator::RefinePairs() {
     RefineRelativePoses(options_.relative_poses, correspondences_,
                         PredictRotations(), &graph_);
   }
-  EndStep("relative poses", std::to_string(graph_.edges.size()) + " pairs, " +
-                                std::to_string(num_removed) +
-                                " with few inliers removed" +
-                                DescribeCameraMount(result_.camera_mount));
+  EndStep("relative poses",
+          std::to_string(graph_.edges.size()) + " pairs, " +
+              std::to_string(num_removed) + " with few inliers removed" +
+              DescribeCameraImuRotation(result_.camera_imu_rotation));
 }
 
-// The chain, with what vision tells of the camera's mount and of the direction
-// of driving.
+// The chain, with what vision observes of the camera-IMU rotation and of the
+// direction of driving.
 void CoarsePoseEstimator::BuildChain() {
   chain_ = OdometryChain(priors_, chain_options_, frame_priors_);
-  const CameraMountOptions& mount = options_.camera_mount;
-  if (chain_.empty() || !options_.relative_poses.enabled || !mount.enabled) {
+  const CameraImuRotationOptions& camera_imu = options_.camera_imu_rotation;
+  if (chain_.empty() || !options_.relative_poses.enabled ||
+      !camera_imu.enabled) {
     return;
   }
   ViewGraph near = graph_;
@@ -61,32 +83,36 @@ void CoarsePoseEstimator::BuildChain() {
                    chain_.IsFollower(edge.image_id2) ||
                    !chain_.IsConnected(edge.image_id1, edge.image_id2) ||
                    std::abs(chain_.NumSteps(edge.image_id1, edge.image_id2)) >
-                       mount.max_num_steps;
+                       camera_imu.max_num_steps;
           }),
       near.edges.end());
   RefineRelativePoses(options_.relative_poses, correspondences_, {}, &near);
-  // What all steps share is what it looks for, and no noise.
+  // The errors that all steps share are the unknowns here and no noise.
   const OdometryChain independent(priors_, WithoutSharedErrors(options_.chain),
                                   frame_priors_);
-  result_.camera_mount =
-      CorrectCameraMount(mount, independent, near, correspondences_, &priors_);
-  chain_options_.shared_turns = result_.camera_mount.left_in_priors;
+  result_.camera_imu_rotation = CorrectCameraImuRotation(
+      camera_imu, independent, near, correspondences_, &priors_);
+  chain_options_.shared_rotation_errors =
+      result_.camera_imu_rotation.left_in_priors;
   chain_ = OdometryChain(priors_, chain_options_, frame_priors_);
 }
 
 std::vector<std::optional<RotationPrediction>>
 CoarsePoseEstimator::PredictRotations() const {
-  const double floor_rad = DegToRad(options_.min_predicted_rotation_sigma_deg);
+  // What calibration and rolling shutter add to the odometry's rotation between
+  // two cameras, 1 sigma.
+  constexpr double kMinPredictedSigmaRad = DegToRad(0.05);
   std::vector<std::optional<RotationPrediction>> predictions;
   for (const ViewGraphEdge& edge : graph_.edges) {
     predictions.emplace_back();
     if (!chain_.IsConnected(edge.image_id1, edge.image_id2)) continue;
     const ChainMotion motion = chain_.Motion(edge.image_id1, edge.image_id2);
     if (!motion.has_rotation) continue;
-    predictions.back() = RotationPrediction{
-        motion.cam2_from_cam1.rotation,
-        motion.covariance.topLeftCorner<3, 3>() +
-            floor_rad * floor_rad * Eigen::Matrix3d::Identity()};
+    predictions.back() =
+        RotationPrediction{motion.cam2_from_cam1.rotation,
+                           motion.covariance.topLeftCorner<3, 3>() +
+                               kMinPredictedSigmaRad * kMinPredictedSigmaRad *
+                                   Eigen::Matrix3d::Identity()};
   }
   return predictions;
 }
@@ -100,12 +126,12 @@ void CoarsePoseEstimator::FilterLoops() {
   std::string steps_summary;
   const TrajectoryOdometry odometry = BuildTrajectoryOdometry(&steps_summary);
   LoopClosureOptions options = options_.loops;
-  // Photos in any order have no parts that could stay apart.
+  // Photos in any order have no segments to keep apart.
   options.split_unconfirmed_closures &=
       !priors_.empty() || IsSequence(odometry.chain);
   result_.loop_closures = FilterLoopClosures(options, odometry, &graph_);
   const LoopClosureReport& report = result_.loop_closures;
-  // What came through removed pairs is forgotten.
+  // Lengths that were propagated through removed pairs are discarded.
   if (report.segments_were_split &&
       report.num_pairs_of_unconfirmed_closures > 0) {
     lengths_ = EdgeLengths();
@@ -120,28 +146,28 @@ void CoarsePoseEstimator::FilterLoops() {
   if (report.num_confirmed_closures + report.unconfirmed_closures.size() > 0) {
     summary += "; " + std::to_string(report.num_segments) + " segments, " +
                std::to_string(report.num_confirmed_closures) +
-               " joins confirmed, " +
+               " closures between them confirmed, " +
                std::to_string(report.unconfirmed_closures.size()) +
-               (report.segments_were_split ? " not made" : " not confirmed");
+               (report.segments_were_split ? " rejected" : " not confirmed");
   }
   EndStep("loop closures", summary);
 }
 
-// The priors, completed by vision where the sensors did not see every step.
+// The priors, completed by vision where sensors miss a step.
 TrajectoryOdometry CoarsePoseEstimator::BuildTrajectoryOdometry(
     std::string* summary) const {
   TrajectoryOdometry odometry;
   odometry.priors = priors_;
   odometry.chain = chain_;
   EdgeLengths lengths = lengths_;
-  VisualSteps steps = CompleteSteps();
+  VisualOdometryEdges steps = CompleteOdometry();
   if (!steps.priors.empty()) {
     OdometryChainOptions options = chain_options_;
     if (!HasLengths(priors_)) {
-      options.scale_drift_ratio = options_.visual_steps.scale_drift_ratio;
+      options.scale_drift_ratio = options_.visual_odometry.scale_drift_ratio;
     }
     const int num_rejected =
-        RejectVisualOdometry(options_.visual_steps, options_.loops, options,
+        RejectVisualOdometry(options_.visual_odometry, options_.loops, options,
                              graph_, priors_.size(), &steps);
     odometry.chain = OdometryChain(steps.priors, options, frame_priors_);
     odometry.unit = steps.unit_m;
@@ -155,7 +181,7 @@ TrajectoryOdometry CoarsePoseEstimator::BuildTrajectoryOdometry(
   return odometry;
 }
 
-// Whether the chain holds nearly all of the images that share a pair.
+// Whether the chain contains nearly all of the images that share a pair.
 bool CoarsePoseEstimator::IsSequence(const OdometryChain& chain) const {
   std::set<image_t> images;
   for (const ViewGraphEdge& edge : graph_.edges) {
@@ -166,22 +192,17 @@ bool CoarsePoseEstimator::IsSequence(const OdometryChain& chain) const {
   const auto num_in_chain = std::count_if(
       images.begin(), images.end(),
       [&chain](image_t image_id) { return chain.Index(image_id) >= 0; });
-  return num_in_chain >= options_.min_sequence_ratio * images.size();
+  constexpr double kMinRatio = 0.8;
+  return num_in_chain >= kMinRatio * images.size();
 }
 
-// Empty where the sensors saw every step.
-VisualSteps CoarsePoseEstimator::CompleteSteps() const {
-  const bool is_complete =
-      priors_.size() + frame_priors_.size() + 1 >= graph_.images.size() &&
-      std::all_of(priors_.begin(), priors_.end(),
-                  [](const RelativePosePrior& prior) {
-                    return prior.HasRotation() && prior.HasDirection() &&
-                           prior.HasLength();
-                  });
-  if (is_complete || !options_.visual_steps.enabled) return VisualSteps();
-  return AddVisualSteps(options_.visual_steps, options_.lengths, graph_,
-                        correspondences_, KnownLengths(), priors_,
-                        frame_priors_);
+// Empty where sensors measure all motions, or without visual odometry.
+VisualOdometryEdges CoarsePoseEstimator::CompleteOdometry() const {
+  if (!options_.visual_odometry.enabled) return VisualOdometryEdges();
+  if (ConnectsAll(AllPriors(), graph_.images)) return VisualOdometryEdges();
+  return AddVisualOdometry(options_.visual_odometry, options_.lengths, graph_,
+                           correspondences_, KnownLengths(), priors_,
+                           frame_priors_);
 }
 
 std::vector<RelativePosePrior> CoarsePoseEstimator::AllPriors() const {
@@ -190,7 +211,7 @@ std::vector<RelativePosePrior> CoarsePoseEstimator::AllPriors() const {
   return all;
 }
 
-// Lengths found before keep to their edges.
+// Lengths found before stay with their edges.
 int CoarsePoseEstimator::AddSensors() {
   std::map<ImagePair, std::optional<EdgeLength>> lengths;
   for (size_t e = 0; e < lengths_.lengths.size(); ++e) {
@@ -235,7 +256,7 @@ void CoarsePoseEstimator::EstimateRotations() {
 void CoarsePoseEstimator::FilterByRotation() {
   int num_removed = FilterEdgesByRotation(options_.max_rotation_discrepancy_deg,
                                           rotations_, &graph_);
-  // Consecutive images that lost their visual edge keep the sensors'.
+  // Consecutive images whose visual edge was removed get the sensors' edge.
   const int num_added = AddSensors();
   num_removed += FilterEdgesByRotation(options_.max_rotation_discrepancy_deg,
                                        rotations_, &graph_);
@@ -244,8 +265,8 @@ void CoarsePoseEstimator::FilterByRotation() {
                                  " sensor edges added");
 }
 
-// Global rotations tell the two optima of nearly planar pairs apart, as
-// odometry does for the others. Removed pairs stay removed: bent towards the
+// Global rotations distinguish the two optima of nearly planar pairs that
+// odometry does not predict. Removed pairs stay removed: refined towards the
 // prediction, a wrong one would look right.
 void CoarsePoseEstimator::RepeatRotations() {
   for (int round = 1; round < options_.num_rotation_rounds; ++round) {
@@ -266,7 +287,8 @@ void CoarsePoseEstimator::RepeatRotations() {
 // For pairs that odometry does not predict.
 std::vector<std::optional<RotationPrediction>>
 CoarsePoseEstimator::PredictFromRotations() const {
-  const double sigma_rad = DegToRad(options_.global_rotation_sigma_deg);
+  // 1 sigma of the global rotations of the previous round between two images.
+  constexpr double kGlobalRotationSigmaRad = DegToRad(1.0);
   std::vector<std::optional<RotationPrediction>> predictions;
   for (const ViewGraphEdge& edge : graph_.edges) {
     predictions.emplace_back();
@@ -278,7 +300,8 @@ CoarsePoseEstimator::PredictFromRotations() const {
     }
     predictions.back() =
         RotationPrediction{rotation2->second * rotation1->second.conjugate(),
-                           sigma_rad * sigma_rad * Eigen::Matrix3d::Identity()};
+                           kGlobalRotationSigmaRad * kGlobalRotationSigmaRad *
+                               Eigen::Matrix3d::Identity()};
   }
   return predictions;
 }

@@ -34,15 +34,12 @@ bool CoarsePoseOptions::IsValid(std::string* error) const {
                          max_rotation_discrepancy_deg}})
              .AtLeast(0, "min_num_inliers", min_num_inliers)
              .AtLeast(1, "num_rotation_rounds", num_rotation_rounds)
-             .Within(0, 1, "min_sequence_ratio", min_sequence_ratio)
-             .NotNegative({{"min_known_length_m", min_known_length_m}})
              .AllHold() &&
-         chain.IsValid(error) && camera_mount.IsValid(error) &&
+         chain.IsValid(error) && camera_imu_rotation.IsValid(error) &&
          relative_poses.IsValid(error) && lengths.IsValid(error) &&
-         visual_steps.IsValid(error) && loops.IsValid(error) &&
+         visual_odometry.IsValid(error) && loops.IsValid(error) &&
          rotations.IsValid(error) && translations.IsValid(error) &&
-         augmentation.IsValid(error) && positions.IsValid(error) &&
-         position_filter.IsValid(error);
+         augmentation.IsValid(error) && positions.IsValid(error);
 }
 
 CoarsePoses EstimateCoarsePoses(
@@ -56,7 +53,7 @@ CoarsePoses EstimateCoarsePoses(
   }
   initial_graph.Check();
   CoarsePoseOptions step_options = options;
-  step_options.camera_mount.num_threads = options.num_threads;
+  step_options.camera_imu_rotation.num_threads = options.num_threads;
   step_options.relative_poses.num_threads = options.num_threads;
   step_options.lengths.num_threads = options.num_threads;
   step_options.translations.num_threads = options.num_threads;

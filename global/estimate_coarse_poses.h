@@ -7,13 +7,13 @@
 
 #include "core/relative_pose_prior.h"
 #include "core/rigid3d.h"
-#include "global/calibration/correct_camera_mount.h"
+#include "global/calibration/correct_camera_imu_rotation.h"
 #include "global/loop_closures/filter_loop_closures.h"
 #include "global/loop_closures/loop_closure_options.h"
 #include "global/odometry/augment_view_graph.h"
 #include "global/odometry/edge_lengths.h"
 #include "global/odometry/odometry_chain.h"
-#include "global/odometry/visual_steps.h"
+#include "global/odometry/visual_odometry.h"
 #include "global/rotation_averaging/rotation_averaging.h"
 #include "global/translation_averaging/filter_edges_by_position.h"
 #include "global/translation_averaging/translation_averaging.h"
@@ -27,34 +27,24 @@ namespace adasfm {
 // Nested by step, in order of their use.
 struct CoarsePoseOptions {
   OdometryChainOptions chain;
-  CameraMountOptions camera_mount;
+  CameraImuRotationOptions camera_imu_rotation;
   RelativePoseRefinementOptions relative_poses;
   EdgeLengthOptions lengths;
-  VisualStepOptions visual_steps;
+  VisualOdometryOptions visual_odometry;
   LoopClosureOptions loops;
-  // Without priors, parts of a drive are kept apart only where the visual chain
-  // holds this share of the images that share a pair.
-  double min_sequence_ratio = 0.8;
   RotationAveragingOptions rotations;
   // eps_R.
   double max_rotation_discrepancy_deg = 5.0;
   RelativeTranslationOptions translations;
   AugmentationOptions augmentation;
   TranslationAveragingOptions positions;
-  PositionFilterOptions position_filter;
-  // Least error granted to the odometry's rotation between two cameras (their
-  // calibration, rolling shutter), added to its covariance.
-  double min_predicted_rotation_sigma_deg = 0.05;
-  // Rounds of relative poses and rotation averaging for pairs that odometry
-  // does not predict: each takes the global rotations of the last as prediction
-  // with this sigma.
+  // Rounds of relative poses and rotation averaging. From the second round on,
+  // pairs that odometry does not predict are predicted by the global rotations
+  // of the previous round.
   int num_rotation_rounds = 2;
-  double global_rotation_sigma_deg = 1.0;
   // Edges with fewer inliers take no part.
   int min_num_inliers = 15;
-  // Priors shorter than this (standstill) say nothing about depths.
-  double min_known_length_m = 0.05;
-  // Of all steps; -1: all of the machine's.
+  // Threads of all steps; -1: all of the machine.
   int num_threads = -1;
 
   bool IsValid(std::string* error) const;
@@ -68,7 +58,7 @@ struct CoarseComponent {
   bool rotations_converged = false;
   bool positions_converged = false;
   double sdp_optimality = 0.0;
-  // Where nothing tells look-alike places apart; none with odometry throughout.
+  // Closures that may be perceptual aliasing; none with odometry throughout.
   std::vector<UnconfirmedClosure> unconfirmed_closures;
 };
 
@@ -85,9 +75,9 @@ struct CoarsePoses {
   // The input's edges and those added, with reasons of removal and the
   // relative poses as they were used.
   ViewGraph graph;
-  // The input's, turned by the camera's mount where vision corrected it.
+  // The input's, rotated where vision corrected T_cam_imu.
   std::vector<RelativePosePrior> priors;
-  CameraMountReport camera_mount;
+  CameraImuRotationReport camera_imu_rotation;
   LoopClosureReport loop_closures;
   std::vector<CoarseStep> steps;
 };
@@ -99,8 +89,8 @@ struct CoarsePoses {
 // a frame's leader is that of its other images. Throws std::invalid_argument
 // for invalid options or an inconsistent graph. Numbered steps:
 //   2.1 least-squares relative poses            RefineRelativePoses
-//       the camera's mount                      CorrectCameraMount
-//   2.2 odometry chain, lengths, loop closures  AddVisualSteps
+//       the camera-IMU rotation                 CorrectCameraImuRotation
+//   2.2 odometry chain, lengths, loop closures  AddVisualOdometry
 //                                               FilterLoopClosures
 //   2.3 sensor edges, rotation averaging        EstimateGlobalRotations
 //   2.4 edges off the rotations                 FilterEdgesByRotation

@@ -14,11 +14,11 @@
 namespace adasfm {
 namespace {
 
-// Orientations weigh as if they were known to this angle when centres are known
-// to the threshold.
+// Sigma assumed for the orientations when the sigma of the centres is the
+// threshold.
 constexpr double kOrientationSigmaRad = 0.1;
 // Samples of three images for each threshold: with r_min = 0.7 of inliers the
-// chance that all 100 hold an outlier is 1e-18.
+// probability that all 100 contain an outlier is 1e-18.
 constexpr int kNumTrials = 100;
 constexpr uint64_t kSeed = 1;
 
@@ -49,7 +49,7 @@ double ComputeExtent(const std::vector<PosePair>& poses) {
   return coordinates[coordinates.size() - 1 - decile] - coordinates[decile];
 }
 
-// One threshold's RANSAC.
+// RANSAC at one threshold.
 class Attempt {
  public:
   Attempt(const AlignSimilarityOptions& options,
@@ -60,8 +60,8 @@ class Attempt {
   }
 
   AlignSimilarityResult Run() {
-    // All images first: most parts fit, and then the result has no chance in
-    // it. RANSAC's samples follow.
+    // All images first: most parts fit, and then the result does not depend on
+    // random samples. The samples of RANSAC follow.
     Consider(std::vector<char>(poses_.size(), 1));
     Random random(kSeed);
     for (int trial = 0; trial < kNumTrials; ++trial) {
@@ -75,7 +75,8 @@ class Attempt {
   }
 
  private:
-  // Estimates from the mask, then again from the inliers while these grow.
+  // Estimates from the mask, then again from the inliers while the result
+  // improves.
   void Consider(const std::vector<char>& initial_mask) {
     std::vector<char> mask = initial_mask;
     for (int round = 0; round < 10; ++round) {
@@ -92,7 +93,7 @@ class Attempt {
     }
   }
 
-  // False when this is no better than what was found before.
+  // Keeps the similarity if it is the best one so far, else returns false.
   bool Evaluate(const Sim3d& target_from_source, std::vector<char>* mask) {
     int num_inliers = 0;
     double sum_squares = 0.0;
@@ -171,7 +172,7 @@ AlignSimilarityResult AlignSimilarity(const AlignSimilarityOptions& options,
     AlignSimilarityResult result = Attempt(options, poses, threshold).Run();
     result.success = result.inlier_ratio >= options.min_inlier_ratio;
     const bool was_success = best.success;
-    // A threshold lowered too far: the one before it was the final one.
+    // Lowered too far: the previous threshold is the final one.
     if (was_success && !result.success) break;
     best = result;
     best.num_iterations = iteration;
@@ -180,7 +181,7 @@ AlignSimilarityResult AlignSimilarity(const AlignSimilarityOptions& options,
       threshold = std::min(
           max_threshold, threshold + options.threshold_increase * options.unit);
     } else if (result.inlier_ratio >= options.max_inlier_ratio) {
-      // Raised before: lowering it again would only go back and forth.
+      // Raised before: lowering the threshold again would only alternate.
       if (iteration > 1 && !was_success) break;
       if (threshold <= min_threshold) break;
       threshold = std::max(
@@ -229,8 +230,8 @@ bool EstimatePoseSimilarity(const std::vector<PosePair>& poses,
                         .toRotationMatrix();
   }
   if (!(source_variance > 0.0) || !(target_variance > 0.0)) return false;
-  // The rotation depends on the scale only through the two terms' weights:
-  // alternating converges at once.
+  // The rotation depends on the scale only through the weights of the two
+  // terms: alternating between rotation and scale converges at once.
   double scale = std::sqrt(target_variance / source_variance);
   Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();
   for (int round = 0; round < 3; ++round) {

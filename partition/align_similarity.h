@@ -10,7 +10,7 @@
 
 namespace adasfm {
 
-// The same image in two worlds.
+// The poses of one image in two worlds.
 struct PosePair {
   Rigid3d cam_from_source;
   Rigid3d cam_from_target;
@@ -25,8 +25,8 @@ struct AlignSimilarityOptions {
   double threshold_decrease = 0.1;
   double min_inlier_ratio = 0.7;
   double max_inlier_ratio = 0.9;
-  // Bounds of the adaptation. Alg. 2 has none: any part fits a threshold that
-  // may grow for ever.
+  // Bounds of the adaptation. Alg. 2 has none, but any part would fit a
+  // threshold that grows without bound.
   int max_num_iterations = 20;
   double min_threshold = 0.1;
   // No threshold exceeds this share of the target's extent (the distance of the
@@ -57,19 +57,20 @@ struct AlignSimilarityResult {
   std::vector<char> inlier_mask;
 };
 
-// Aligns a part to the global frame: RANSAC on camera poses whose threshold
-// rises while fewer than r_min of the images are inliers, and falls while r_max
-// of them are. The similarity returned is the one estimated at the final
-// threshold, the lowest one that still keeps r_min.
+// Aligns a part to the global frame by RANSAC on camera poses. The threshold is
+// raised while fewer than r_min of the images are inliers, and lowered while at
+// least r_max of them are. Returns the similarity estimated at the final
+// threshold, the lowest one tried that still keeps r_min.
 AlignSimilarityResult AlignSimilarity(const AlignSimilarityOptions& options,
                                       const std::vector<PosePair>& poses);
 
 // Least squares on centres and orientations of the pairs in the mask:
 //   min sum |C_target - (s Q C_source + t)|^2 + weight^2 sum |Q - Q_i|^2,
 // with Q_i = R_target^T R_source and the Frobenius norm. `orientation_weight`
-// has the target's unit of length: centres whose spread about a line exceeds it
-// fix the rotation themselves, on a straight road the orientations fix the
-// roll. False with fewer than two pairs or coinciding centres.
+// has the target's unit of length: centres whose spread about a line exceeds
+// the weight determine the rotation themselves; on a straight road the
+// orientations determine the roll. False with fewer than two pairs or
+// coinciding centres.
 bool EstimatePoseSimilarity(const std::vector<PosePair>& poses,
                             const std::vector<char>& mask,
                             double orientation_weight,

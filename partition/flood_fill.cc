@@ -99,7 +99,8 @@ class Layer {
 
   std::vector<Part>& parts_;
   std::vector<bool> wants_more_;
-  // As the layer begins: images taken in it are separators of the next.
+  // State at the beginning of the layer: images taken in a layer become
+  // separators in the next one.
   std::map<image_t, std::vector<int>> parts_of_image_;
   std::set<std::pair<int, image_t>> served_separators_;
 };

@@ -10,26 +10,26 @@
 namespace adasfm {
 
 struct FloodFillOptions {
-  // tau_ot: the share of a part's images that other parts have too. Alignment
-  // and merging rest on them; the paper's value.
+  // tau_ot: the share of a part's images that other parts contain, too.
+  // Alignment and merging rely on these images. The paper's value.
   double min_overlap_ratio = 0.3;
 
   bool IsValid(std::string* error) const;
 };
 
-// Adaptive flood fill (paper, section on graph partition and Alg. 1). Layer by
-// layer, the separators of a part (its images with an edge to an image outside)
-// each take the strongest such image, until tau_ot of the part is shared. A
-// part stops on its own, so dense cuts need one layer and thin chains as many
-// as it takes.
+// Adaptive flood fill (paper, section on graph partition and Alg. 1). The
+// separators of a part are its images with an edge to an image outside. Layer
+// by layer, each separator takes its strongest neighbour outside, until tau_ot
+// of the part is shared. Each part stops by itself: dense cuts need one layer,
+// thin chains as many as necessary.
 //
-// The paper's text lets every separator take an image; its Alg. 1 gives every
-// edge to the smallest part that has one of its ends. The figure needs both
-// rules, and so does this function: edges go by falling weight (ties by ids),
-// each one to the smallest part (ties by index) with exactly one end inside
-// whose separator has taken nothing in this layer; an edge serves once a layer.
-// Returns the parts with their overlap, in the order given, images sorted by
-// id.
+// In the paper's text every separator takes an image; in its Alg. 1 every edge
+// is given to the smallest part that has one of its ends. The figure needs both
+// rules, and this function applies both. Edges are processed by falling weight
+// (ties by ids). Each edge is given to the smallest part (ties by index) that
+// has exactly one end inside and whose separator has taken nothing in this
+// layer; an edge is used once per layer. Returns the parts with their overlap,
+// in the order given, images sorted by id.
 std::vector<std::vector<image_t>> ExpandByFloodFill(
     const FloodFillOptions& options, const ImageGraph& graph,
     const std::vector<std::vector<image_t>>& parts);

@@ -10,9 +10,9 @@
 
 namespace adasfm {
 
-// The view graph as the partition sees it: images and undirected edges whose
-// weight (> 0) is how strongly the two images hold together, e.g. the number of
-// inlier matches.
+// The view graph for the partition: images and undirected edges. The weight of
+// an edge (> 0) is the strength of the connection between its images, e.g. the
+// number of inlier matches.
 struct ImageGraph {
   std::set<image_t> images;
   std::map<ImagePair, double> edges;

@@ -31,7 +31,8 @@ MetisGraph BuildMetisGraph(const ImageAdjacency& adjacency,
   }
   MetisGraph graph;
   for (const image_t image_id : component) {
-    // METIS's result depends on the order of a row; by id it is unique.
+    // METIS's result depends on the order within a row; the order by id is
+    // unique.
     std::map<idx_t, idx_t> row;
     for (const auto& [neighbor, weight] : adjacency.at(image_id)) {
       // METIS sums weights in integers of 32 bits.
@@ -74,7 +75,8 @@ std::vector<Part> CutWithMetis(const ImageAdjacency& adjacency,
   return parts;
 }
 
-// The part, other than `own`, that the images hold to most; -1 for none.
+// The part, other than `own`, with the strongest connection to the images; -1
+// for none.
 int FindStrongestNeighborPart(const ImageAdjacency& adjacency,
                               const std::vector<Part>& parts,
                               const std::vector<image_t>& images, int own) {
@@ -94,8 +96,9 @@ int FindStrongestNeighborPart(const ImageAdjacency& adjacency,
                           : -1;
 }
 
-// Moves everything but a part's largest piece, and parts that are too small,
-// to the neighbour that they hold to most. False when nothing was to be moved.
+// One repair: removes an empty part, or moves the smallest piece of a
+// disconnected or too small part to the part with the strongest connection to
+// the piece. False when there was nothing to repair.
 bool RepairOnePart(const ImageAdjacency& adjacency, size_t min_size,
                    std::vector<Part>* parts) {
   for (size_t k = 0; k < parts->size(); ++k) {
@@ -129,7 +132,7 @@ std::vector<Part> CutComponent(const NormalizedCutOptions& options,
   const int min_num_parts =
       (static_cast<int>(component.size()) - 1) / options.max_part_size + 1;
   // METIS balances up to a tolerance, and repairs change sizes: a few more
-  // parts bring the largest one under the bound.
+  // parts bring the largest part below the bound.
   const int max_num_parts = min_num_parts + 3 + min_num_parts / 2;
   for (int num_parts = min_num_parts;
        num_parts <= max_num_parts && MaxSize(best) > options.max_part_size;

@@ -13,7 +13,7 @@ namespace {
 
 constexpr double kHolePeriods = 1.5;
 constexpr size_t kMinNumSamples = 100;
-// Stretches that tell the error of a bridge.
+// Approximate number of stretches that measure the error of a bridge.
 constexpr size_t kNumStretches = 1000;
 
 // Readings of one sensor at a nearly constant rate.
@@ -23,8 +23,8 @@ struct ReadingLog {
   double period_s = 0.0;
 };
 
-// The error of a bridge's mean, rms of an axis, by the number of missing
-// samples.
+// The error of a bridge's mean, rms of an axis, by the hole's length in
+// periods.
 class BridgeError {
  public:
   explicit BridgeError(const ReadingLog& log) : log_(log) {}
@@ -101,9 +101,9 @@ void ForHoles(const ReadingLog& log, const std::vector<timestamp_t>& times_ns,
   }
 }
 
-// e_R at the hole, seen at the link's end, is as large on all axes; the
-// velocity errs by its own error and by the turned mean force for the rest of
-// the link, the position by the velocity's.
+// e_R of the hole, in the frame at the link's end, is as large on all axes. The
+// velocity errs by its own error and by the mean force, rotated by e_R, over
+// the rest of the link; the position by the velocity's error.
 void AddToImu(double rotation_sigma, double velocity_sigma, double rest_s,
               ImuPreintegration* imu) {
   const Eigen::Matrix3d start_from_end = imu->delta_rotation.toRotationMatrix();
@@ -144,7 +144,7 @@ void AddWheelHoles(const std::vector<WheelSpeed>& speeds,
                    const Eigen::Vector3d& forward,
                    std::vector<OdometryLink>* links) {
   const ReadingLog log = ToReadings(speeds, [](const WheelSpeed& speed) {
-    // Each counts as three axes, of which the others are zero.
+    // Sigma averages over three axes, of which two are zero here.
     return Eigen::Vector3d(std::sqrt(3.0) * speed.speed, 0.0, 0.0);
   });
   const ReadingLog turns = ToReadings(speeds, [](const WheelSpeed& speed) {

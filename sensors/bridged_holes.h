@@ -10,15 +10,13 @@
 
 namespace adasfm {
 
-// What: adds to the links' covariances what samples that a log lacks could have
-// held.
-// Inputs: the links between times_ns, integrated from the logs, in which holes
-// (steps of more than 1.5 periods) were bridged by a straight line.
-// Method: the mean over a hole differs from that of the straight line by an
-// error whose variance the log itself tells, from stretches of the same length
-// elsewhere in it. The error of the rotation goes on into velocity and position
-// over the rest of the link.
-// On failure: a log too short to tell (fewer than 100 samples) adds nothing.
+// Adds the uncertainty of missing samples to the covariances of the links
+// between times_ns. The links were integrated from the logs, in which holes
+// (steps of more than 1.5 periods) were bridged by a straight line. The error
+// variance of a bridge's mean is measured on stretches of the same length
+// elsewhere in the log. The rotation error propagates into velocity and
+// position over the rest of the link. A log of fewer than 100 samples adds
+// nothing.
 void AddHoleUncertainty(const MotionLogs& logs,
                         const std::vector<timestamp_t>& times_ns,
                         const Eigen::Quaterniond& imu_from_wheel,

@@ -9,7 +9,7 @@
 namespace adasfm {
 namespace {
 
-// The mean rate at standstills, else what vision says.
+// The mean rate at standstills, else the bias from vision.
 ImuBias FirstBias(const std::vector<OdometryLink>& links,
                   const VisionUse& vision) {
   ImuBias bias;

@@ -13,13 +13,13 @@ namespace adasfm {
 struct FusionInput {
   OdometryTimeline timeline;
   OdometryFusionProblem problem;
-  // Intervals where wheels without the IMU slip (sensors/seen_wheel_yaw.h).
+  // Links where wheels without the IMU slip (sensors/seen_wheel_yaw.h).
   int num_seen_slips = 0;
 };
 
-// Preintegrates the logs between the images, with states between images far
-// apart: the smoother's problem and where it begins. times_ns: of the images,
-// ascending, on the IMU's clock.
+// Builds the smoother's problem and its initial states: preintegrates the logs
+// between the images, with states between images far apart. times_ns: of the
+// images, ascending, on the IMU's clock.
 FusionInput BuildFusionProblem(const PriorEstimationOptions& options,
                                const SensorCalibration& calibration,
                                const std::vector<timestamp_t>& times_ns,

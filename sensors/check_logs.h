@@ -11,25 +11,26 @@
 
 namespace adasfm {
 
-// What the estimator asks of its logs before it believes them. Times are those
-// of the images, in order, on the IMU's clock.
+// Checks of the logs before the estimation. Times are those of the images,
+// ascending, on the IMU's clock.
 
-// An error when the images or the wheels are on another clock: images less than
-// 1 ms apart, a wheel log that covers no image. A warning for a wheel log that
-// covers less than half of the images.
+// Error for a wrong clock or unit: images with a median period below 1 ms, or a
+// wheel log that covers no image. Warning for a wheel log that covers less than
+// half of the images.
 Status CheckCoverage(const std::vector<timestamp_t>& times_ns,
                      const MotionLogs& logs,
                      std::vector<std::string>* warnings);
 
-// CheckWheels (sensors/calibration_check/check_wheels.h) of logs that have
-// both; empty when nothing contradicts.
+// The contradiction found by CheckWheels
+// (sensors/calibration_check/check_wheels.h); empty when there is none, or
+// without an IMU log or a wheel log.
 std::string FindContradiction(const MotionLogs& logs,
                               const SensorCalibration& calibration,
                               std::vector<std::string>* warnings);
 
-// A line about a wheel scale more than 20 % from 1, with its likely causes;
-// empty when there is none. One beyond a factor of 2 has no other cause than a
-// wheel log that is wrong: is_error says so.
+// One line with the likely causes of a wheel scale more than 20 % from 1; empty
+// for other scales. is_error: the scale is off by a factor of 2 or more, which
+// only a wrong wheel log explains.
 std::string DescribeWheelScale(double scale, bool* is_error);
 
 }  // namespace adasfm

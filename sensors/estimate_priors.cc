@@ -24,16 +24,17 @@
 namespace adasfm {
 namespace {
 
-// Noise figures are corrected this often at most, for as long as they change by
-// more than estimates of some hundred residuals err.
+// Noise figures are corrected this often at most, and only while they change by
+// more than estimates from some hundred residuals err.
 constexpr int kMaxNumCorrections = 6;
-// The smoother finds a delay of the wheels that is within its prior.
+// Clock errors below this many sigmas of the smoother's wheel delay are left to
+// it.
 constexpr double kMaxDelaySigmas = 2.0;
 
-// The time between the images errs, and with it the turn. About all axes alike:
-// rows that are exposed one after another also tilt and skew the picture (a
-// phone's rotations erred half as much across the axis of the turn as about
-// it).
+// Adds the rotation error from errors of the time between the images. It is the
+// same on all axes: rows that are exposed one after another also tilt and skew
+// the picture (a phone's rotations erred half as much across the rotation axis
+// as about it).
 void AddIntervalTimeError(const UnexplainedRotation& unexplained,
                           RelativePosePrior* prior) {
   const double error = unexplained.interval_time_sigma_s /
@@ -42,7 +43,7 @@ void AddIntervalTimeError(const UnexplainedRotation& unexplained,
   prior->covariance.topLeftCorner<3, 3>().diagonal().array() += error * error;
 }
 
-// The stages of EstimatePriors with what they share.
+// The stages of EstimatePriors and their common data.
 class PriorEstimator {
  public:
   PriorEstimator(const SensorCalibration& calibration,
@@ -57,7 +58,7 @@ class PriorEstimator {
   void SelectLogs(const SensorLogs& logs);
   Status FindImagesInLogs();
   void CorrectWheelClock();
-  // Of wheels that no IMU watches.
+  // For wheels without an IMU.
   void LeaveOutWheelSkids();
   // The images' times on the IMU's clock.
   std::vector<timestamp_t> ImageTimesOfImu() const;
@@ -120,7 +121,7 @@ void PriorEstimator::CorrectWheelClock() {
   if (options_.estimate_time_shift == 0) return;
   const std::optional<double> shift_s =
       FindWheelClockShift(logs_.imu, logs_.wheel, calibration_);
-  // What is near is an unknown of the smoother, which knows it better.
+  // Small delays are an unknown of the smoother, which estimates them better.
   if (!shift_s || std::abs(*shift_s) <
                       kMaxDelaySigmas * options_.fusion.wheel_delay_sigma_s) {
     return;
@@ -288,7 +289,7 @@ StatusOr<PriorEstimate> PriorEstimator::Run(
   all_images_ = std::move(ordered).value();
   Status status = FindImagesInLogs();
   if (!status.ok()) return status;
-  // 2. Vision against the gyroscope; it may move the time shift.
+  // 2. Vision against the gyroscope; this may correct the time shift.
   std::map<image_t, timestamp_t> times_ns;
   for (const ImageStamp& image : all_images_) {
     times_ns[image.image_id] = image.timestamp_ns;

@@ -23,8 +23,8 @@ struct ImageStamp {
   timestamp_t timestamp_ns = 0;
 };
 
-// What was logged, each in order of time on the IMU's clock; empty when the
-// machine has no such sensor.
+// Logs in order of time, on the IMU's clock; empty for a sensor that the
+// machine does not have.
 struct SensorLogs {
   std::vector<ImuSample> imu;
   std::vector<WheelSample> wheel;
@@ -37,8 +37,8 @@ struct VisualRotation {
   image_t image_id2 = kInvalidImageId;
   Eigen::Quaterniond cam2_from_cam1 = Eigen::Quaterniond::Identity();
   int num_inliers = 0;
-  // The median angle between the rays of the inliers in both cameras' frames,
-  // rad; 0 when it is not known.
+  // Median over the inliers of the angle between the two rays of a match, each
+  // in its own camera's frame, rad; 0 when unknown.
   double median_motion_rad = 0.0;
 };
 
@@ -50,21 +50,22 @@ struct PriorEstimationOptions {
   // Links are no longer than this: images further apart get states between.
   double max_link_s = 0.5;
   // Logs are used from this long before the first to this long after the last
-  // image: a standstill there tells the biases.
+  // image, since standstills there observe the biases.
   double max_lead_s = 20.0;
   // Whether two-view rotations help to find the gyroscope's bias, and where
   // wheels without an IMU slip.
   bool use_visual_rotations = true;
-  // What all of them err by alike, which their scatter does not show, 1 sigma,
-  // rad/s.
+  // Error that all two-view rotations share and that their scatter does not
+  // show, as a rate, 1 sigma, rad/s.
   double visual_bias_sigma = 0.002;
   // Whether a contradiction between sensors is an error: vision against the
   // gyroscope (sensors/calibration_check/check_against_vision.h), wheels
   // against the IMU (check_wheels.h there). Else it is a warning.
   bool check_against_vision = true;
-  // Whether the time shift that vision and gyroscope agree on is added to the
-  // calibration's: 0, 1, or -1: when vision tells it clearly and it may be a
-  // clock's (VisionCheck::is_clock_shift).
+  // Whether the time shift between vision and gyroscope is added to the
+  // calibration's: 0 no, 1 yes, -1 only if vision determines it clearly and it
+  // may be a clock offset (VisionCheck::is_clock_shift). 0 also leaves the
+  // wheels' clock uncorrected.
   int estimate_time_shift = -1;
   // Whether a low-pass filter in the gyroscope's log that vision clearly shows
   // (sensors/calibration_check/gyroscope_filter.h) is undone.
@@ -75,23 +76,23 @@ struct PriorEstimationOptions {
 };
 
 struct PriorEstimate {
-  // Consecutive images in order of time; a pair without data has none.
+  // One for each pair of consecutive images with data, in order of time.
   std::vector<RelativePosePrior> priors;
-  // Of consecutive images between which the IMU has no gap; none where a prior
-  // has a length.
+  // One for each pair of consecutive images between which the IMU has no gap.
   std::vector<InertialMotion> inertial_motions;
   // Unit vectors that point down.
   std::map<image_t, Eigen::Vector3d> gravity_in_cam;
-  // Also what all priors share: gyroscope_bias (rad/s, body frame) with
-  // gyroscope_bias_covariance, wheel_scale with wheel_scale_sigma.
+  // Includes the calibration parameters that all priors share: gyroscope_bias
+  // (rad/s, body frame) with gyroscope_bias_covariance, wheel_scale with
+  // wheel_scale_sigma.
   SensorSummary summary;
 };
 
-// From logs to priors: (1) order images and find those inside the logs,
-// (2) compare vision with the gyroscope and the wheels with the IMU, (3)
-// preintegrate between images, (4) smooth all of it at once, (5) express motion
-// and covariance in the camera frames. What the sensors cannot observe is
-// flagged (core/relative_pose_prior). Bad data gives a status of one line;
+// Computes priors from logs: (1) orders the images and finds those inside the
+// logs, (2) compares vision with the gyroscope and the wheels with the IMU, (3)
+// preintegrates between images, (4) smooths all logs at once, (5) expresses
+// motion and covariance in the camera frames. Flags state what the sensors
+// observe (core/relative_pose_prior.h). Bad data gives a status of one line;
 // invalid options throw std::invalid_argument.
 StatusOr<PriorEstimate> EstimatePriors(
     const std::vector<ImageStamp>& images, const SensorLogs& logs,

@@ -13,25 +13,27 @@ namespace {
 
 constexpr double kStretchS = 1.0;
 constexpr size_t kMinNumStretches = 8;
-// The share of the stretches that is quieter.
+// Quantile of the stretches' variances that counts as their quieter part.
 constexpr double kQuietShare = 0.25;
 // Stated figures are kept within this factor: estimates err by some percent.
 constexpr double kMinFactor = 1.2;
 // A figure this much too small is another sensor's, or in another unit.
 constexpr double kWrongFactor = 5.0;
 
-// On the drives measured a gyroscope loses a third of what it would lose at
-// half its rate. From this factor on that is as much as its noise.
+// On the drives measured a gyroscope loses a third of its loss at half the
+// rate. Beyond this ratio of the half-rate loss to the noise the loss exceeds
+// the noise.
 constexpr double kMaxHalfRateLoss = 3.0;
 constexpr double kMaxGapPeriods = 4.0;
 
-// The smoother's residuals move a figure by no more than this, and by more than
-// estimates of some hundred residuals err.
+// Largest factor by which the smoother's residuals raise a stated figure.
 constexpr double kMaxNoiseFactor = 5.0;
-// Slip is a share of the speed, which no figure of the log's noise states: on
-// gravel wheels err by 40 times theirs. Sums over seconds vary by as much more.
+// Slip is proportional to the speed and in no stated noise: on gravel wheels
+// err by 40 times theirs. The variance of sums over seconds needs as large a
+// limit.
 constexpr double kMaxWheelNoiseFactor = 100.0;
 constexpr double kMaxWheelPersistence = 100.0;
+// Smaller changes are errors of estimates from some hundred residuals.
 constexpr double kMinNoiseChange = 1.2;
 
 // The readings of one quantity, in order of time.
@@ -50,8 +52,8 @@ struct Readings {
   }
 };
 
-// The quantile of the quiet share of a chi-square of n degrees of freedom over
-// n (Wilson and Hilferty).
+// The kQuietShare quantile of chi-square / n with n degrees of freedom (Wilson
+// and Hilferty).
 double QuietQuantile(double n) {
   constexpr double kNormalQuantile = -0.6745;
   const double spread = 2.0 / (9.0 * n);
@@ -93,7 +95,7 @@ double QuietDensity2(const Readings& readings, size_t block) {
          period_s;
 }
 
-// 0 when the log does not tell.
+// Upper bound of the white noise's density; 0 when the log is too short.
 double LeastDensity(const Readings& readings) {
   if (readings.values.size() < 2) return 0.0;
   double least = std::numeric_limits<double>::infinity();
@@ -116,9 +118,8 @@ void Raise(const char* name, double shown, double min_factor, double* figure,
   *figure = shown;
 }
 
-// By how much integrals over a second change without every other reading, as
-// the density of a white noise that changes them so; of white noise that is its
-// own density. 0 when the log is too short.
+// Change of integrals over a second without every other reading, as the density
+// of white noise that causes the same change. 0 when the log is too short.
 double HalfRateLoss(const Readings& readings) {
   if (readings.values.size() < 3) return 0.0;
   const double max_step_s = kMaxGapPeriods * readings.PeriodS();
@@ -133,7 +134,7 @@ double HalfRateLoss(const Readings& readings) {
     const Eigen::Vector3d& first = readings.values[i];
     const Eigen::Vector3d& last = readings.values[i + 2];
     const Eigen::Vector3d& middle = readings.values[i + 1];
-    // The midpoint rule with the middle one, less that without.
+    // The trapezoidal rule with the middle reading, minus the rule without it.
     change += 0.5 * (seconds(i, i + 1) * (first + middle) +
                      seconds(i + 1, i + 2) * (middle + last) -
                      step_s * (first + last));
@@ -148,7 +149,7 @@ double HalfRateLoss(const Readings& readings) {
   return std::sqrt(sum / sum_s);
 }
 
-// What is lost between the samples, where it is more than noise.
+// Adds the loss between the samples to the density, where it exceeds the noise.
 void AddRateLoss(const Readings& rates, double* density,
                  std::vector<std::string>* warnings) {
   const double loss = HalfRateLoss(rates);
@@ -163,8 +164,8 @@ void AddRateLoss(const Readings& rates, double* density,
   *density = raised;
 }
 
-// Moves a factor by another, up to max_factor; whether it moved enough to
-// matter.
+// Multiplies a factor by another, within 1 and max_factor. False, without a
+// change, when it would change by less than kMinNoiseChange.
 bool MoveFactor(double by, double max_factor, double* factor) {
   const double corrected = std::clamp(*factor * by, 1.0, max_factor);
   const double change = corrected / *factor;
@@ -210,7 +211,7 @@ bool CorrectNoiseFigures(const SensorCalibration& stated,
   NoiseCheck yaw = fused.wheel_yaw_check;
   if (stated.wheel_type == WheelType::kDifferential ||
       stated.wheel_type == WheelType::kTicks) {
-    // One figure for the speed of a wheel.
+    // Two wheels have one figure, that of a wheel's speed.
     speed.chi2 += yaw.chi2;
     speed.redundancy += yaw.redundancy;
     yaw = NoiseCheck();

@@ -34,15 +34,15 @@ Times BringTogether(const SensorCalibration& calibration,
   return times;
 }
 
-// The last element at or before a time; none before the first.
+// Index of the last element at or before a time; -1 before the first.
 int FindLastBefore(const std::vector<double>& times, double time) {
   return static_cast<int>(std::upper_bound(times.begin(), times.end(), time) -
                           times.begin()) -
          1;
 }
 
-// By how much the variance of a fix grows because its error is also that of its
-// neighbours: the number of fixes in the correlation time, with its two tails.
+// Factor on the variance of a fix, since its neighbours share its error: the
+// number of fixes in the correlation time, on both sides.
 double CorrelationFactor(double correlation_time_s,
                          const std::vector<double>& times, size_t index) {
   if (correlation_time_s <= 0.0 || times.size() < 2) return 1.0;
@@ -104,7 +104,7 @@ class PriorBuilder {
     Add(prior);
   }
 
-  // By the fixes around it.
+  // Adds the image's position between the fixes around it.
   void AddImage(int image) {
     const double time = times_.images[image];
     const int before = FindLastBefore(times_.fixes, time);

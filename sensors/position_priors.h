@@ -12,21 +12,22 @@
 namespace adasfm {
 
 struct PositionPriorOptions {
-  // An image between two fixes further apart than this gets no position:
-  // nobody knows the way between them.
+  // An image between two fixes further apart than this gets no position: the
+  // path between the fixes is unknown.
   double max_fix_gap_s = 3.0;
   // A fix between two images at most this far apart belongs to both, weighted
   // by time. At 2 m/s^2 a straight line between them errs by 6 cm at most.
   double max_image_gap_s = 0.5;
-  // Errors of a receiver persist for this long: fixes that follow each other
-  // faster share them, so that each has a larger variance. 0: independent.
+  // Correlation time of the receiver's errors. Fixes at shorter intervals share
+  // errors, so the variance of each is raised. 0: independent errors.
   double correlation_time_s = 0.0;
 
   bool IsValid(std::string* error) const;
 };
 
 struct PositionPriors {
-  // In the ENU frame of the origin, in order of time.
+  // In the ENU frame of the origin: first those between two images, then those
+  // of single images, each in order of time.
   std::vector<PositionPrior> priors;
   GeodeticPosition origin;
   int num_fixes = 0;
@@ -34,10 +35,10 @@ struct PositionPriors {
   int num_fixes_outside = 0;
 };
 
-// Gives fixes to images (ordered by time, on the camera's clock). A fix between
-// near images is a position on the line between them; where images are further
-// apart, each gets a position on the line between the fixes around it. An error
-// when no fix falls between the images, naming both spans.
+// Assigns fixes to images (ordered by time, on the camera's clock). A fix
+// between two near images is a position on the line between them. Where images
+// are further apart, each of them gets a position on the line between the fixes
+// around it. Error that names both time spans when no prior results.
 StatusOr<PositionPriors> ComputePositionPriors(
     const PositionPriorOptions& options, const SensorCalibration& calibration,
     const std::vector<ImageStamp>& images, const std::vector<GnssFix>& fixes);

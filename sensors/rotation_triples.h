@@ -9,19 +9,19 @@
 
 namespace adasfm {
 
-// Two-view rotations among three images: a right one closes with two others, a
-// wrong one hardly ever does.
+// Loops of two-view rotations among three images: a correct rotation closes
+// with two others, a wrong one hardly ever does.
 class RotationTriples {
  public:
-  // Keeps a reference.
+  // Keeps pointers into `rotations`.
   explicit RotationTriples(const std::vector<TimedRotation>& rotations);
 
-  // Whether the rotation and those of both its images to a third one make less
-  // than max_angle_rad together, for any third image.
+  // Whether, for any third image, the loop of the rotation and those of its two
+  // images to the third has an angle below max_angle_rad.
   bool Closes(const TimedRotation& rotation, double max_angle_rad) const;
 
  private:
-  // cam2_from_cam1 of a pair in either order; null where there is none.
+  // The rotation of a pair in either order; null where there is none.
   const TimedRotation* Find(timestamp_t time1_ns, timestamp_t time2_ns) const;
 
   std::map<std::pair<timestamp_t, timestamp_t>, const TimedRotation*> pairs_;

@@ -20,40 +20,38 @@ constexpr size_t kMinNumSeenLinks = 20;
 constexpr double kMaxSlipRatio = 0.2;
 // The median of a normal variable's absolute value.
 constexpr double kMedianAbs = 0.6745;
-// In scales of the residuals.
+// Of the Cauchy loss, in scales of the residuals.
 constexpr double kLossScale = 2.0;
-// No scatter of two-view rotations is smaller, rad.
+// Least scatter of two-view rotations, rad.
 constexpr double kMinScale = 1e-6;
 constexpr double kBlockS = 2.0;
 constexpr int kNumRounds = 20;
-// Vision is taken for half as much again as it scatters: it is used again.
+// Factor on the scatter of vision, since vision is used again later.
 constexpr double kVisualSigmaFactor = 1.5;
 
-// What wheels turned from one image to a later one, and cameras saw of it.
-struct SeenTurn {
+// Yaw of the wheels from one image to a later one, compared with the cameras.
+struct VisualYaw {
   size_t first_link = 0;
   double start_s = 0.0;
-  // (wheels' yaw, distance), and true minus wheels' yaw.
+  // (wheels' yaw, distance), and true (visual) minus wheels' yaw.
   Eigen::Vector2d row = Eigen::Vector2d::Zero();
   double difference_rad = 0.0;
   double yaw_variance = 0.0;
 };
 
-// Those over num_links links, all by wheels without IMU, in order of time.
-std::vector<SeenTurn> FindSeenTurns(const std::vector<TimedRotation>& rotations,
-                                    timestamp_t timeshift_ns,
-                                    const Eigen::Quaterniond& cam_from_imu,
-                                    const OdometryTimeline& timeline,
-                                    const OdometryFusionProblem& problem,
-                                    size_t num_links) {
+// Those over num_links links with wheel yaw and without IMU, in order of time.
+std::vector<VisualYaw> FindVisualYaws(
+    const std::vector<TimedRotation>& rotations, timestamp_t timeshift_ns,
+    const Eigen::Quaterniond& cam_from_imu, const OdometryTimeline& timeline,
+    const OdometryFusionProblem& problem, size_t num_links) {
   const Eigen::Vector3d up =
       problem.imu_from_wheel.rotation * Eigen::Vector3d::UnitZ();
-  std::vector<SeenTurn> seen;
+  std::vector<VisualYaw> seen;
   for (const TimedRotation& rotation : rotations) {
     const std::optional<size_t> first =
         FindLinkOfRotation(rotation, timeshift_ns, timeline, num_links);
     if (!first) continue;
-    SeenTurn turn;
+    VisualYaw turn;
     turn.first_link = *first;
     turn.start_s =
         SecondsFromNs(timeline.times_ns[*first] - timeline.times_ns.front());
@@ -69,22 +67,24 @@ std::vector<SeenTurn> FindSeenTurns(const std::vector<TimedRotation>& rotations,
         up.dot(LogSo3(BodyRotation(rotation, cam_from_imu))) - turn.row[0];
     seen.push_back(turn);
   }
-  std::sort(seen.begin(), seen.end(), [](const SeenTurn& a, const SeenTurn& b) {
-    return a.first_link < b.first_link;
-  });
+  std::sort(seen.begin(), seen.end(),
+            [](const VisualYaw& a, const VisualYaw& b) {
+              return a.first_link < b.first_link;
+            });
   return seen;
 }
 
 class WheelYawFit {
  public:
-  WheelYawFit(const std::vector<SeenTurn>& turns,
+  WheelYawFit(const std::vector<VisualYaw>& turns,
               const OdometryFusionOptions& options)
       : turns_(turns), weights_(turns.size(), 1.0) {
     prior_information_ = ChainGlobals::PriorSigmas(options)
                              .segment<2>(ChainGlobals::kLoggedYaw)
                              .cwiseAbs2()
                              .cwiseInverse();
-    // From none on: long slips turn least squares of all by tens of degrees.
+    // Starts with the weights of m = c = 0: long slips bias unweighted least
+    // squares by tens of degrees.
     scale_ = Scale();
     UpdateWeights();
     for (int round = 0; round < kNumRounds; ++round) {
@@ -96,14 +96,14 @@ class WheelYawFit {
   }
 
   double scale_rad() const { return scale_; }
-  double Residual(const SeenTurn& turn) const {
+  double Residual(const VisualYaw& turn) const {
     return turn.difference_rad - turn.row.dot(unknowns_);
   }
-  double Variance(const SeenTurn& turn) const {
+  double Variance(const VisualYaw& turn) const {
     return turn.row.dot(covariance_ * turn.row);
   }
 
-  // As the smoother has them: of 1 / (1 + m) and c / (1 + m).
+  // In the smoother's parameters 1 / (1 + m) and c / (1 + m).
   WheelYawPrior Prior() const {
     const double logged_per_true = 1.0 / (1.0 + unknowns_[0]);
     WheelYawPrior prior;
@@ -131,7 +131,7 @@ class WheelYawFit {
 
   double Scale() const {
     std::vector<double> errors;
-    for (const SeenTurn& turn : turns_) {
+    for (const VisualYaw& turn : turns_) {
       errors.push_back(std::abs(Residual(turn)));
     }
     return std::max(kMinScale, UpperMedian(&errors) / kMedianAbs);
@@ -170,7 +170,7 @@ class WheelYawFit {
     return static_cast<int>(turns_[i].start_s / kBlockS);
   }
 
-  const std::vector<SeenTurn>& turns_;
+  const std::vector<VisualYaw>& turns_;
   std::vector<double> weights_;
   Eigen::Vector2d prior_information_;
   double scale_ = 1.0;
@@ -179,14 +179,14 @@ class WheelYawFit {
   Eigen::Matrix2d covariance_ = Eigen::Matrix2d::Zero();
 };
 
-// Wheels that no camera sees slip as often as those that are seen: links of no
-// seen turn err by the mean square of what slips turn too much.
-void AddUnseenSlips(const std::vector<SeenTurn>& seen,
+// Unseen wheels slip as often as seen ones: adds the mean square, over all seen
+// links, of the yaw errors of slips to the variance of unseen links.
+void AddUnseenSlips(const std::vector<VisualYaw>& seen,
                     const std::set<size_t>& slips, const WheelYawFit& fit,
                     OdometryFusionProblem* problem) {
   double sum = 0.0;
   std::set<size_t> seen_links;
-  for (const SeenTurn& turn : seen) {
+  for (const VisualYaw& turn : seen) {
     seen_links.insert(turn.first_link);
     if (slips.count(turn.first_link)) sum += std::pow(fit.Residual(turn), 2);
   }
@@ -195,14 +195,15 @@ void AddUnseenSlips(const std::vector<SeenTurn>& seen,
     OdometryLink& link = problem->links[k];
     if (link.has_imu || !link.has_wheel_yaw || seen_links.count(k)) continue;
     link.wheel.yaw_variance += variance;
-    // The way turns by half of it on average.
+    // The direction of the path errs by half of the yaw error on average.
     link.wheel.covariance += 0.25 * variance * link.wheel.distance_m *
                              link.wheel.distance_m *
                              Eigen::Matrix3d::Identity();
   }
 }
 
-// Links that only cameras see turn as those of three images agree they do.
+// Links without IMU and wheels get the two-view rotation where those of three
+// images agree.
 void TakeVisualRotations(const std::vector<TimedRotation>& rotations,
                          timestamp_t timeshift_ns,
                          const Eigen::Quaterniond& cam_from_imu,
@@ -210,7 +211,7 @@ void TakeVisualRotations(const std::vector<TimedRotation>& rotations,
                          double threshold_sigma,
                          OdometryFusionProblem* problem) {
   const RotationTriples triples(rotations);
-  // Of three rotations.
+  // The loop has the errors of three rotations.
   const double max_angle_rad = threshold_sigma * std::sqrt(3.0) * scale_rad;
   for (const TimedRotation& rotation : rotations) {
     const std::optional<size_t> k =
@@ -236,14 +237,14 @@ int UseSeenWheelYaw(const std::vector<TimedRotation>& rotations,
                     const OdometryFusionOptions& options,
                     OdometryFusionProblem* problem) {
   const auto find_turns = [&](size_t num_links) {
-    return FindSeenTurns(rotations, timeshift_ns, cam_from_imu, timeline,
-                         *problem, num_links);
+    return FindVisualYaws(rotations, timeshift_ns, cam_from_imu, timeline,
+                          *problem, num_links);
   };
-  const std::vector<SeenTurn> seen = find_turns(1);
+  const std::vector<VisualYaw> seen = find_turns(1);
   if (seen.size() < kMinNumSeenLinks) return 0;
   const WheelYawFit fit(seen, options);
   problem->wheel_yaw_prior = fit.Prior();
-  const auto differs = [&](const SeenTurn& turn) {
+  const auto differs = [&](const VisualYaw& turn) {
     const double variance =
         std::max(fit.scale_rad() * fit.scale_rad(), turn.yaw_variance) +
         fit.Variance(turn);
@@ -251,11 +252,11 @@ int UseSeenWheelYaw(const std::vector<TimedRotation>& rotations,
            options.slip_threshold_sigma * std::sqrt(variance);
   };
   std::set<size_t> slips;
-  for (const SeenTurn& turn : seen) {
+  for (const VisualYaw& turn : seen) {
     if (differs(turn)) slips.insert(turn.first_link);
   }
-  // An image between two links may have all its pairs wrong.
-  for (const SeenTurn& turn : find_turns(2)) {
+  // The image between two links may have only wrong pairs.
+  for (const VisualYaw& turn : find_turns(2)) {
     if (differs(turn)) continue;
     slips.erase(turn.first_link);
     slips.erase(turn.first_link + 1);

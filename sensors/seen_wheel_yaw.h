@@ -9,27 +9,32 @@
 
 namespace adasfm {
 
-// What: what cameras tell of wheels whose yaw no IMU checks, on links that join
-// two images in a row.
-// Inputs: two-view rotations on the camera's clock; the links of `problem`.
-// Method. Wheels that differ by 0.4 % turn by 0.004 rad a metre, which passes
-// for a turn of 50 deg over 200 m: with true yaw - wheels' yaw
-// = m (wheels' yaw) + c distance the track's error m and the curvature c are
-// found from all links, by iteratively reweighted least squares (Cauchy, scale
-// from the median) with the options' sigmas as priors. Their covariance is the
-// sandwich estimate over blocks of two seconds, and what the wheels' noise
-// takes from m. It takes the place of the options' in the problem
-// (wheel_yaw_prior). A link beyond slip_threshold_sigma slips, unless wheels
-// and cameras agree over it and a neighbour together (then the image between
-// errs): nothing is known of its motion, its length included; more than a fifth
-// of the links are no slips, and left as they are. Links that no camera sees
-// get the mean square, over all seen links, of what slips turn too much. Links
-// without wheels, the slips among them, turn as cameras saw, where the
-// rotations among three images agree (rotation_triples.h). Vision has no other
-// part in these priors, since it is used again later. On failure: fewer than 20
-// links change nothing.
+// Calibrates wheels without an IMU against the cameras and finds their slips,
+// on links that join two consecutive images. `rotations` are two-view rotations
+// on the camera's clock; the links are those of `problem`.
 //
-// Returns the number of links that slip.
+// Wheels that differ by 0.4 % turn by 0.004 rad/m, which passes for a turn of
+// 50 deg over 200 m. The error m of the track width and the curvature c in
+//
+//   true yaw - wheels' yaw = m (wheels' yaw) + c distance
+//
+// are estimated from all links by iteratively reweighted least squares (Cauchy,
+// scale from the median), with the options' sigmas as priors. Their covariance
+// is the sandwich estimate over blocks of two seconds, plus the attenuation of
+// m by the wheels' noise. The estimate replaces the options' prior in the
+// problem (wheel_yaw_prior).
+//
+// A link whose residual exceeds slip_threshold_sigma slips, unless wheels and
+// cameras agree over this link and a neighbour together (then the image between
+// the two links is wrong). The motion of a slipping link is unknown, including
+// its length. If more than a fifth of the links seem to slip, none is treated
+// as a slip. The yaw variance of links that no camera sees grows by the squared
+// residuals of slips, as their mean over all seen links. Links without wheels,
+// including slips, get the rotation of the cameras where the rotations among
+// three images agree (rotation_triples.h). Vision has no other part in these
+// priors, since it is used again later. Fewer than 20 links change nothing.
+//
+// Returns the number of slipping links.
 int UseSeenWheelYaw(const std::vector<TimedRotation>& rotations,
                     timestamp_t timeshift_ns,
                     const Eigen::Quaterniond& cam_from_imu,

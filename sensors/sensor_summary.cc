@@ -72,12 +72,13 @@ void SummarizeFusion(const OdometryFusionProblem& problem,
     }
     summary->wheel_delay_s = fused.wheel_delay_s;
     summary->wheel_delay_sigma_s = fused.wheel_delay_sigma_s;
-    summary->wheel_mount_deg = RadToDeg(1.0) * fused.wheel_mount;
-    summary->wheel_mount_sigma_deg = RadToDeg(1.0) * fused.wheel_mount_sigma;
+    summary->driving_direction_deg = RadToDeg(1.0) * fused.driving_direction;
+    summary->driving_direction_sigma_deg =
+        RadToDeg(1.0) * fused.driving_direction_sigma;
   }
   if (!fused.converged) {
     summary->warnings.push_back(
-        "the smoother did not settle: sensors contradict each other; check "
+        "the smoother did not converge: sensors contradict each other; check "
         "T_cam_imu, T_imu_wheel and the noise figures");
   }
 }

@@ -31,7 +31,8 @@ struct SensorSummary {
   Eigen::Vector3d accelerometer_bias = Eigen::Vector3d::Zero();
   double accelerometer_bias_sigma = 0.0;
   // Covariance of the gyroscope's bias (rad^2/s^2), body (IMU) frame. Without
-  // an IMU of the rate that wheels err by alike, OdometryFusionResult.
+  // an IMU that of the rate error that the wheels' links share
+  // (OdometryFusionResult).
   Eigen::Matrix3d gyroscope_bias_covariance = Eigen::Matrix3d::Zero();
   // Noise in use over the stated one, as the logs show it.
   double gyroscope_noise_factor = 1.0;
@@ -48,20 +49,21 @@ struct SensorSummary {
   // True speed = scale * logged speed.
   double wheel_scale = 1.0;
   double wheel_scale_sigma = 0.0;
-  // The direction of driving against T_imu_wheel: to the left and down.
-  Eigen::Vector2d wheel_mount_deg = Eigen::Vector2d::Zero();
-  Eigen::Vector2d wheel_mount_sigma_deg = Eigen::Vector2d::Zero();
-  // The time shift in use, and what vision would add to it (0 when unknown).
+  // Driving direction relative to T_imu_wheel: to the left and down.
+  Eigen::Vector2d driving_direction_deg = Eigen::Vector2d::Zero();
+  Eigen::Vector2d driving_direction_sigma_deg = Eigen::Vector2d::Zero();
+  // The time shift in use, the correction of the calibration's time shift by
+  // vision (0 when unknown), and whether the correction was applied.
   double timeshift_cam_imu_s = 0.0;
   double visual_timeshift_correction_s = 0.0;
   bool timeshift_was_corrected = false;
-  // How long the wheels' readings lie behind their times, as the smoother has
-  // it.
+  // Delay of the wheels' readings behind the motion, estimated by the smoother.
   double wheel_delay_s = 0.0;
   double wheel_delay_sigma_s = 0.0;
   // What was added to the times of the wheels.
   double wheel_clock_shift_s = 0.0;
-  // Vision against the gyroscope, and whether that was reason to use no IMU.
+  // Vision against the gyroscope, and whether the IMU was left out because of
+  // it.
   UnexplainedRotation unexplained_rotation;
   bool imu_was_left_out = false;
   // The low-pass filter that was undone (see GyroscopeFilter); 0: none.
@@ -78,8 +80,8 @@ struct SensorSummary {
 // Rates and gaps of the logs.
 void SummarizeRates(const MotionLogs& logs, SensorSummary* summary);
 
-// Biases, scale, mounting, distance and standstill as the smoother found them,
-// and a warning when it did not settle.
+// Biases, scale, driving direction, distance and standstill as the smoother
+// estimated them, and a warning when the smoother did not converge.
 void SummarizeFusion(const OdometryFusionProblem& problem,
                      const OdometryFusionResult& fused, const MotionLogs& logs,
                      SensorSummary* summary);
@@ -89,9 +91,10 @@ std::vector<WheelSlip> ListWheelSlips(const OdometryFusionResult& fused,
                                       const OdometryTimeline& timeline,
                                       timestamp_t timeshift_ns);
 
-// Needs distance, bias and scale of the summary. Over 100 m at the mean speed:
-// heading by the gyroscope's noise and what is left of its bias; the position
-// by heading (its mean over the way is half of its end) and scale.
+// Predicts the drift over 100 m at the mean speed; needs distance, bias and
+// scale of the summary. The heading errs by the gyroscope's noise and bias
+// sigma, the position by the scale and half of the final heading error (its
+// mean over the path).
 void PredictDrift(const OdometryFusionProblem& problem, bool has_imu,
                   SensorSummary* summary);
 

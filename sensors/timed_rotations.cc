@@ -8,7 +8,7 @@ namespace adasfm {
 namespace {
 
 constexpr int kMinNumInliers = 20;
-// Five times what a keypoint errs by.
+// Five times the error of a keypoint.
 constexpr double kMinSeenMotionRad = 5e-3;
 
 }  // namespace
@@ -73,7 +73,7 @@ std::optional<size_t> FindLinkOfRotation(const TimedRotation& rotation,
   return k;
 }
 
-// cam2_from_cam1 turns against the body's motion.
+// cam2_from_cam1 rotates opposite to the body.
 Eigen::Quaterniond BodyRotation(const TimedRotation& rotation,
                                 const Eigen::Quaterniond& cam_from_imu) {
   return cam_from_imu.conjugate() * rotation.cam2_from_cam1.conjugate() *

@@ -17,14 +17,16 @@ std::vector<TimedRotation> ComputeTimedRotations(
     const std::vector<VisualRotation>& rotations,
     const std::map<image_t, timestamp_t>& image_times_ns);
 
-// From and to when the images in a row saw the machine move (camera clock), one
-// after the other: half of the matches moved by more than keypoints err.
+// Intervals between consecutive images (camera clock, ascending) over which the
+// machine is seen to move: half of the matches moved by more than keypoints
+// err.
 std::vector<std::pair<timestamp_t, timestamp_t>> FindSeenMotion(
     const std::vector<VisualRotation>& rotations,
     const std::map<image_t, timestamp_t>& image_times_ns);
 
-// The first of num_links links from one image of a rotation to the other; none
-// where these are not so far apart, or the rotation has too few inliers.
+// The first of the num_links links between the two images of a rotation; none
+// where the images are not num_links links apart, or the rotation has too few
+// inliers.
 std::optional<size_t> FindLinkOfRotation(const TimedRotation& rotation,
                                          timestamp_t timeshift_ns,
                                          const OdometryTimeline& timeline,

@@ -11,7 +11,7 @@
 namespace adasfm {
 namespace {
 
-// What no trajectory is more exact than: rounding, rolling shutter, clocks.
+// Least errors of a trajectory: rounding, rolling shutter, clocks.
 constexpr double kMinSigmaM = 1e-3;
 constexpr double kMinSigmaRad = DegToRad(0.02);
 constexpr double kRotationSigmaRatio = 0.01;

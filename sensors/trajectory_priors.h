@@ -13,16 +13,16 @@
 
 namespace adasfm {
 
-// Poses that something else has estimated (visual-inertial odometry, a phone's
-// tracking, lidar odometry) as relative priors. What is smooth from image to
-// image but drifts is what such priors can say.
+// Relative priors from the poses of another estimator (visual-inertial
+// odometry, a phone's tracking, lidar odometry). They suit trajectories that
+// are smooth from image to image but drift.
 struct TrajectoryPriorOptions {
   // Errors of the motion between two images, 1 sigma, for each metre of it:
   // visual-inertial odometry drifts by about 1 %.
   double sigma_m_per_m = 0.01;
   double sigma_deg_per_m = 0.1;
-  // Images are given poses between two of the trajectory at most this far
-  // apart: beyond it linear interpolation is a guess.
+  // An image gets a pose between two trajectory poses at most this far apart:
+  // beyond this gap linear interpolation is a guess.
   double max_gap_s = 0.5;
 
   bool IsValid(std::string* error) const;
@@ -36,7 +36,7 @@ std::map<image_t, Rigid3d> InterpolateTrajectory(
     double max_gap_s);
 
 // Priors of consecutive images (in order of time) that both have poses. Their
-// covariance has no less than 1 mm, 0.02 deg and 1 % of the turn.
+// sigmas are at least 1 mm, 0.02 deg and 1 % of the rotation.
 std::vector<RelativePosePrior> ComputeTrajectoryPriors(
     const std::vector<ImageStamp>& images,
     const std::map<image_t, Rigid3d>& cams_from_world,

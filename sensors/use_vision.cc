@@ -10,8 +10,8 @@
 namespace adasfm {
 namespace {
 
-// Below it gyroscope and pictures have nothing in common, as logs of another
-// drive; a stabilised video keeps the slow turns.
+// Below this correlation gyroscope and pictures are of different drives; a
+// stabilised video keeps the slow rotations.
 constexpr double kMinSameMotionCorrelation = 0.4;
 
 class VisionComparison {
@@ -29,7 +29,8 @@ class VisionComparison {
 
  private:
   void CorrectTimeShift(const VisionCheck& check);
-  // What the IMU says is of no use; the other logs stay.
+  // Clears the IMU log; the other logs stay. An error for wheels of another
+  // drive.
   Status LeaveOutImu(const VisionCheck& check);
   void SetBias(const VisionCheck& check);
   void UndoFilter(const VisionCheck& check);
@@ -43,11 +44,11 @@ class VisionComparison {
 
 Status VisionComparison::Run() {
   if (logs_.imu.empty() || vision_.rotations.empty()) return Status::Ok();
-  VisionCheck check = CheckAgainstVision(vision_.rotations, logs_.imu,
-                                         calibration_, VisionCheckOptions());
+  VisionCheck check =
+      CheckAgainstVision(vision_.rotations, logs_.imu, calibration_);
   if (check.contradiction_is_time_shift) {
-    const std::string jump = FindClockJump(vision_.rotations, logs_.imu,
-                                           calibration_, VisionCheckOptions());
+    const std::string jump =
+        FindClockJump(vision_.rotations, logs_.imu, calibration_);
     check.contradiction_is_time_shift = jump.empty();
     if (!jump.empty()) check.contradiction = jump;
   }
@@ -113,7 +114,7 @@ Status VisionComparison::LeaveOutImu(const VisionCheck& check) {
 
 void VisionComparison::SetBias(const VisionCheck& check) {
   vision_.has_bias = options_.use_visual_rotations;
-  // Before any data the bias is zero, with a sigma of its own.
+  // The prior of the bias is zero, with gyroscope_bias_sigma.
   const double visual_variance = std::pow(options_.visual_bias_sigma, 2) +
                                  std::pow(check.gyroscope_bias_sigma, 2);
   const double prior_variance =
@@ -125,7 +126,7 @@ void VisionComparison::SetBias(const VisionCheck& check) {
 
 void VisionComparison::UndoFilter(const VisionCheck& check) {
   if (check.filter.lag_s == 0.0) return;
-  // Of the clock in use.
+  // For the time shift in use.
   GyroscopeFilter filter = check.filter;
   filter.delay_s += calibration_.timeshift_cam_imu_s +
                     check.time_shift_correction_s -

@@ -12,7 +12,7 @@
 
 namespace adasfm {
 
-// What vision tells the smoother.
+// Results of vision for the smoother.
 struct VisionUse {
   // None when they contradict the gyroscope.
   std::vector<TimedRotation> rotations;
@@ -27,11 +27,11 @@ struct VisionUse {
 };
 
 // Compares the two-view rotations with the gyroscope
-// (calibration_check/check_against_vision.h) and acts on it: moves the time
-// shift, undoes a filter of the log, clears an IMU that saw another motion than
-// the camera (a stabilised video; the other logs stay), or takes no rotations.
-// The options say what of it is allowed. Error: a contradiction that is none of
-// these.
+// (calibration_check/check_against_vision.h). As far as the options allow,
+// corrects the time shift, undoes a filter of the log, clears an IMU log that
+// shows another motion than the camera's (a stabilised video; the other logs
+// stay), or discards the rotations. Returns an error for a contradiction that
+// none of these resolves.
 Status UseVision(const SensorCalibration& calibration,
                  const PriorEstimationOptions& options, MotionLogs* logs,
                  VisionUse* vision, SensorSummary* summary);

@@ -41,8 +41,8 @@ void MarkTurns(const std::vector<WheelSpeed>& speeds,
   }
 }
 
-// By how much the mean speed over half a window grows at each sample, against
-// the half before.
+// At each sample: the mean speed over half a window from there on, minus that
+// over the half before.
 std::vector<double> SpeedChanges(const std::vector<WheelSpeed>& speeds,
                                  size_t half) {
   std::vector<double> sums = {0.0};
@@ -56,7 +56,7 @@ std::vector<double> SpeedChanges(const std::vector<WheelSpeed>& speeds,
   return changes;
 }
 
-// From one impossible change of speed to the next one of the opposite sign.
+// Marks what lies between impossible speed changes of opposite sign.
 void MarkJumps(const std::vector<WheelSpeed>& speeds,
                std::vector<bool>* skids) {
   std::vector<timestamp_t> times_ns;

@@ -7,14 +7,15 @@
 
 namespace adasfm {
 
-// What: leaves out where wheels move as no machine can.
-// Inputs: speeds in order of time; returns the number of stretches left out.
-// Method: no tyre holds more than 12 m/s^2. Speed times yaw rate, the sideways
-// acceleration, is beyond it where one wheel skids: its log turns by tens of
-// degrees in a blink. A speed that changes faster (means over 0.1 s) and within
-// 10 s back again is that of wheels that spin or lock in between. Without an
-// IMU or a camera nothing else tells. More than a fifth of the log is no skid
-// but a wrong track or unit, and left as it is.
+// Removes samples with impossible motion of the wheels; returns the number of
+// stretches removed. speeds: in order of time.
+//
+// Tyres transmit at most 12 m/s^2. Speed times yaw rate, the lateral
+// acceleration, exceeds this limit where one wheel skids: the log turns by tens
+// of degrees in a moment. A speed that changes faster (means over 0.1 s) and
+// changes back within 10 s shows wheels that spin or lock in between. Without
+// an IMU or a camera nothing else reveals skids. More than a fifth of the log
+// is no skid but a wrong track or unit: the log stays as it is.
 int LeaveOutSkids(std::vector<WheelSpeed>* speeds);
 
 }  // namespace adasfm

@@ -16,8 +16,8 @@
 namespace adasfm {
 namespace {
 
-// The car is slower from this far before a bend to 4 / 9 behind it, by the
-// bend's length.
+// The car is slower from this far before a bend to 4 / 9 behind it, in units of
+// the bend's length.
 constexpr double kSlowBefore = 2.0 / 3.0;
 constexpr double kSlowWidth = kSlowBefore + 1.0 + 4.0 / 9.0;
 constexpr double kCarSpeed = 8.0;    // m/s
@@ -291,7 +291,7 @@ DriveState Drive::StateAt(double time_s) const {
       Integrate(sin(heading) * speed, axis.y()) + cos(heading) * weave;
   const Taylor z =
       Taylor(kAxleHeight) + Taylor(slope_) * s + SumWaves(heave_, s);
-  // The car points where the wheel frame moves: wheels do not skid sideways.
+  // The car heads where the wheel frame moves: wheels do not slip sideways.
   const Taylor yaw = heading +
                      atan(SumWaveSlopes(weave_, s) /
                           (Taylor(1.0) - path_.Curvature(s) * weave)) +

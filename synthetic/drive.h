@@ -22,27 +22,28 @@ struct DriveState {
   double wheel_yaw_rate = 0.0;
 };
 
-// A smooth drive along a path, known in closed form: arc length s(t) from a
-// speed profile that starts at rest, slows down in bends and has stops, some of
-// which turn the machine on the spot, the wheel frame's path with a weave about
-// the path, and a body that rolls, pitches and heaves with the distance driven.
+// A smooth drive along a path, known in closed form. The arc length s(t)
+// follows a speed profile that starts at rest, slows down in bends and has
+// stops, at some of which the machine turns on the spot. The wheel frame weaves
+// about the path, and the body rolls, pitches and heaves with the distance
+// driven.
 class Drive {
  public:
   Drive(const SyntheticWorldOptions& options, const Path& path,
         const Rigid3d& imu_from_wheel);
 
-  // At rest from begin to end, but for a turn on the spot by turn_rad.
+  // At rest from begin to end, except for a turn on the spot by turn_rad.
   struct Stop {
     double begin_s, end_s, turn_rad;
   };
 
   DriveState StateAt(double time_s) const;
   double ArcLengthAt(double time_s) const;
-  // The time at which the car has driven so far; the inverse of ArcLengthAt.
+  // The time at which the car reaches arc_length_m; the inverse of ArcLengthAt.
   double TimeAt(double arc_length_m) const;
   double FirstImageTime() const;
-  // When the image of the options' last spacing would be taken without stops;
-  // images are taken until then.
+  // The time of the last image: when a drive without stops has covered the
+  // spacings of all images.
   double LastImageTime() const { return last_image_s_; }
   const std::vector<Stop>& stops() const { return stops_; }
 
@@ -68,7 +69,7 @@ class Drive {
   double cruise_speed_;
   double standstill_s_;
   Path path_;
-  // Of the road: height per way.
+  // Slope of the road: height per distance driven.
   double slope_;
   double last_image_s_ = 0.0;
   std::vector<Stop> stops_;

@@ -23,7 +23,8 @@ constexpr double kMaxSpuriousTurn = DegToRad(40.0);
 constexpr double kMinOutlierTurn = DegToRad(15.0);
 constexpr double kMaxOutlierTurn = DegToRad(90.0);
 
-Eigen::Quaterniond DrawTurn(double min_rad, double max_rad, Random* random) {
+Eigen::Quaterniond DrawRotation(double min_rad, double max_rad,
+                                Random* random) {
   const double angle = random->Uniform(min_rad, max_rad);
   return ExpSo3(angle * random->UnitVector());
 }
@@ -37,8 +38,8 @@ std::optional<SyntheticPair> MakeSpuriousPair(const SyntheticWorld& world,
   pair.image_id1 = image1.image_id;
   pair.image_id2 = image2.image_id;
   pair.is_spurious = true;
-  pair.cam2_from_cam1 =
-      Rigid3d(DrawTurn(0.0, kMaxSpuriousTurn, random), random->UnitVector());
+  pair.cam2_from_cam1 = Rigid3d(DrawRotation(0.0, kMaxSpuriousTurn, random),
+                                random->UnitVector());
   const std::vector<Bearing> bearings1 = ComputeBearings(world.camera, image1);
   const std::vector<Bearing> bearings2 = ComputeBearings(world.camera, image2);
   std::vector<int> order1 = random->Sample(bearings1.size(), bearings1.size());
@@ -115,7 +116,7 @@ void SpoilRotations(const SyntheticWorldOptions& options,
   for (const int k : random.Sample(num_spoilt, num_pairs)) {
     SyntheticPair& pair = *true_pairs[k];
     pair.cam2_from_cam1.rotation =
-        DrawTurn(kMinOutlierTurn, kMaxOutlierTurn, &random) *
+        DrawRotation(kMinOutlierTurn, kMaxOutlierTurn, &random) *
         pair.cam2_from_cam1.rotation;
     pair.is_rotation_outlier = true;
   }

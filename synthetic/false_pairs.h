@@ -8,13 +8,14 @@
 
 namespace adasfm {
 
-// What two-view verification lets through of images with nothing in common: a
-// pose at random and 15 to 25 matches that fit it by chance, among more that do
-// not. Throws std::invalid_argument when the images have too few such pairs.
+// Adds pairs of images with nothing in common that pass two-view verification:
+// a random pose and 15 to 25 matches that fit it by chance, among more matches
+// that do not. Throws std::invalid_argument when the images have too few such
+// pairs.
 void AddSpuriousPairs(const SyntheticWorld& world, int num_pairs,
                       std::map<ImagePair, SyntheticPair>* pairs);
 
-// Turns the poses of options.rotation_outlier_ratio of the true pairs.
+// Rotates the poses of options.rotation_outlier_ratio of the true pairs.
 void SpoilRotations(const SyntheticWorldOptions& options,
                     std::map<ImagePair, SyntheticPair>* pairs);
 

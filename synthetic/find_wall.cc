@@ -8,7 +8,7 @@
 namespace adasfm {
 namespace {
 
-// Meets one block; distances along the (not normalised) direction.
+// Intersects the ray with one block; distances in lengths of the direction.
 bool HitBlock(const Eigen::Vector2d& from, const Eigen::Vector2d& direction,
               int column, int row, WallHit* hit) {
   const int cell[2] = {column, row};

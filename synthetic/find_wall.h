@@ -8,7 +8,7 @@
 
 namespace adasfm {
 
-// Beyond it nothing is drawn but haze [m].
+// Only haze is drawn beyond this distance [m].
 inline constexpr double kViewLimit = 250.0;
 
 struct WallHit {
@@ -18,9 +18,9 @@ struct WallHit {
   GridNode to = {0, 0};
 };
 
-// The first facade of the grid's blocks that a ray meets, seen from above.
-// from [m] and direction (of any length) in the world; distances are in lengths
-// of the direction, infinite beyond kViewLimit.
+// The first facade of the grid's blocks that a ray hits, seen from above. from
+// [m] and direction (of any length) are in the world; distances are in lengths
+// of the direction, infinite when no facade is found within kViewLimit.
 WallHit FindWall(const Eigen::Vector2d& from, const Eigen::Vector2d& direction);
 
 }  // namespace adasfm

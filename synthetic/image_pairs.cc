@@ -18,14 +18,14 @@
 namespace adasfm {
 namespace {
 
-// COLMAP keeps pairs with at least so many verified matches.
+// COLMAP keeps pairs with at least this many verified matches.
 constexpr int kMinNumInliers = 15;
-// A feature is recognised between views that do not differ by more.
+// Largest ratio of distances from which a feature is recognised in both views.
 constexpr double kMaxScaleRatio = 2.2;
 constexpr double kMatchRate = 0.85;
-// Look-alike facades are not equal in all details.
+// Facades that look alike are not equal in all details.
 constexpr double kAliasMatchRate = 0.4;
-// Points of cars are below zero.
+// No landmark and no car point (car points are negative).
 constexpr int kNoTwin = std::numeric_limits<int>::min();
 
 class Matcher {
@@ -69,7 +69,7 @@ class Matcher {
 
     std::vector<FeatureMatch> rigid;
     Rigid3d apparent = FindApparentMotion(candidate, shared, &rigid);
-    // Without motion the direction is anybody's guess.
+    // Without motion the direction is undetermined.
     if (apparent.translation.norm() < 1e-9) {
       apparent.translation = random.UnitVector();
     }
@@ -121,8 +121,8 @@ class Matcher {
     return matches;
   }
 
-  // The motion of the rigid body, the town or a car, that carries most of the
-  // matches, and these.
+  // The motion relative to the rigid body, the town or a car, with most of the
+  // matches, and the matches on this body.
   Rigid3d FindApparentMotion(const PairCandidate& candidate,
                              const std::vector<FeatureMatch>& matches,
                              std::vector<FeatureMatch>* rigid) const {
@@ -159,8 +159,8 @@ class Matcher {
                kMaxViewAngle;
   }
 
-  // The landmark that lies to street 2 of the candidate as this one does to
-  // street 1, in a street that looks the same.
+  // The landmark whose place relative to street 2 of the candidate is that of
+  // the given one relative to street 1, in a street that looks the same.
   int FindTwin(const PairCandidate& candidate, int landmark) const {
     const Street& street1 = grid_.streets[candidate.street1];
     const Street& street2 = grid_.streets[candidate.street2];
@@ -186,7 +186,7 @@ class Matcher {
     return kNoTwin;
   }
 
-  // Right matches go where too few keypoints would be free for the wrong ones.
+  // Removes right matches where too few keypoints would be free for wrong ones.
   void LeaveRoomForOutliers(const PairCandidate& candidate, Random* random,
                             std::vector<FeatureMatch>* matches) const {
     const size_t num_keypoints = std::min(indices_[candidate.first].size(),
@@ -199,8 +199,8 @@ class Matcher {
     std::sort(matches->begin(), matches->end());
   }
 
-  // Joins keypoints at random that have no match yet, so that the share of
-  // wrong matches is that of the options.
+  // Joins random keypoints without a match, so that the share of wrong matches
+  // is that of the options.
   void AddOutliers(const PairCandidate& candidate, Random* random,
                    std::vector<FeatureMatch>* matches) const {
     const double ratio = world_.options.outlier_match_ratio;
@@ -247,7 +247,8 @@ void MatchAll(const Matcher& matcher,
   }
 }
 
-// Of so many true pairs, when the wrong ones shall make up a share of all.
+// The number of wrong pairs that are a share `ratio` of all pairs, for a number
+// of true pairs.
 int NumWrongPairs(const SyntheticWorldOptions& options, double ratio,
                   size_t num_true_pairs) {
   const double true_ratio =
@@ -255,7 +256,7 @@ int NumWrongPairs(const SyntheticWorldOptions& options, double ratio,
   return static_cast<int>(std::lround(ratio / true_ratio * num_true_pairs));
 }
 
-// Look-alike pairs until there are so many. Returns how many were found.
+// Adds aliased pairs until there are num_wanted. Returns how many were found.
 int MatchAliases(const Matcher& matcher, const StreetGrid& grid,
                  const SyntheticWorld& world, int num_wanted,
                  std::map<ImagePair, SyntheticPair>* pairs) {

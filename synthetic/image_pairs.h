@@ -9,10 +9,10 @@
 
 namespace adasfm {
 
-// Matches the images: neighbours in the sequence, places seen again, look-alike
-// places, and images with nothing in common. arc_lengths_m: how far the car had
-// driven, by image. Returns the share of look-alike pairs that was reached,
-// that of the options or the largest possible one.
+// Matches the images: neighbours in the sequence, revisited places, aliased
+// places, and images with nothing in common. arc_lengths_m: the distance driven
+// at each image of the first camera. Returns the share of aliased pairs that
+// was reached, that of the options or the largest possible one.
 double MatchImages(const StreetGrid& grid, const LandmarkMap& map,
                    const std::vector<double>& arc_lengths_m,
                    SyntheticWorld* world);

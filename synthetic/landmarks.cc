@@ -223,7 +223,7 @@ class Observer {
  private:
   bool IsNear(const Street& street, const Eigen::Vector3d& center) const {
     if (IsOnLawn(world_.options)) return true;
-    // Floors lie between those of a car park.
+    // In a car park, floors hide the streets of other levels.
     if (world_.options.trajectory == SyntheticTrajectory::kFloors &&
         std::abs(street.HeightAt(0.5 * kBlockSize) + kCameraHeight -
                  center.z()) > 0.5 * world_.options.floor_height_m) {
@@ -261,10 +261,11 @@ class Observer {
                           landmark.position_in_world.head<2>());
   }
 
-  // Moves the pixel to where it is when its row is read.
+  // Moves the pixel to its position at the time when its row is read.
   void RollShutter(const ExposurePoses& rows, const SyntheticCamera& camera,
                    int landmark, Eigen::Vector2d* pixel) const {
-    // Converges by the motion over one image height per round.
+    // Each round multiplies the error by the ratio of the motion to the image
+    // height.
     for (int round = 0; round < 4; ++round) {
       const Rigid3d cam_from_world =
           rows.CamFromWorldAt(pixel->y() / camera.height);

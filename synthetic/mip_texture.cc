@@ -51,7 +51,7 @@ Eigen::Vector3f MipTexture::Sample(const Eigen::Vector2d& position_m,
   const double length_m = 2.0 * half_axis_m.norm();
   const int num_taps = std::clamp(
       static_cast<int>(std::ceil(length_m / width_m)), 1, kMaxNumTaps);
-  // Between two levels of detail, so that no seam is seen where they change.
+  // Blends two levels of detail, so that no seam is visible between them.
   const double size_px = px_per_m_ * std::max(width_m, length_m / kMaxNumTaps);
   const double detail =
       std::clamp(std::log2(std::max(size_px, 1.0)), 0.0, levels_.size() - 1.0);

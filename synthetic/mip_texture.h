@@ -7,15 +7,17 @@
 
 namespace adasfm {
 
-// A flat picture in metres with its smaller copies, sampled without aliasing.
+// A flat texture in metres with its downscaled copies, sampled without
+// aliasing.
 class MipTexture {
  public:
   MipTexture() = default;
   // picture: CV_8UC3; its first row lies at y = 0.
   MipTexture(const cv::Mat& picture, double px_per_m);
 
-  // The mean colour around a point over a footprint: width across, and a longer
-  // axis (from its middle to its end) along which several samples are taken.
+  // The mean colour over a footprint around a point: width_m across, and
+  // half_axis_m from the middle to the end of the longer axis, along which
+  // several samples are taken.
   Eigen::Vector3f Sample(const Eigen::Vector2d& position_m, double width_m,
                          const Eigen::Vector2d& half_axis_m) const;
 

@@ -15,8 +15,8 @@ namespace {
 constexpr double kRevisitDistance = 75.0;
 constexpr double kRevisitRadius = 15.0;
 constexpr size_t kMaxNumRevisitsPerImage = 10;
-// Look-alike images are this close to each other, relative to their facades,
-// and at least that far apart in truth.
+// Images of aliased pairs differ by less than this along their streets, and are
+// farther apart than this in the world [m].
 constexpr double kMaxAliasOffset = 8.0;
 constexpr double kMinAliasDistance = 45.0;
 constexpr size_t kNumAliasNeighbors = 5;
@@ -57,7 +57,7 @@ std::vector<std::pair<double, int>> ImagesInStreet(const SyntheticWorld& world,
   return images;
 }
 
-// The pose that camera sees itself in when it takes the street for its twin.
+// The apparent pose of a camera when the street is mistaken for its twin.
 Rigid3d MoveToTwin(const Rigid3d& cam_from_world, const Street& street,
                    const Street& twin) {
   const Eigen::Vector3d center = twin.WorldFromLocal(
@@ -72,7 +72,8 @@ Rigid3d MoveToTwin(const Rigid3d& cam_from_world, const Street& street,
                                 center);
 }
 
-// Candidates of one pair of twins, a run of neighbouring images first.
+// Candidates of one pair of twins: a run of neighbouring images, and all
+// others.
 void FindTwinAliases(const StreetGrid& grid, const SyntheticWorld& world,
                      int street_index, int twin_index, Random* random,
                      std::vector<PairCandidate>* run,
@@ -100,7 +101,8 @@ void FindTwinAliases(const StreetGrid& grid, const SyntheticWorld& world,
     std::sort(near.begin(), near.end());
     for (size_t rank = 0; rank < near.size(); ++rank) {
       const int other = near[rank].second;
-      // Camera 1 is the earlier image, and camera 2 sees itself in its street.
+      // Image 1 is the earlier one; camera 2 appears to be in the street of
+      // camera 1.
       const bool is_first_here = image < other;
       PairCandidate candidate{std::min(image, other), std::max(image, other),
                               is_first_here ? street_index : twin_index,

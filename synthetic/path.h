@@ -8,13 +8,13 @@
 
 namespace adasfm {
 
-// Of a left bend of unit length by an angle: where it ends, x along the
-// direction in which it begins.
+// Displacement from the begin of a bend of unit length by angle_rad to the arc
+// length u; x along the initial direction.
 Eigen::Vector2d UnitBendDisplacement(double u, double angle_rad);
 
-// The axis of a road as a function of the way s along it, in m: straight pieces
-// and bends whose curvature rises and falls smoothly (140 u^3 (1 - u)^3 times
-// the angle). Angles are positive to the left.
+// The axis of a road as a function of the distance s along it, in m: straight
+// pieces and bends whose curvature rises and falls smoothly (140 u^3 (1 - u)^3
+// times the angle). Angles are positive to the left.
 class Path {
  public:
   Path(const Eigen::Vector2d& start, double heading_rad)
@@ -29,7 +29,7 @@ class Path {
     double heading;
     double angle;  // 0: straight
   };
-  // Ascending.
+  // In order of begin.
   const std::vector<Segment>& bends() const { return bends_; }
 
   Eigen::Vector2d Position(double s) const;

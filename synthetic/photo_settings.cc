@@ -14,11 +14,11 @@
 namespace adasfm {
 namespace {
 
-// Distances to what is in focus change within seconds.
+// Distances of the objects in focus change within seconds.
 constexpr double kSlowFocusPeriod = 12.0;  // s
 constexpr double kFastFocusPeriod = 5.0;   // s
 
-// Up to a common factor.
+// Focal errors, up to a common factor.
 std::vector<double> DrawFocalWave(const SyntheticWorld& world) {
   Random random = MakeRandom(world.options.seed, 24);
   const double slow_phase = random.Uniform(0.0, 2.0 * kPi);
@@ -34,7 +34,7 @@ std::vector<double> DrawFocalWave(const SyntheticWorld& world) {
   return wave;
 }
 
-// Up to a common factor; changes at images that are drawn.
+// Up to a common factor; changes at random images.
 std::vector<double> DrawFocalSteps(const SyntheticWorldOptions& options) {
   Random random = MakeRandom(options.seed, 25);
   std::vector<bool> is_step(options.num_images, false);

@@ -23,7 +23,7 @@ constexpr int kMaxNumMoments = 64;
 
 const Eigen::Vector3f kHaze(225.0f, 215.0f, 205.0f);
 
-// Smooth, so that no feature sticks to the sky.
+// Smooth, so that no features are detected in the sky.
 Eigen::Vector3f ShadeSky(const Eigen::Vector3d& direction) {
   const float up = static_cast<float>(std::max(0.0, direction.z()));
   return kHaze - up * Eigen::Vector3f(15.0f, 55.0f, 85.0f);
@@ -39,8 +39,8 @@ double HalfAxis(double width, double incidence_cosine) {
   return 0.5 * width / std::max(incidence_cosine, 0.02);
 }
 
-// Of a photo, while its shutter is open: what moves fastest moves by a pixel
-// from one to the next.
+// Moments while the shutter is open: up to kMaxNumMoments, at most a pixel of
+// motion apart for the fastest keypoint.
 int NumMoments(const SyntheticWorld& world, const SyntheticImage& image) {
   const std::vector<double> lengths_px = ComputeBlurLengths(world, image);
   if (lengths_px.empty()) return 1;

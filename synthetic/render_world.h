@@ -14,13 +14,14 @@
 
 namespace adasfm {
 
-// Photos of a world: one ray per pixel against facades, ground and sky, with
-// textures averaged over the pixel's footprint, a soft lens and sensor noise.
-// With an exposure time the photo is the mean of what is seen at even moments
-// while the shutter is open; its gain scales the grey levels, which end at
-// white. Images without keypoints (blackouts) show nothing. Streets that look
-// alike carry the same textures. Pixel (x, y) of the picture has its centre at
-// (x + 0.5, y + 0.5) in the camera's pixels, as in COLMAP.
+// Renders photos of a world: one ray per pixel is intersected with facades,
+// ground and sky; textures are averaged over the pixel's footprint; lens blur
+// and sensor noise are added. With an exposure time the photo is the mean over
+// evenly spaced moments while the shutter is open. The gain scales the grey
+// levels, which are clipped at white. Images without keypoints (blackouts) are
+// uniformly grey. Streets that look alike have the same textures. Pixel (x, y)
+// of the picture has its centre at (x + 0.5, y + 0.5) in the camera's pixels,
+// as in COLMAP.
 class WorldRenderer {
  public:
   // The world must outlive the renderer.
@@ -37,7 +38,7 @@ class WorldRenderer {
   };
   struct PixelRay {
     Eigen::Vector3d direction;
-    double angle_rad;  // that the pixel covers
+    double angle_rad;  // covered by the pixel
   };
 
   const Street& StreetBetween(const GridNode& a, const GridNode& b);
@@ -46,14 +47,14 @@ class WorldRenderer {
   const MipTexture& CrossingOf(const GridNode& node);
 
   Eigen::Vector3f Shade(const Eigen::Vector3d& center, const PixelRay& ray);
-  // False when the ray passes above the houses.
+  // False when the ray hits no facade, e.g. above the houses.
   bool ShadeWall(const Eigen::Vector3d& center, const PixelRay& ray,
                  double* distance, Eigen::Vector3f* color);
   Eigen::Vector3f ShadeGround(const Eigen::Vector3d& center,
                               const PixelRay& ray);
   // Fills rays_in_cam_ for a focal length.
   void AimRays(double focal_factor);
-  // Grey levels without limit (CV_32FC3): at one pose, and of an image.
+  // Unclipped grey levels (CV_32FC3): at one pose, and of an image.
   cv::Mat RenderLight(const Rigid3d& cam_from_world);
   cv::Mat CollectLight(const SyntheticImage& image);
   void AddLensAndNoise(size_t image_index, cv::Mat* picture) const;

@@ -25,9 +25,9 @@ Route BuildStraightRoute(int num_nodes) {
   return route;
 }
 
-// A walk that never turns back, in a town of a size that the walk has to come
-// back to streets driven before. It likes to meet its own way, follows it for
-// one or two streets, and leaves it again.
+// A random walk that never reverses, in a town so small that the walk must
+// return to streets driven before. It prefers crossings that it has visited,
+// follows its former way for one or two streets, and leaves it again.
 class TownWalk {
  public:
   TownWalk(int num_nodes, Random* random)
@@ -78,7 +78,7 @@ class TownWalk {
   int num_repeats_ = 0;
 };
 
-// Side by side, driven up and down by turns.
+// Parallel streets, driven up and down alternately.
 Route BuildParallelRoute(int num_nodes, int num_blocks) {
   Route route;
   for (int column = 0; static_cast<int>(route.nodes.size()) < num_nodes;

@@ -19,27 +19,27 @@ struct Route {
   std::vector<GridNode> nodes;
 };
 
-// A town: a random walk long enough for the drive, which likes to come back to
-// streets driven before. Parallel streets: up one, down the next, and so on. A
-// car park: around one block, again and again.
+// A town: a random walk long enough for the drive that prefers streets driven
+// before. Parallel streets: up one, down the next, and so on. A car park:
+// around one block repeatedly.
 Route BuildRoute(const SyntheticWorldOptions& options, Random* random);
 
-// Along the streets, or back and forth in lanes along x with U-turns.
+// The path along the streets, or back and forth in lanes along x with U-turns.
 Path BuildPath(const SyntheticWorldOptions& options, const Route& route);
 
 // A machine on a field instead of a car in streets.
 bool IsOnLawn(const SyntheticWorldOptions& options);
 
-// Whether the route passes by look-alike places again and again.
+// Whether the route passes places that look alike periodically.
 bool IsPeriodic(const SyntheticWorldOptions& options);
 
-// Lanes that the images reach.
+// The number of lanes that the images reach.
 int NumLanes(const SyntheticWorldOptions& options);
 
 // Length of the U-turn from one lane into the next, m.
 double UTurnLength(const SyntheticWorldOptions& options);
 
-// Height per way driven: the ramp of a car park.
+// Height per distance driven on the ramp of a car park; 0 elsewhere.
 double RoadSlope(const SyntheticWorldOptions& options);
 
 }  // namespace adasfm

@@ -23,11 +23,11 @@ class GravelSlip {
  public:
   GravelSlip(const SyntheticWorldOptions& options, uint64_t wheel)
       : sigma_(options.wheel_slip_sigma),
-        keep_(std::exp(-1.0 / (options.wheel_rate_hz * kSlipCorrelationTime))),
+        keep_(std::exp(-1.0 / (kSyntheticWheelRateHz * kSlipCorrelationTime))),
         random_(MakeRandom(options.seed, 19, wheel)),
         slip_(random_.Gaussian(sigma_)) {}
 
-  // One sample later.
+  // Advances by one sample.
   double Next() {
     slip_ = keep_ * slip_ +
             random_.Gaussian(std::sqrt(1.0 - keep_ * keep_) * sigma_);
@@ -108,9 +108,9 @@ void SimulateWheels(const Drive& drive, double first_image_s, double end_s,
   GravelSlip left(options, 0);
   GravelSlip right(options, 1);
   const int64_t num_samples =
-      static_cast<int64_t>(std::ceil(end_s * options.wheel_rate_hz)) + 1;
+      static_cast<int64_t>(std::ceil(end_s * kSyntheticWheelRateHz)) + 1;
   for (int64_t i = 0; i < num_samples; ++i) {
-    const timestamp_t time_ns = NsFromSeconds(i / options.wheel_rate_hz);
+    const timestamp_t time_ns = NsFromSeconds(i / kSyntheticWheelRateHz);
     const double time_s = SecondsFromNs(time_ns);
     const DriveState state = drive.StateAt(time_s);
     WheelSample sample;

@@ -6,8 +6,8 @@
 
 namespace adasfm {
 
-// Everything that the logs hold lies this long after the epoch, so that the
-// time stamps look like those of a real recording.
+// The logs begin this long after the epoch, so that the time stamps look like
+// those of a real recording.
 inline constexpr timestamp_t kWorldStartNs = 1600000000000000000;
 
 // The logs run on the IMU's clock, from the start of the drive to end_s.

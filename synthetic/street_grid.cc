@@ -9,12 +9,12 @@
 namespace adasfm {
 namespace {
 
-// Look-alike streets are at least this far apart (between their middles).
+// Smallest distance between the midpoints of streets that look alike.
 constexpr double kMinTwinDistance = 55.0;
-// About as many look-alike image pairs come from one pair of streets.
+// Approximate number of aliased image pairs from one pair of streets.
 constexpr int kNumAliasPairsPerTwin = 70;
 
-// At street i of the route the car is so high.
+// Height of the road at node i of the route.
 double HeightAtNode(const SyntheticWorldOptions& options, size_t i) {
   return options.trajectory == SyntheticTrajectory::kFloors
              ? 0.25 * i * options.floor_height_m
@@ -69,7 +69,7 @@ class StreetBuilder {
     return &grid_.streets.back();
   }
 
-  // Street i of the ramp, and what is seen ahead from its begin.
+  // Street i of the ramp, and the other streets that branch off at its begin.
   void AddFloorStreets(size_t i) {
     const GridNode& from = grid_.route.nodes[i];
     Street* street = Add(from, grid_.route.nodes[i + 1], i);
@@ -92,7 +92,7 @@ class StreetBuilder {
   StreetGrid& grid_;
 };
 
-// The streets of the route that the images certainly reach, in its order.
+// The streets that the images certainly reach, in the order of the route.
 std::vector<int> ReachedStreets(const SyntheticWorldOptions& options,
                                 const StreetGrid& grid) {
   const int reach = static_cast<int>(options.spacing_m *
@@ -109,7 +109,7 @@ std::vector<int> ReachedStreets(const SyntheticWorldOptions& options,
   return streets;
 }
 
-// Joins the rings of streets that look alike.
+// Joins two rings of streets that look alike; both get the layout of a.
 void JoinTwins(int a, int b, std::vector<Street>* streets) {
   for (const int k : {a, b}) {
     if ((*streets)[k].twin < 0) (*streets)[k].twin = k;
@@ -122,7 +122,8 @@ void JoinTwins(int a, int b, std::vector<Street>* streets) {
   std::swap((*streets)[a].twin, (*streets)[b].twin);
 }
 
-// Pairs of streets first, then larger classes. Returns how many were joined.
+// Joins pairs of streets first, then larger classes. Returns how many joins
+// were made.
 int MakeTwins(int num_twins, const std::vector<int>& reached, Random* random,
               std::vector<Street>* streets) {
   // Driven streets come first in the list, in the order of the route.
@@ -153,8 +154,9 @@ int MakeTwins(int num_twins, const std::vector<int>& reached, Random* random,
   return num_joined;
 }
 
-// Parallel streets, or the floors of a car park: every period-th street of the
-// route, and what branches off there, looks the same.
+// Parallel streets: every period-th street of the route looks the same. Car
+// park: streets at the same place of all floors look the same, also those that
+// branch off.
 void MakePeriodicTwins(const SyntheticWorldOptions& options, StreetGrid* grid) {
   std::vector<Street>& streets = grid->streets;
   if (options.trajectory == SyntheticTrajectory::kFloors) {
@@ -166,7 +168,7 @@ void MakePeriodicTwins(const SyntheticWorldOptions& options, StreetGrid* grid) {
     }
     return;
   }
-  // One street up or down and the connection behind it.
+  // The blocks of one street and the connection to the next one.
   const size_t period = options.street_num_blocks + 1;
   for (size_t i = period; i + 1 < grid->route.nodes.size(); ++i) {
     if ((i + 1) % period == 0) continue;

@@ -12,8 +12,8 @@
 
 namespace adasfm {
 
-// The town is a square grid of streets. Between the streets stand blocks of
-// houses, squares that nobody can look through.
+// The town is a square grid of streets, with opaque square blocks of houses
+// between them.
 inline constexpr double kStreetHalfWidth = 7.0;  // axis to facade, m
 inline constexpr double kMaxViewDistance = 60.0;
 
@@ -24,10 +24,10 @@ struct Street {
   GridNode to = {0, 0};
   // Equal layout seeds give equal facades.
   uint64_t layout_seed = 0;
-  // The next one of the ring of streets that look the same, or -1.
+  // The next street in the ring of streets that look alike, or -1.
   int twin = -1;
   bool is_driven = false;
-  // Of the road, where u = 0, and per u.
+  // Height of the road at u = 0, and its slope along u.
   double height_m = 0.0;
   double slope = 0.0;
 
@@ -58,13 +58,14 @@ struct StreetGrid {
   bool can_have_more_twins = false;
 };
 
-// The route and all streets that it can see, one field on a lawn. num_twins
-// times two streets are made to look alike, pairs first, then classes; parallel
-// streets and the floors of a car park always do. -1: FirstNumTwins.
+// The route and all streets visible from it; on a lawn, one field. num_twins
+// times two streets are made to look alike, pairs first, then larger classes;
+// parallel streets and the floors of a car park always look alike. -1:
+// FirstNumTwins.
 StreetGrid BuildStreetGrid(const SyntheticWorldOptions& options,
                            int num_twins = -1);
 
-// About as many as options.alias_pair_ratio needs.
+// Approximate num_twins that options.alias_pair_ratio needs.
 int FirstNumTwins(const SyntheticWorldOptions& options);
 
 // Whether no block stands between two points (heights do not matter).

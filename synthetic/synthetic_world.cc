@@ -15,9 +15,9 @@
 namespace adasfm {
 namespace {
 
-// The logs go on after the last image for so long.
+// The logs continue for this long after the last image, s.
 constexpr double kTail = 0.5;
-// Images are late or early by up to this share of their distance in time.
+// Images are late or early by up to this share of their interval.
 constexpr double kTimeJitter = 0.01;
 
 SyntheticCamera MakeCamera(const SyntheticWorldOptions& options) {
@@ -33,8 +33,8 @@ SyntheticCamera MakeCamera(const SyntheticWorldOptions& options) {
   return camera;
 }
 
-// Forward-looking (camera z along the body's x), turned by a few degrees as
-// mounts are, ahead of and above the IMU.
+// Forward-looking (camera z along the body's x), rotated by a few degrees as
+// real cameras are, ahead of and above the IMU.
 Rigid3d MakeCamFromImu() {
   Eigen::Matrix3d axes;
   axes << 0, -1, 0, 0, 0, -1, 1, 0, 0;
@@ -52,12 +52,12 @@ Rigid3d MakeCam1FromCam0(double baseline_m) {
   return CamFromWorldWithCenter(turn, Eigen::Vector3d(baseline_m, 0.0, 0.0));
 }
 
-// Keypoints that each image may have.
+// The largest number of keypoints of each image.
 std::vector<int> DrawBlackouts(const SyntheticWorldOptions& options) {
   Random random = MakeRandom(options.seed, 12);
   std::vector<int> max_num_keypoints(options.num_images,
                                      options.num_keypoints_per_image);
-  // One in each of equally long stretches, away from their ends.
+  // One blackout in each of equally long stretches, away from their ends.
   for (int i = 0; i < options.num_blackouts; ++i) {
     const int64_t begin = int64_t{options.num_images} * i;
     const int first = static_cast<int>(begin / options.num_blackouts);
@@ -105,8 +105,8 @@ std::vector<double> TakeImages(const Drive& drive, SyntheticWorld* world) {
   return times_s;
 }
 
-// What the camera sees, and the matches, with so many streets that look alike
-// as the share of look-alike pairs needs.
+// Fills keypoints and matches, with as many streets that look alike as the
+// share of aliased pairs needs.
 void FillImagesAndPairs(const std::vector<ExposurePoses>& rows,
                         const std::vector<double>& arc_lengths_m,
                         SyntheticWorld* world) {
@@ -138,7 +138,7 @@ void FillImagesAndPairs(const std::vector<ExposurePoses>& rows,
   }
 }
 
-// The second camera's images, at the first one's times.
+// Adds the images of the second camera, at the times of the first one.
 void AddSecondCamera(SyntheticWorld* world) {
   const size_t num_frames = world->images.size();
   for (size_t i = 0; i < num_frames; ++i) {

@@ -26,13 +26,13 @@ struct SyntheticCamera {
   Eigen::Vector4d fisheye_coeffs = Eigen::Vector4d::Zero();
 };
 
-// Where the camera is from the beginning to the end of a short time: while the
+// Poses of the camera at the beginning and the end of a short time: while the
 // rows of an image are read, or while its shutter is open.
 struct ExposurePoses {
   Rigid3d first_cam_from_world;
   Rigid3d last_cam_from_world;
 
-  // 0 at the beginning, 1 at the end; evenly in between.
+  // share: 0 at the beginning, 1 at the end; interpolated in between.
   Rigid3d CamFromWorldAt(double share) const;
 };
 
@@ -44,18 +44,17 @@ struct SyntheticImage {
   timestamp_t timestamp_ns = 0;  // the camera's clock
   Rigid3d cam_from_world;        // true pose; world is z-up, in metres
   std::vector<Eigen::Vector2d> keypoints;
-  // The landmark each keypoint sees; numbers of their own beyond all landmarks
-  // for keypoints on cars.
+  // The landmark of each keypoint; keypoints on cars have unique numbers beyond
+  // all landmarks.
   std::vector<int> landmark_ids;
-  // The point of a car that each keypoint sees, -1 for none; empty without
-  // cars.
+  // The car point of each keypoint, -1 for none; empty without cars.
   std::vector<int> car_point_ids;
   std::vector<Rigid3d> cam_from_car;
-  // This image's focal length per that of the camera.
+  // Focal length of this image divided by that of the camera.
   double focal_factor = 1.0;
-  // What a photo's grey levels are multiplied with before they are clipped.
+  // Factor on a photo's grey levels before they are clipped.
   double exposure_gain = 1.0;
-  // While the shutter is open; unset where exposures take no time.
+  // Poses while the shutter is open; unset without an exposure time.
   std::optional<ExposurePoses> shutter;
 };
 
@@ -111,8 +110,8 @@ struct SyntheticWorld {
 // than the drive can have; the message names the largest possible value.
 SyntheticWorld BuildSyntheticWorld(const SyntheticWorldOptions& options);
 
-// The camera as it was when it took the image: with the image's focal length,
-// which nobody is told.
+// The camera with the focal length of the image, which is hidden from all
+// estimators.
 SyntheticCamera CameraOfImage(const SyntheticCamera& camera,
                               const SyntheticImage& image);
 

@@ -24,7 +24,6 @@ bool SyntheticWorldOptions::IsValid(std::string* error) const {
                  {"num_sequential_neighbors", num_sequential_neighbors},
                  {"blackout_num_images", blackout_num_images},
                  {"imu_rate_hz", imu_rate_hz},
-                 {"wheel_rate_hz", wheel_rate_hz},
                  {"wheel_scale", wheel_scale}})
       .NotNegative(
           {{"stereo_baseline_m", stereo_baseline_m},

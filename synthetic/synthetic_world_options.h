@@ -12,6 +12,9 @@ enum class SyntheticCameraModel { kPinhole, kFisheye };
 
 enum class SyntheticTrajectory { kTown, kStraight, kParallel, kFloors, kLanes };
 
+// Of the wheel log.
+inline constexpr double kSyntheticWheelRateHz = 50.0;
+
 // A drive through streets with facades. One generator serves the tests, the
 // benchmarks and the demo; equal options give equal worlds.
 struct SyntheticWorldOptions {
@@ -20,7 +23,8 @@ struct SyntheticWorldOptions {
   uint64_t seed = 1;
   // Mean distance between images along the path.
   double spacing_m = 1.5;
-  // Mean time between images under way; 0: that of 8 m/s, within 0.05 to 0.4 s.
+  // Mean time between images under way; 0: that of 8 m/s (kLanes: 1 m/s),
+  // within 0.05 to 0.4 s.
   double image_interval_s = 0.0;
   // kTown drives blocks with right-angle bends and returns to places seen
   // before; kStraight is one street; kParallel goes up and down parallel
@@ -34,8 +38,8 @@ struct SyntheticWorldOptions {
   // kLanes.
   double lane_spacing_m = 1.0;
   double lane_length_m = 20.0;
-  // Stops under way, and turns by 360 deg on the spot. Images go on at even
-  // times: the drive becomes shorter.
+  // Stops under way, and turns by 360 deg on the spot. Images are still taken
+  // at even times, so that the distance driven becomes shorter.
   int num_stops = 0;
   double stop_duration_s = 10.0;
   int num_spins = 0;
@@ -56,50 +60,51 @@ struct SyntheticWorldOptions {
   // Share of an image's keypoints that lie on two cars that drive ahead.
   double moving_keypoint_ratio = 0.0;
   // Autofocus: the largest error of a photo's focal length, as a share of the
-  // camera's; a slow wave of time, or constant between so many changes.
+  // camera's. The error is a slow wave in time or, with num_focal_steps,
+  // constant between this many changes.
   double focal_breathing_ratio = 0.0;
   int num_focal_steps = 0;
-  // Only photos show the following three. Automatic exposure: the share of
-  // photos that are darker or brighter than the one before by a factor.
+  // The following three affect photos only. Automatic exposure: the share of
+  // photos that are darker or brighter than the previous one by
+  // exposure_jump_factor.
   double exposure_jump_ratio = 0.0;
   double exposure_jump_factor = 2.0;
   // Motion blur: how long the shutter is open; the pose is that of the middle.
   double exposure_time_s = 0.0;
-  // Share of raw matches that are wrong at random (verification drops most).
+  // Share of raw matches that are wrong at random (verification rejects most).
   double outlier_match_ratio = 0.2;
-  // Consecutive pairs up to this distance in the sequence are matched, as well
-  // as all pairs that truly see the same facades.
+  // Images up to this distance in the sequence are matched, as well as images
+  // of the same place on another visit.
   int num_sequential_neighbors = 10;
-  // Share of verified pairs that join look-alike places: mutually consistent
-  // wrong matches of repeated facades.
+  // Share of verified pairs that are aliased: mutually consistent wrong matches
+  // of repeated facades.
   double alias_pair_ratio = 0.0;
   // Share of verified pairs that join images with nothing in common, by a few
   // matches that fit some epipolar geometry by chance.
   double spurious_pair_ratio = 0.0;
   // Share of the true pairs whose rotation is off by 15 to 90 deg.
   double rotation_outlier_ratio = 0.0;
-  // Intervals without texture: this many, each this many images long, with at
-  // most so many keypoints.
+  // Intervals without texture: their number, their length in images and the
+  // largest number of keypoints of their images.
   int num_blackouts = 0;
   int blackout_num_images = 16;
   int blackout_num_keypoints = 0;
 
   double imu_rate_hz = 200.0;
-  double wheel_rate_hz = 50.0;
   ImuNoise imu_noise = {5e-4, 2e-5, 5e-3, 2e-4};
   // The biases at the start are drawn with these, rad/s and m/s^2 per axis.
   double gyro_bias_sigma = 0.003;
   double accel_bias_sigma = 0.03;
   double wheel_speed_noise = 0.05;  // m/s, 1 sigma per sample
-  // True speed = factor * what the log says.
+  // True speed = wheel_scale * logged speed.
   double wheel_scale = 1.0;
-  // Intervals in which the wheels turn without moving the car so far.
+  // Intervals in which the wheels slip and log more than the distance driven.
   int num_wheel_slips = 0;
   // Gravel: each wheel's slip, 1 sigma as a share of its speed, with a
-  // correlation time of 1 s. The calibration does not know of it.
+  // correlation time of 1 s. Not part of the calibration.
   double wheel_slip_sigma = 0.0;
-  // The gyroscope's bias about the vertical grows so fast, rad/s per s. The
-  // calibration does not know of it.
+  // Growth of the gyroscope's bias about the vertical, rad/s per s. Not part of
+  // the calibration.
   double gyro_drift = 0.0;
   // Positions of a receiver; 0: none. White noise per axis, and intervals of 5
   // s in which they are 15 m off.

@@ -108,7 +108,7 @@ T SmoothStepDerivative(const T& u) {
   return T(140.0) * u * u * u * v * v * v;
 }
 
-// The integral from 0.
+// The integral of SmoothStep from 0.
 inline double SmoothStepIntegral(double u) {
   if (u <= 0.0) return 0.0;
   if (u >= 1.0) return 0.5 + (u - 1.0);

@@ -13,7 +13,7 @@
 namespace adasfm {
 namespace {
 
-// In the frame of a car, m: its rear and the left side, which the camera sees.
+// In the frame of a car, m: its rear and its right side, which the camera sees.
 std::vector<Eigen::Vector3d> DrawCarPoints(Random* random) {
   std::vector<Eigen::Vector3d> points;
   for (int i = 0; i < kNumPointsPerCar; ++i) {
@@ -26,7 +26,7 @@ std::vector<Eigen::Vector3d> DrawCarPoints(Random* random) {
   return points;
 }
 
-// Where car k stands, in the frame of the road below the IMU: x forward.
+// Position of car k in the frame of the road below the IMU: x forward.
 Eigen::Vector3d CarPosition(int k, double time_s) {
   return k == 0
              ? Eigen::Vector3d(10.0 + 2.0 * std::sin(2.0 * kPi * time_s / 17.0),
@@ -71,7 +71,7 @@ class CarPainter {
     image->car_point_ids.assign(num, -1);
     const int num_moving =
         std::lround(world_.options.moving_keypoint_ratio * num);
-    // The keypoints stand in random order: the first ones go.
+    // The keypoints are in random order: the first ones are replaced.
     int keypoint = 0;
     for (int i = 0; i < kNumPointsPerCar && keypoint < num_moving; ++i) {
       for (int k = 0; k < kNumCars && keypoint < num_moving; ++k) {
@@ -90,7 +90,7 @@ class CarPainter {
   }
 
  private:
-  // Whether the point is in view.
+  // False when the point is not in view.
   bool Replace(int car, int point, int keypoint, Random* random,
                SyntheticImage* image) const {
     const SyntheticCamera camera = CameraOfImage(world_.camera, *image);

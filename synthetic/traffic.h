@@ -6,8 +6,8 @@
 namespace adasfm {
 
 // Two cars that drive ahead of the camera, one in its lane and one in the next,
-// at distances that change slowly; each turns with the camera's car. Nothing is
-// hidden behind them.
+// at slowly changing distances and with the heading of the camera's car. They
+// occlude nothing.
 inline constexpr int kNumCars = 2;
 inline constexpr int kNumPointsPerCar = 1000;
 

@@ -17,9 +17,9 @@ using Matrix5d = Eigen::Matrix<double, 5, 5>;
 
 constexpr int kNumIterations = 6;
 constexpr double kLossScalePx = 2.0;
-// Keeps the step bounded where the motion is too small to show a direction.
+// Keeps the step bounded where the motion is too small to observe a direction.
 constexpr double kDamping = 1e-6;
-// Of the numeric derivatives: far above rounding, far below the noise.
+// Step of the numeric derivatives: far above rounding, far below the noise.
 constexpr double kDifference = 1e-6;
 
 double SampsonErrorPx(const Bearing& bearing1, const Bearing& bearing2,

@@ -18,9 +18,8 @@ double ComputeSampsonErrorPx(const Bearing& bearing1, const Bearing& bearing2,
 inline constexpr double kMaxEpipolarErrorPx = 4.0;
 
 // Gauss-Newton on the Sampson errors, from a start near the solution, with a
-// robust weight beyond about 2 px. Derivatives are numeric, so that a mistake
-// in those of the estimators under test is not made here too. The translation
-// keeps the length one.
+// robust weight beyond about 2 px. Derivatives are numeric, so as not to share
+// a mistake with the estimators under test. The translation has length one.
 Rigid3d RefineTwoViewPose(const std::vector<Bearing>& bearings1,
                           const std::vector<Bearing>& bearings2,
                           const std::vector<FeatureMatch>& matches,

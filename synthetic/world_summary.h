@@ -9,14 +9,14 @@
 
 namespace adasfm {
 
-// What a world really has, counted from its images, pairs and logs.
+// Figures of a world, counted from its images, pairs and logs.
 struct SyntheticWorldSummary {
   int num_images = 0;
   double driven_m = 0.0;
   double duration_s = 0.0;             // from the first image to the last
-  double standing_s = 0.0;             // of it, in stops and turns on the spot
+  double standing_s = 0.0;             // in stops and turns on the spot
   int num_images_without_texture = 0;  // fewer than 15 keypoints
-  double mean_num_keypoints = 0.0;     // of the others
+  double mean_num_keypoints = 0.0;     // of the other images
   // Share of an image's keypoints whose landmark the next image sees too.
   double mean_overlap = 0.0;
   double moving_keypoint_ratio = 0.0;
@@ -27,20 +27,21 @@ struct SyntheticWorldSummary {
   int num_revisit_pairs = 0;
   double alias_pair_ratio = 0.0;
   double spurious_pair_ratio = 0.0;
-  double false_pair_ratio = 0.0;  // both
-  // Images that false pairs join to others.
+  double false_pair_ratio = 0.0;  // alias and spurious
+  // Images of at least one false pair.
   int num_images_with_false_pairs = 0;
   // Of the true pairs.
   double rotation_outlier_ratio = 0.0;
   // Of the raw matches of true pairs.
   double outlier_match_ratio = 0.0;
   int num_gnss_fixes = 0;
-  // Of the photos after the first, those whose gain differs from the one
-  // before; the largest factor between two.
+  // Share of the photos after the first whose gain differs from that of the
+  // previous one, and the largest factor between two successive photos.
   double exposure_jump_ratio = 0.0;
   double max_exposure_factor = 1.0;
-  // How far a photo's keypoints move while the shutter is open, on average:
-  // mean and largest of the photos, and the share of photos above 2 px.
+  // Blur of a photo: mean distance by which its keypoints move while the
+  // shutter is open. Mean and maximum over the photos, and the share of photos
+  // above 2 px.
   double mean_blur_px = 0.0;
   double max_blur_px = 0.0;
   double blurred_photo_ratio = 0.0;
@@ -49,8 +50,8 @@ struct SyntheticWorldSummary {
 
 SyntheticWorldSummary SummarizeWorld(const SyntheticWorld& world);
 
-// Names and values, in the order above; of exposure, blur and focal lengths
-// only what the world has.
+// Names and values, in the order above; figures of exposure, blur and focal
+// lengths only where the world has such effects.
 std::vector<std::pair<std::string, double>> ListFigures(
     const SyntheticWorldSummary& summary);
 

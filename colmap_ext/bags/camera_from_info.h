@@ -7,8 +7,8 @@
 
 namespace adasfm {
 
-// The camera of a bag's photos; of rectified photos the projection P counts. Or
-// why the message cannot be used.
+// The camera of a bag's photos, for rectified photos from the projection P; or
+// an error why the message cannot be used.
 StatusOr<CalibratedCamera> CameraFromInfo(const RosCameraInfo& info,
                                           bool is_rectified);
 

@@ -9,7 +9,7 @@
 namespace adasfm {
 namespace {
 
-// How an encoding's pixels become OpenCV's (blue first).
+// Conversion of an encoding's pixels to OpenCV's (blue first).
 struct PixelFormat {
   int type;
   int conversion;  // -1: none
@@ -62,7 +62,7 @@ cv::Mat SwapBytes(const cv::Mat& words) {
   return swapped;
 }
 
-// The bits beyond eight that the brightest pixel has.
+// Number of bits beyond eight in the brightest pixel.
 int FindShift(const cv::Mat& words) {
   double brightest = 0.0;
   cv::minMaxLoc(words, nullptr, &brightest);
@@ -82,7 +82,7 @@ std::string ImageDecoder::DecodeRaw(const RosImage& image, ImageFile* file) {
   }
   const PixelFormat& pixels = format->second;
   const uint64_t pixel_bytes = CV_ELEM_SIZE(pixels.type);
-  // COLMAP's own limit is near this; larger ones are damage.
+  // COLMAP's own limit is near this; larger sizes mean damage.
   constexpr uint32_t kMaxSide = 1 << 15;
   if (image.width == 0 || image.height == 0 || image.width > kMaxSide ||
       image.height > kMaxSide || image.row_bytes < image.width * pixel_bytes ||
@@ -97,7 +97,8 @@ std::string ImageDecoder::DecodeRaw(const RosImage& image, ImageFile* file) {
   if (CV_MAT_DEPTH(pixels.type) == CV_16U) {
     if (image.is_big_endian) picture = SwapBytes(picture);
     if (shift_ < 0) shift_ = FindShift(picture);
-    // Truncation, not rounding, keeps the brightest pixels in eight bits.
+    // Truncation instead of rounding keeps the brightest pixels within eight
+    // bits.
     cv::Mat words;
     cv::divide(picture, cv::Scalar(1 << shift_), words, 1.0, CV_32F);
     words.convertTo(picture, CV_8U, 1.0, -0.499);
@@ -108,7 +109,7 @@ std::string ImageDecoder::DecodeRaw(const RosImage& image, ImageFile* file) {
     picture = converted;
   }
   file->extension = ".png";
-  // Fast rather than small: it is read again within minutes.
+  // Fast rather than small: the file is read again within minutes.
   cv::imencode(".png", picture, file->bytes, {cv::IMWRITE_PNG_COMPRESSION, 1});
   return "";
 }

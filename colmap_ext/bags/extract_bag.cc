@@ -138,7 +138,7 @@ Status BagExtractor::WritePhoto(const BagMessage& message,
                                 timestamp_t time_ns) {
   const std::string base =
       folder_ + "/" + kImageFolder + "/" + PhotoStem(time_ns);
-  // The first photo is decoded again: it settles what all photos share.
+  // The first photo is always decoded: it determines a shift for all photos.
   for (const char* extension : {".png", ".jpg"}) {
     if (photos_.empty()) break;
     if (!fs::exists(base + extension)) continue;

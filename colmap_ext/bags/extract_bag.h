@@ -18,20 +18,20 @@ namespace adasfm {
 struct BagExtractionOptions {
   BagTopicNames topics;
   PhotoSelectionOptions photos;
-  // Whether the user has a calibration, and the type of its wheels if it has
-  // any: then the bag's mounting is not needed.
+  // Whether the user has a calibration, which makes the bag's extrinsics
+  // unnecessary, and the type of its wheels if it has any.
   bool has_calibration = false;
   std::optional<WheelType> wheel_type;
 };
 
-// What an extraction left in its folder; empty where the bag does not have it.
+// Files of an extraction; paths are empty where the bag lacks the data.
 struct BagFiles {
   std::string image_path;        // folder images/, "<stamp in ns>.png" or .jpg
   std::string image_times_path;  // image_times.csv
   std::string imu_path;          // imu.csv
   std::string wheel_path;        // wheel.csv
   std::string gnss_path;         // gnss.csv
-  std::string sensors_path;      // sensors.yaml: mounting from /tf_static
+  std::string sensors_path;      // sensors.yaml: extrinsics from /tf_static
   CalibratedCamera camera;       // camera.txt: from CameraInfo
 };
 
@@ -42,23 +42,22 @@ struct BagExtraction {
 
 // Writes a bag's photos, their times, logs and calibration as files
 // (docs/reference/formats.md) into the folder: one pass for the logs, one for
-// the photos. Photos that are there already are not written again, so that an
-// interrupted extraction continues. What the bag lacks is named in one warning;
-// a mounting that sensor logs need, and that neither the bag nor the user
-// gives, is an error.
+// the photos. Existing photos are not written again, so that an interrupted
+// extraction continues. One warning lists what the bag lacks. An error when
+// sensor logs need extrinsics that neither the bag nor the user gives.
 StatusOr<BagExtraction> ExtractBag(const std::string& bag_path,
                                    const BagExtractionOptions& options,
                                    const std::string& folder,
                                    const ProgressCallback& progress);
 
-// The name of a photo without its extension: of equal length, so that the order
-// of names is that of time.
+// The name of a photo without its extension, of constant length, so that names
+// sort by time.
 std::string PhotoStem(timestamp_t time_ns);
 
 // The files of a finished extraction.
 BagFiles FindBagFiles(const std::string& folder);
 
-// Removes what extractions write, and nothing else.
+// Removes files that extractions write, and nothing else.
 Status RemoveBagFiles(const std::string& folder);
 
 }  // namespace adasfm

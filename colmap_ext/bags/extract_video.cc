@@ -17,7 +17,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// Edges are measured at this width: fast, and motion blur is wider than that.
+// Width at which edges are measured: fast, and motion blur is wide enough.
 constexpr char kFramesFilter[] =
     "scale='min(640,iw)':-2,blurdetect,settb=1/1000000000,"
     "metadata=mode=print:file=-";
@@ -55,7 +55,7 @@ class VideoExtractor {
   Status SelectFrames();
   Status WriteSelected();
   Status NamePhotos();
-  // Where the second pass counts its photos.
+  // Name of a photo in the numbering of the second pass.
   std::string NewPhoto(int number) const {
     char name[24];
     std::snprintf(name, sizeof(name), "/new/%08d.jpg", number);
@@ -98,7 +98,7 @@ Status VideoExtractor::ReadFrames() {
           progress_("looking at frame " + std::to_string(number + 1),
                     kFirstPassShare * share);
         } else if (!frames_.empty()) {
-          // No number where the frame has no edges.
+          // blurdetect gives no number for a frame without edges.
           double blur_px = 0.0;
           if (std::sscanf(line.c_str(), "lavfi.blur=%lf", &blur_px) == 1 &&
               blur_px > 0.0) {

@@ -11,12 +11,12 @@
 namespace adasfm {
 namespace {
 
-// Photos further apart in direction than this share too little.
+// Photos whose directions differ more share too little.
 constexpr double kMaxTurnRad = DegToRad(10.0);
-// Speeds are not carried on over a longer gap of their log.
+// Speeds are not extrapolated over longer gaps of the log.
 constexpr double kMaxStepS = 1.0;
 
-// How far the machine has driven and turned until a time.
+// Distance and angle that the machine has travelled up to a time.
 struct Way {
   timestamp_t timestamp_ns = 0;
   double distance_m = 0.0;
@@ -39,7 +39,32 @@ std::vector<Way> WayOfPoses(const std::vector<OdometryPose>& poses) {
   return ways;
 }
 
-std::vector<Way> WayOfSpeeds(const std::vector<WheelSample>& samples) {
+struct Speed {
+  double forward = 0.0;   // m/s
+  double yaw_rate = 0.0;  // rad/s
+};
+
+// Without a calibration the track width and the wheelbase are those of a small
+// machine: a larger one turns less than computed, and more photos are taken.
+Speed SpeedOf(WheelType type, const WheelSample& sample) {
+  constexpr double kTrackWidthM = 0.3;
+  constexpr double kWheelbaseM = 0.5;
+  switch (type) {
+    case WheelType::kDifferential:
+      return {0.5 * (sample.first + sample.second),
+              (sample.second - sample.first) / kTrackWidthM};
+    case WheelType::kSteering:
+      return {sample.first,
+              sample.first * std::tan(sample.second) / kWheelbaseM};
+    case WheelType::kSpeed:
+      return {sample.first, 0.0};
+    default:
+      return {sample.first, sample.second};
+  }
+}
+
+std::vector<Way> WayOfSpeeds(WheelType type,
+                             const std::vector<WheelSample>& samples) {
   std::vector<Way> ways;
   Way way;
   for (size_t i = 0; i < samples.size(); ++i) {
@@ -47,8 +72,9 @@ std::vector<Way> WayOfSpeeds(const std::vector<WheelSample>& samples) {
       const double step_s = std::min(
           kMaxStepS,
           SecondsFromNs(samples[i].timestamp_ns - samples[i - 1].timestamp_ns));
-      way.distance_m += std::abs(samples[i].first) * step_s;
-      way.turn_rad += std::abs(samples[i].second) * step_s;
+      const Speed speed = SpeedOf(type, samples[i]);
+      way.distance_m += std::abs(speed.forward) * step_s;
+      way.turn_rad += std::abs(speed.yaw_rate) * step_s;
     }
     way.timestamp_ns = samples[i].timestamp_ns;
     ways.push_back(way);
@@ -56,14 +82,14 @@ std::vector<Way> WayOfSpeeds(const std::vector<WheelSample>& samples) {
   return ways;
 }
 
-// Empty when the log has no metres.
+// Empty when the log has no lengths in metres.
 std::vector<Way> FindWay(const BagLogs& logs) {
   if (!logs.odometry.empty()) return WayOfPoses(logs.odometry);
-  if (logs.wheel_type == WheelType::kTicks) return {};
-  return WayOfSpeeds(logs.wheel);
+  if (CountsTicks(logs.wheel_type)) return {};
+  return WayOfSpeeds(logs.wheel_type, logs.wheel);
 }
 
-// The last known way before or at a time; the first one before that.
+// The last entry at or before a time; the first entry for earlier times.
 const Way& WayAt(const std::vector<Way>& ways, timestamp_t time_ns) {
   const auto after = std::upper_bound(
       ways.begin(), ways.end(), time_ns,

@@ -10,20 +10,20 @@
 
 namespace adasfm {
 
-// Which photos of a bag are taken out.
+// Options of which photos of a bag are extracted.
 struct PhotoSelectionOptions {
-  // Every so many. Cameras record far more than a model needs; but what is
-  // enough depends on the speed.
+  // Extracts every image_step-th photo. Cameras record far more than a model
+  // needs, but the number needed depends on the speed.
   int image_step = 1;
-  // Not before the machine has moved so far, in metres, or has turned by 10
-  // degrees since the last photo taken; needs wheels. 0: all of the above.
+  // Of these, skips photos until the machine has moved this far [m], or turned
+  // by 10 degrees, since the last extracted photo; needs wheels. 0: skips none.
   double image_distance_m = 0.0;
 
   bool IsValid(std::string* error) const;
 };
 
-// The stamps of the photos to take; an error when the distance is asked for and
-// the wheels do not tell it.
+// The stamps of the photos to extract; an error when a distance is required and
+// the wheels do not measure it.
 StatusOr<std::set<timestamp_t>> SelectPhotos(
     const BagLogs& logs, const PhotoSelectionOptions& options);
 

@@ -53,8 +53,8 @@ std::string FormatWheel(const BagLogs& logs) {
   return text.str();
 }
 
-// TUM. Seconds, since nanoseconds of a simulation's clock have too few digits
-// to be taken for such.
+// TUM format. Times are in seconds, since nanoseconds of a simulation's clock
+// have too few digits to be recognised as nanoseconds.
 std::string FormatOdometry(const std::vector<OdometryPose>& poses) {
   std::ostringstream text = ExactStream();
   text << "#t [s] tx ty tz [m] qx qy qz qw\n";
@@ -78,7 +78,7 @@ std::string FormatGnss(const std::vector<RosNavSatFix>& fixes) {
   for (const RosNavSatFix& fix : fixes) {
     text << fix.header.stamp_ns << "," << fix.latitude << "," << fix.longitude
          << "," << fix.altitude;
-    // 0 where the receiver does not say.
+    // 0 where the receiver states none.
     for (const int i : {0, 4, 8}) {
       const double variance =
           fix.covariance_type == 0 ? 0.0 : fix.position_covariance[i];
@@ -150,7 +150,7 @@ Status WriteBagLogs(const BagLogs& logs, const std::string& folder) {
 
 StatusOr<std::string> FormatBagCalibration(const std::string& bag_path,
                                            const BagLogs& logs) {
-  // Without an IMU the wheels' frame takes its place.
+  // Without an IMU, the wheels' frame replaces the IMU's frame.
   const bool has_imu = !logs.imu.empty();
   const std::string& body = has_imu ? logs.imu_frame : logs.wheel_frame;
   const StatusOr<Rigid3d> cam_from_body =
@@ -165,7 +165,7 @@ StatusOr<std::string> FormatBagCalibration(const std::string& bag_path,
     const double period_s = ComputeMedianPeriod(times);
     if (period_s > 0.0) imu.rate_hz = 1.0 / period_s;
   }
-  std::string text = "# Mounting from " + bag_path +
+  std::string text = "# Extrinsics from " + bag_path +
                      "; noise: typical values, which no bag tells.\n" +
                      FormatSensorsYaml(*cam_from_body, 0.0, imu);
   if (!HasWheels(logs)) return text;

@@ -12,8 +12,8 @@ namespace adasfm {
 // the formats of docs/reference/sensors.md and formats.md.
 Status WriteBagLogs(const BagLogs& logs, const std::string& folder);
 
-// The calibration that a bag's frames and transforms give, as the text of a
-// sensors.yaml; an error names the frames that are not connected.
+// The calibration from a bag's frames and transforms, as the text of a
+// sensors.yaml; the error names the frames that are not connected.
 StatusOr<std::string> FormatBagCalibration(const std::string& bag_path,
                                            const BagLogs& logs);
 

@@ -24,8 +24,8 @@ void BlockMatrix::Column::Sort() {
 
 void BlockMatrix::AddPair(int block1, int block2) {
   if (block1 == block2) return;
-  // Priors, and points that Ceres lists, name the same pairs again and again:
-  // these are taken out before they double the list.
+  // Priors, and points in the Ceres problem, repeat the same pairs many times.
+  // Repetitions are removed before they double the list.
   constexpr size_t kMinNumUnsorted = 64;
   Column& column = columns_[std::min(block1, block2)];
   column.rows.push_back(std::max(block1, block2));

@@ -7,31 +7,31 @@
 
 namespace adasfm {
 
-// A symmetric sparse matrix as a sum of dense blocks, of which the lower
-// triangle is kept. Its pattern is known before its values, so that nothing but
-// the matrix itself takes memory: AddBlock, then AddPair, then Reorder, then
+// A symmetric sparse matrix that is a sum of dense blocks; only the lower
+// triangle is stored. The pattern is fixed before the values, so that only the
+// matrix itself takes memory. Order of calls: AddBlock, AddPair, Reorder,
 // Allocate.
 class BlockMatrix {
  public:
-  // Appends rows and columns; the index of the block.
+  // Appends a block of `size` rows and columns; returns its index.
   int AddBlock(int size);
   int NumBlocks() const { return static_cast<int>(size_.size()); }
   int NumColumns() const { return num_columns_; }
   int SizeOf(int block) const { return size_[block]; }
   int FirstColumnOf(int block) const { return first_[block]; }
 
-  // Makes room for what two blocks have in common, if there is none yet.
+  // Makes room for the block of a pair, unless it exists.
   void AddPair(int block1, int block2);
-  // Numbers the blocks anew so that a Cholesky factor has little fill
-  // (block_ordering.h); the new number of each. A graph of blocks takes a 36th
-  // of the memory of that of a matrix of poses, and a matrix in order is
-  // factorised without a copy (ordered_cholesky.h).
+  // Renumbers the blocks so that a Cholesky factor has little fill
+  // (block_ordering.h); returns the new number of each. For a matrix of poses
+  // the graph of blocks takes a 36th of the memory of the graph of numbers. An
+  // ordered matrix is factorised without a copy (ordered_cholesky.h).
   std::vector<int> Reorder();
   // Fixes the pattern; all values are zero.
   void Allocate();
 
-  // Adds to the rows of one block and the columns of one not behind it; of the
-  // block of a diagonal the lower triangle. Other columns may be added to at
+  // Adds `values` to a block, row_block >= col_block; to a block of the
+  // diagonal only their lower triangle. Threads may add to different columns at
   // the same time.
   template <typename Derived>
   void Add(int row_block, int col_block,
@@ -58,8 +58,8 @@ class BlockMatrix {
   const std::vector<int>& RowsOf(int col_block) const {
     return columns_[col_block].rows;
   }
-  // Adds to the k-th of RowsOf a block of two factors, kNumRows x 3 and
-  // 3 x kNumCols: without a search, for many additions to one column.
+  // Adds a product of two factors, kNumRows x 3 and 3 x kNumCols, to the k-th
+  // of RowsOf. Without a search, for many additions to one column.
   template <int kNumRows, int kNumCols>
   void AddProduct(int col_block, int k,
                   const Eigen::Matrix<double, kNumRows, 3>& left,
@@ -77,22 +77,22 @@ class BlockMatrix {
   Eigen::SparseMatrix<double>& Matrix() { return matrix_; }
 
  private:
-  // Of one column of blocks: those below the diagonal.
+  // The blocks below the diagonal in one column of blocks.
   struct Column {
     std::vector<int> rows;
-    // Sorted and unique so far.
+    // So many of the first rows are sorted and unique.
     size_t num_sorted = 0;
     void Sort();
   };
 
-  // Where the rows of a block begin behind those of the diagonal.
+  // Where the rows of a block begin behind those of the diagonal block.
   int OffsetOf(int row_block, int col_block) const;
 
   std::vector<int> size_;
   std::vector<int> first_;
   int num_columns_ = 0;
   std::vector<Column> columns_;
-  // By column, one for each of its rows.
+  // OffsetOf for each of RowsOf, by column.
   std::vector<std::vector<int>> offsets_;
   Eigen::SparseMatrix<double> matrix_;
 };

@@ -9,14 +9,14 @@
 namespace adasfm {
 namespace {
 
-// CHOLMOD's nested dissection takes longer than both others, and saves a
-// twentieth of the factor of 30,000 images, an eighth of that of 4,000.
+// CHOLMOD's own nested dissection takes longer than both other methods, and
+// saves a twentieth of the factor of 30,000 images, an eighth of that of 4,000.
 constexpr int kMinNumBlocksToDissect = 2000;
 
 class BlockAnalysis
     : public Eigen::CholmodSupernodalLLT<Eigen::SparseMatrix<double>> {
  public:
-  // The lower triangle; the values mean nothing.
+  // pattern: the lower triangle; its values are not used.
   explicit BlockAnalysis(const Eigen::SparseMatrix<double>& pattern) {
     cholmod().print = 0;
     cholmod().nmethods = pattern.rows() < kMinNumBlocksToDissect ? 2 : 3;
@@ -29,7 +29,7 @@ class BlockAnalysis
   const int* Order() const {
     return static_cast<const int*>(m_cholmodFactor->Perm);
   }
-  // With the diagonal.
+  // Including the diagonal.
   double NumFactorBlocks() { return cholmod().lnz; }
 };
 

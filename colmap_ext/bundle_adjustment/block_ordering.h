@@ -6,23 +6,22 @@
 
 namespace adasfm {
 
-// An order in which a symmetric matrix of blocks has a Cholesky factor of
-// little fill, with one row and column of blocks for each node of a graph and
-// blocks where nodes are neighbours.
+// An order in which a symmetric block matrix has a Cholesky factor of little
+// fill. Each node of a graph is a row and a column of blocks; the matrix has a
+// block off the diagonal where two nodes are neighbours.
 struct BlockOrdering {
-  // By its new number, the old number of each block.
+  // The old number of each block, by its new number.
   std::vector<int> block_of_number;
-  // Of the factor, below its diagonal.
+  // Blocks of the factor below its diagonal.
   size_t num_factor_blocks = 0;
 };
 
-// Method: CHOLMOD's, minimum degree or nested dissection (METIS), whichever has
-// less fill, in postorder.
+// Method: the ordering of CHOLMOD with least fill, in postorder: minimum
+// degree, nested dissection by METIS or, for many blocks, CHOLMOD's own.
 //
-// Input: for each node its neighbours, by index, every edge at one of its
-// nodes; of edges that come twice the second changes nothing. A chain of n
-// nodes has n - 1 blocks, a complete graph n (n - 1) / 2. Throws where memory
-// is short.
+// Input: for each node the indices of its neighbours; every edge is listed at
+// one of its nodes, and repeated edges change nothing. A chain of n nodes has
+// n - 1 blocks, a complete graph n (n - 1) / 2. Throws where memory is short.
 BlockOrdering FindBlockOrdering(const std::vector<std::vector<int>>& neighbors);
 
 }  // namespace adasfm

@@ -18,12 +18,12 @@
 namespace adasfm {
 namespace {
 
-// The length of a scale that nothing measures is held to this share of itself;
-// no residual pulls against it, so the value is not a weight.
+// Relative 1 sigma of the distance that fixes a scale which nothing measures.
+// No residual contradicts the distance, so the value is not a weight.
 constexpr double kGaugeLengthRatio = 1e-3;
-// The chain's length and bends are soft: the damping that Ceres begins with
-// (radius 1e4) would let them go a little at each of many steps, and an
-// adjustment end before they are where they belong.
+// The length and the bends of a chain are weakly constrained. With the initial
+// damping of Ceres (radius 1e4) they would change a little at each of many
+// steps, and an adjustment would end before they converge.
 constexpr double kInitialTrustRegionRadius = 1e10;
 // Problems with fewer residuals are solved faster by one thread.
 constexpr int kMinNumResidualsForThreads = 20000;
@@ -34,7 +34,7 @@ bool HasMeasuredLengths(const std::vector<PosePriorEdge>& priors) {
   });
 }
 
-// Holds the degrees of freedom that the data leave open (see AdjustBundle).
+// Fixes the degrees of freedom that the data leave open (see AdjustBundle).
 void FixGauge(bool has_lengths, BundleProblem* problem) {
   const std::vector<image_t> constant_images = problem->ConstantImages();
   if (constant_images.empty()) problem->FixFirstPose();
@@ -79,7 +79,7 @@ ceres::Solver::Options SolverOptions(
   return solver;
 }
 
-// Sets what a solver has to say, and whether its parameters may be used.
+// Sets the solver's figures, and whether its parameters may be used.
 void SolveWithCeres(const PriorBundleAdjustmentOptions& options,
                     bool has_small_factor, BundleProblem* bundle,
                     PriorBundleAdjustmentSummary* summary) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// How BundleProblem holds the degrees of freedom that the data leave open.
+// How BundleProblem fixes the degrees of freedom that the data leave open.
 #include <utility>
 #include <vector>
 
@@ -45,8 +45,8 @@ void BundleProblem::FixDistanceToFarthestPose(double sigma_ratio) {
     }
   }
   if (first.second == nullptr) return;
-  // A pose on few points may be wrong by more than the model is large, and
-  // would take the model along where it goes.
+  // A pose on few points may err by more than the size of the model, and would
+  // move the model with it.
   const double min_num_observations = 0.5 * MedianNumObservations();
   std::pair<image_t, ImageBlock*> farthest(kInvalidImageId, nullptr);
   double max_distance = 0.0;

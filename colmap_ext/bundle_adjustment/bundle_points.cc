@@ -48,7 +48,7 @@ std::vector<BundleProblem::Observation> BundleProblem::FindObservations(
   return observations;
 }
 
-// One alone says nothing.
+// A single observation does not constrain a point.
 std::vector<std::vector<BundleProblem::Observation>> BundleProblem::CutTrack(
     const Covisibility& covisibility,
     const std::vector<Observation>& observations) {
@@ -152,7 +152,7 @@ BundleProblem::ObservationRange BundleProblem::ObservationsOf(size_t k) const {
 Eigen::Vector3d BundleProblem::PositionOf(size_t begin, size_t end) const {
   Eigen::Vector3d xyz = points_[begin].xyz;
   if (end == begin + 1) return xyz;
-  // The robust weights settle slowly where observations disagree.
+  // The robust weights converge slowly where observations disagree.
   constexpr int kNumIterations = 10;
   for (int iteration = 0; iteration < kNumIterations; ++iteration) {
     Eigen::Matrix3d information = Eigen::Matrix3d::Zero();

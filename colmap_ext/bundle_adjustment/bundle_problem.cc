@@ -33,11 +33,11 @@ BundleProblem::BundleProblem(const PriorBundleAdjustmentOptions& options,
   problem_options.evaluation_callback = this;
   problem_ = std::make_unique<ceres::Problem>(problem_options);
   AddImages(problem, reconstruction);
-  points_apart_ =
-      may_keep_points_apart && !options.RefinesCameras() && mounts_.empty();
+  points_apart_ = may_keep_points_apart && !options.RefinesCameras() &&
+                  cams_from_rig_.empty();
   AddPoints(reconstruction, points_apart_ ? covisibility : nullptr);
   AddPriors(problem.priors);
-  AddMountPriors(problem.rigs);
+  AddRigPriors(problem.rigs);
   shared_errors_.AddPriors(problem_.get());
   SetConstantBlocks(reconstruction);
 }
@@ -48,7 +48,7 @@ void BundleProblem::PrepareForEvaluation(bool, bool new_evaluation_point) {
 }
 
 void BundleProblem::UpdatePoses() {
-  for (auto& [camera_id, mount] : mounts_) mount.Update();
+  for (auto& [camera_id, cam_from_rig] : cams_from_rig_) cam_from_rig.Update();
   for (auto& [image_id, block] : images_) {
     block.SolvedPose()->Update();
     if (block.IsDerived()) block.RigPose::Update();
@@ -102,15 +102,16 @@ void BundleProblem::AddRigs(const CameraRigs& rigs,
     const RigCamera& camera = rigs.cameras.at(image.camera_id);
     ImageBlock& block = images_.at(image_id);
     if (camera.is_reference || !camera.cam_from_rig || !block.frame) continue;
-    block.mount =
-        &mounts_.emplace(image.camera_id, *camera.cam_from_rig).first->second;
+    block.cam_from_rig =
+        &cams_from_rig_.emplace(image.camera_id, *camera.cam_from_rig)
+             .first->second;
   }
   UpdatePoses();
 }
 
-void BundleProblem::AddMountPriors(const CameraRigs& rigs) {
-  for (auto& [camera_id, mount] : mounts_) {
-    if (!problem_->HasParameterBlock(mount.parameters)) continue;
+void BundleProblem::AddRigPriors(const CameraRigs& rigs) {
+  for (auto& [camera_id, cam_from_rig] : cams_from_rig_) {
+    if (!problem_->HasParameterBlock(cam_from_rig.parameters)) continue;
     const RigCamera& camera = rigs.cameras.at(camera_id);
     Eigen::Matrix<double, 6, 1> sigmas;
     sigmas << Eigen::Vector3d::Constant(camera.rotation_sigma_rad),
@@ -119,7 +120,7 @@ void BundleProblem::AddMountPriors(const CameraRigs& rigs) {
         Eigen::MatrixXd(sigmas.cwiseInverse().asDiagonal()),
         Eigen::VectorXd::Zero(6)));
     problem_->AddResidualBlock(other_costs_.back().get(), nullptr,
-                               mount.parameters);
+                               cam_from_rig.parameters);
   }
 }
 
@@ -243,9 +244,9 @@ std::shared_ptr<ceres::ParameterBlockOrdering> BundleProblem::Ordering() {
   for (double* values : shared_errors_.Used()) {
     ordering->AddElementToGroup(values, 2);
   }
-  for (auto& [camera_id, mount] : mounts_) {
-    if (problem_->HasParameterBlock(mount.parameters)) {
-      ordering->AddElementToGroup(mount.parameters, 3);
+  for (auto& [camera_id, cam_from_rig] : cams_from_rig_) {
+    if (problem_->HasParameterBlock(cam_from_rig.parameters)) {
+      ordering->AddElementToGroup(cam_from_rig.parameters, 3);
     }
   }
   for (std::vector<double>& values : other_parameters_) {
@@ -262,8 +263,8 @@ bool BundleProblem::IsFinite() const {
   for (const AdjustedPose& pose : poses_) {
     if (!all_finite(pose.parameters, 6)) return false;
   }
-  for (const auto& [camera_id, mount] : mounts_) {
-    if (!all_finite(mount.parameters, 6)) return false;
+  for (const auto& [camera_id, cam_from_rig] : cams_from_rig_) {
+    if (!all_finite(cam_from_rig.parameters, 6)) return false;
   }
   for (const PointBlock& point : points_) {
     if (!point.xyz.allFinite()) return false;
@@ -280,9 +281,9 @@ void BundleProblem::WriteTo(colmap::Reconstruction* reconstruction) const {
     pose.Update();
     Rigid3d cam_from_world = pose.CamFromWorld();
     if (block.IsDerived()) {
-      AdjustedPose mount = *block.mount;
-      mount.Update();
-      cam_from_world = mount.CamFromWorld() * cam_from_world;
+      AdjustedPose cam_from_rig = *block.cam_from_rig;
+      cam_from_rig.Update();
+      cam_from_world = cam_from_rig.CamFromWorld() * cam_from_world;
     } else if (block.is_constant || !block.IsUsed()) {
       continue;
     }

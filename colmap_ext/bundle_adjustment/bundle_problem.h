@@ -23,12 +23,12 @@ namespace adasfm {
 // that of the first images that see them.
 class BundleProblem final : private ceres::EvaluationCallback {
  public:
-  // The options are valid. Images without a residual do not take part, nor do
-  // points behind all but one of their cameras. Points may be kept apart from
-  // the Ceres problem, which then has neither them nor their observations, as
-  // long as these depend on one pose alone: no intrinsics, no mounts. With
-  // `covisibility` such a point becomes one for each group of its track's
-  // images that share points.
+  // The options must be valid. Images without a residual do not take part, nor
+  // do points in front of fewer than two cameras. Points and their observations
+  // may be kept apart from the Ceres problem as long as the observations depend
+  // on one pose alone: no intrinsics, no cams_from_rig. With `covisibility`
+  // such a point becomes one for each group of its track's images that share
+  // points.
   BundleProblem(const PriorBundleAdjustmentOptions& options,
                 const PriorBundleAdjustmentProblem& problem,
                 const colmap::Reconstruction& reconstruction,
@@ -44,34 +44,35 @@ class BundleProblem final : private ceres::EvaluationCallback {
     return problem_->NumResiduals() +
            2 * static_cast<int>(observations_.size());
   }
-  // Those that take part in a residual.
+  // The constant images that take part in a residual.
   std::vector<image_t> ConstantImages() const;
 
   // Makes the pose of the first image that has observations (else of the first
   // image) constant.
   void FixFirstPose();
-  // Holds the distance from the first constant pose to the pose farthest from
-  // it that sees at least half as many points as the median image, to this
-  // share of the distance.
+  // Constrains the distance from the first constant pose to the farthest pose
+  // that sees at least half as many points as the median image. sigma_ratio:
+  // 1 sigma over that distance.
   void FixDistanceToFarthestPose(double sigma_ratio);
 
-  // The pose of an image that has part in a residual already; null for others.
+  // The pose of an image that already takes part in a residual; else null.
   const AdjustedPose* UsedPose(image_t image_id) const;
   bool IsConstant(image_t image_id) const;
-  // The rotation by which T_cam_imu is wrong (shared_errors.h).
+  // The rotation error of T_cam_imu (shared_errors.h).
   double* ExtrinsicRotation() {
     return shared_errors_.ExtrinsicRotation(problem_.get());
   }
-  // Parameters of the caller's own.
+  // Adds parameters with these values; returns their address.
   double* AddParameters(std::vector<double> values);
-  // Adds a residual on such poses and parameters and takes both over.
+  // Adds a residual on poses of images and such parameters; takes ownership of
+  // both functions.
   ceres::ResidualBlockId AddResidual(
       std::unique_ptr<ceres::CostFunction> cost,
       std::unique_ptr<ceres::LossFunction> loss,
       const std::vector<image_t>& image_ids,
       const std::vector<double*>& parameters = {});
-  // The same for a term of priors, with a Huber loss: it pulls at what is far
-  // off, too.
+  // The same for a prior term (kVelocity), with a Huber loss, which still
+  // constrains large errors.
   void AddVelocityTerm(std::unique_ptr<ceres::CostFunction> cost,
                        const std::vector<image_t>& image_ids,
                        const std::vector<double*>& parameters);
@@ -80,25 +81,25 @@ class BundleProblem final : private ceres::EvaluationCallback {
   struct PriorBlock {
     ceres::ResidualBlockId residual = nullptr;
     PriorTerm term = PriorTerm::kRotation;
-    // Whether the term's factor of the sigmas counts for it,
+    // Whether the factor of the term's sigma applies to it.
     bool has_factor = true;
-    // it has a robust loss,
+    // Whether it has a robust loss.
     bool is_robust = true;
-    // and keypoints test it (IsTestedMeasurement).
+    // Whether keypoints test it (IsTestedMeasurement).
     bool is_tested = true;
   };
   // In the order in which they were added.
   const std::vector<PriorBlock>& PriorBlocks() const { return prior_blocks_; }
   bool IsPoint(const double* parameters) const;
-  // In order of image ids.
+  // Of images in order of their ids, then of frames added for rigs.
   std::vector<AdjustedPose>& Poses() { return poses_; }
-  // To the parameters as they are.
+  // Recomputes the poses from their present parameters.
   void UpdatePoses();
 
-  // Of those kept apart.
+  // The points kept apart.
   size_t NumPointsApart() const { return points_apart_ ? points_.size() : 0; }
   Eigen::Vector3d& PointApart(size_t k) { return points_[k].xyz; }
-  // In order of image ids.
+  // The observations of a point, in order of image ids.
   struct ObservationRange {
     const PointObservation* first = nullptr;
     const PointObservation* last = nullptr;
@@ -121,7 +122,8 @@ class BundleProblem final : private ceres::EvaluationCallback {
   void WriteTo(colmap::Reconstruction* reconstruction) const;
 
  private:
-  // Its pose, and the frame's, are in poses_, its mount in mounts_.
+  // The poses of image and frame are in poses_, the cam_from_rig is in
+  // cams_from_rig_.
   struct ImageBlock : RigPose {
     bool is_constant = false;
     int num_observations = 0;
@@ -131,9 +133,9 @@ class BundleProblem final : private ceres::EvaluationCallback {
     AdjustedPose* SolvedPose() const { return IsDerived() ? frame : pose; }
   };
   struct PointBlock {
-    colmap::point3D_t id = 0;  // Of all groups of its track.
+    colmap::point3D_t id = 0;  // Same for all groups of its track.
     Eigen::Vector3d xyz;
-    size_t first_observation = 0;  // Where they are kept apart.
+    size_t first_observation = 0;  // If kept apart.
   };
   struct CameraBlock {
     std::vector<double> params;
@@ -150,10 +152,10 @@ class BundleProblem final : private ceres::EvaluationCallback {
                             bool new_evaluation_point) override;
   void AddImages(const PriorBundleAdjustmentProblem& problem,
                  const colmap::Reconstruction& reconstruction);
-  // Gives the images of rigs their frames and mounts.
+  // Gives the images of rigs their frames and cams_from_rig.
   void AddRigs(const CameraRigs& rigs,
                const colmap::Reconstruction& reconstruction);
-  void AddMountPriors(const CameraRigs& rigs);
+  void AddRigPriors(const CameraRigs& rigs);
   // Adds a residual on the poses of images and on other parameters; `cost` is
   // owned by this object already.
   ceres::ResidualBlockId AddCost(ceres::CostFunction* cost,
@@ -162,17 +164,17 @@ class BundleProblem final : private ceres::EvaluationCallback {
                                  const std::vector<double*>& others = {});
   void AddPoints(const colmap::Reconstruction& reconstruction,
                  const Covisibility* covisibility);
-  // Where all observations of the points from `begin` to `end`, which are one
-  // in the model, see it.
+  // The position that fits all observations of the points from `begin` to
+  // `end`, which are one point of the model.
   Eigen::Vector3d PositionOf(size_t begin, size_t end) const;
   double KeypointSigmaPx(camera_t camera_id) const;
-  // Of the images in use.
+  // Over the images in use.
   double MedianNumObservations() const;
   // The usable observations of a point, in order of image ids.
   std::vector<Observation> FindObservations(
       const colmap::Reconstruction& reconstruction,
       const colmap::Point3D& point) const;
-  // The groups of two observations or more.
+  // The groups with two observations or more.
   static std::vector<std::vector<Observation>> CutTrack(
       const Covisibility& covisibility,
       const std::vector<Observation>& observations);
@@ -188,13 +190,13 @@ class BundleProblem final : private ceres::EvaluationCallback {
   const PriorBundleAdjustmentOptions options_;
   std::map<image_t, ImageBlock> images_;
   std::map<camera_t, CameraBlock> cameras_;
-  // Ceres orders the blocks of a group by address: contiguous and in the order
-  // of ids, so that every run adds in the same order.
+  // Ceres orders the blocks of a group by address. Poses are contiguous and in
+  // the order of ids, so that every run adds in the same order.
   std::vector<AdjustedPose> poses_;
-  std::map<camera_t, AdjustedPose> mounts_;
+  std::map<camera_t, AdjustedPose> cams_from_rig_;
   std::vector<PointBlock> points_;
   bool points_apart_ = false;
-  std::vector<PointObservation> observations_;  // Kept apart.
+  std::vector<PointObservation> observations_;  // Of points kept apart.
   SharedErrorBlocks shared_errors_;
   std::deque<std::vector<double>> other_parameters_;
   std::deque<ReprojectionCost> reprojection_costs_;

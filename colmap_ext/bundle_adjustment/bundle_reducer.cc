@@ -27,7 +27,7 @@ int BundleReducer::AddBlock(double* parameters, int size) {
   return matrix_.AddBlock(size);
 }
 
-// Ceres lists parameters by their addresses, which are others in every run.
+// Ceres would list parameters by their addresses, which differ in every run.
 void BundleReducer::NumberBlocks() {
   for (AdjustedPose& pose : bundle_.Poses()) {
     const bool is_free = problem_.HasParameterBlock(pose.parameters) &&
@@ -46,8 +46,8 @@ void BundleReducer::NumberBlocks() {
   }
 }
 
-// Image by image, each pair once: most points of an image are seen by the same
-// others.
+// Adds each pair once, image by image, as mostly the same other images see the
+// points of an image.
 void BundleReducer::AddPairsOfPoints() {
   const size_t num_points = bundle_.NumPointsApart();
   const auto block_of = [&](const PointObservation& observation) {
@@ -177,7 +177,7 @@ double BundleReducer::Evaluate(ceres::ResidualBlockId id, bool is_robust) {
   double cost = 0.0;
   problem_.EvaluateResidualBlockAssumingParametersUnchanged(
       id, is_robust, &cost, residuals_.data(), pointers_.data());
-  // What nothing changes has no part in the cost.
+  // A residual of constant parameters does not count in the cost.
   return blocks_.empty() && point_ == nullptr ? 0.0 : cost;
 }
 
@@ -197,7 +197,7 @@ void BundleReducer::AddRows() {
   }
 }
 
-// Those of one point follow each other.
+// Observations of one point follow each other.
 void BundleReducer::AddPointRows() {
   if (point_ != last_point_) EliminateListedPoint();
   last_point_ = point_;

@@ -10,13 +10,13 @@
 
 #include "colmap_ext/bundle_adjustment/block_matrix.h"
 #include "colmap_ext/bundle_adjustment/bundle_problem.h"
+#include "colmap_ext/bundle_adjustment/minimize_point.h"
 #include "colmap_ext/bundle_adjustment/reduced_system.h"
-#include "colmap_ext/bundle_adjustment/settle_point.h"
 
 namespace adasfm {
 
 // The normal equations of an adjustment without its points (Schur complement),
-// at the parameters as they are.
+// at the present parameters.
 //
 // Method: each point's derivatives are computed, eliminated and forgotten, once
 // to build the equations and once more to move the point by their solution. No
@@ -27,37 +27,39 @@ namespace adasfm {
 // order of little fill (BlockMatrix::Reorder).
 class BundleReducer {
  public:
-  // The problem is complete, its gauge too. num_threads: of the points that it
-  // keeps apart; any number adds in the same order.
+  // The problem must be complete, including its gauge. num_threads is for the
+  // points kept apart; the order of additions does not depend on it.
   BundleReducer(BundleProblem* bundle, int num_threads);
 
-  // Sets Matrix() and Gradient(); the cost, with the robust weights of all
-  // residuals. Levenberg-Marquardt's damping of radius 1 / inverse_radius is
-  // Ceres': by the diagonal, in units of the first call's. With `priors`, those
-  // go there, without robust weights, and have only room in the matrix.
+  // Sets Matrix() and Gradient(); returns the cost, with the robust weights of
+  // all residuals. Damping is that of Ceres' Levenberg-Marquardt with radius
+  // 1 / inverse_radius: by the diagonal, in units of the first call's. With
+  // `priors`, the rows of the priors go there, without robust weights, and the
+  // matrix only has room for them.
   double Linearize(double inverse_radius,
                    std::vector<ReducedPriorRows>* priors = nullptr);
   BlockMatrix& Matrix() { return matrix_; }
-  // The parameters of its blocks.
+  // The parameters of the matrix's blocks.
   const std::vector<double*>& Parameters() const { return parameters_of_; }
   const Eigen::VectorXd& Gradient() const { return gradient_; }
-  // Of all parameters, the points too.
+  // Over all parameters, including the points.
   double LargestGradient() const { return largest_gradient_; }
 
-  // What follows is for problems that keep their points apart.
+  // The functions below are for problems that keep their points apart.
 
   struct Step {
-    // Of the cost, by the linearised residuals.
+    // Decrease of the cost by the linearised residuals.
     double predicted_decrease = 0.0;
-    // Of all parameters, and of the step.
+    // Squared norms of all parameters and of the step.
     double squared_norm = 0.0;
     double squared_length = 0.0;
   };
   // Moves all parameters by the solution of the last equations.
   Step Move(const Eigen::VectorXd& step);
   void TakeBack();
-  // Moves each point to its best place by the poses (settle_point.h). The cost.
-  double SettlePoints(const SettlePointOptions& options);
+  // Moves each point to its optimum at the present poses (minimize_point.h).
+  // Returns the cost.
+  double MinimizePoints(const MinimizePointOptions& options);
 
  private:
   using RowMajorMatrix =
@@ -68,7 +70,7 @@ class BundleReducer {
     int block = 0;
     RowMajorMatrix values;
   };
-  // The part of the normal equations that the observations of a point make.
+  // The contribution of a point's observations to the normal equations.
   struct PointSums {
     struct Image {
       int block = 0;
@@ -76,25 +78,25 @@ class BundleReducer {
       Eigen::Matrix<double, 6, 3> mixed;
       Eigen::Matrix<double, 6, 1> gradient;
     };
-    // Those not constant.
+    // The images that are not constant.
     std::vector<Image> images;
-    // Their places in ascending order of blocks, by SortImages.
+    // Indices of `images` in ascending order of blocks, set by SortImages.
     std::vector<int> order;
     Eigen::Matrix3d information;
     Eigen::Vector3d gradient;
     double cost = 0.0;
-    // Of the damped information.
+    // Inverse of the damped information.
     Eigen::Matrix3d covariance;
 
     void SortImages();
   };
-  // What the points at hand add to one column of blocks.
+  // The contributions of the current points to one column of blocks.
   struct PointColumn {
     int block = 0;
-    // A point's place, and that of its image in the point's order.
+    // Index of a point, and of its image in the point's order.
     std::vector<std::pair<int, int>> images;
   };
-  // What a part of the points adds up to.
+  // Sums over a part of the points.
   struct Totals {
     double cost = 0.0;
     double largest_gradient = 0.0;
@@ -108,30 +110,31 @@ class BundleReducer {
   void AddPairsOfPoints();
 
   // Calls function(point, scratch, totals) for points kept apart, from `begin`,
-  // where a part begins, to `end`; appends to the totals of the parts.
+  // the first of a part, to `end`; appends to the totals of the parts.
   template <typename Function>
   void ForEachPoint(size_t begin, size_t end, const Function& function,
                     std::vector<Totals>* parts) const;
   static Totals AddUp(const std::vector<Totals>& parts);
   Totals LinearizePoints();
-  // Of the points from `begin` on.
+  // Linearises the points from `begin` on.
   void LinearizePoints(size_t begin, std::vector<PointSums>* points,
                        std::vector<Totals>* parts);
   void Sum(size_t point, PointSums* sums) const;
   void Damp(size_t point, PointSums* sums) const;
-  // Adds what is left of the points to the equations of the poses.
+  // Adds the points, eliminated, to the equations of the poses.
   void Eliminate(const std::vector<PointSums>& points);
   // Sets num_columns_ and the columns.
   void ListColumns(const std::vector<PointSums>& points);
   void AddToColumn(const std::vector<PointSums>& points,
                    const PointColumn& column);
-  // By the step of the poses; adds to `total`.
+  // Moves a point according to the step of the poses; adds to `total`.
   void MovePoint(const Eigen::VectorXd& step, size_t point,
                  const PointSums& sums, Step* total);
   void MoveOthers(const Eigen::VectorXd& step, Step* total);
   void DampPoses();
 
-  // Sets residuals_, blocks_ and, of keypoints, point_ and by_point_; the cost.
+  // Sets residuals_, blocks_ and, for keypoints, point_ and by_point_. Returns
+  // the cost.
   double Evaluate(ceres::ResidualBlockId id, bool is_robust);
   void AddRows();
   void AddPointRows();
@@ -147,41 +150,41 @@ class BundleReducer {
   std::vector<int> block_of_pose_;      // -1: constant.
   BlockMatrix matrix_;
   Eigen::VectorXd gradient_;
-  // Before the elimination.
+  // Gradient and diagonal before the elimination of points.
   Eigen::VectorXd whole_gradient_;
   Eigen::VectorXd diagonal_;
   double largest_gradient_ = 0.0;
 
-  // Of the points at hand. The first num_columns_ are in use; by block, the
-  // place of its column, or -1.
+  // The columns of the current points, the first num_columns_ in use.
+  // column_of_block_: by block, the index of its column, or -1.
   std::vector<PointColumn> columns_;
   size_t num_columns_ = 0;
   std::vector<int> column_of_block_;
 
-  // Of the damping.
+  // State of the damping.
   double inverse_radius_ = 0.0;
   Eigen::VectorXd scales_;
   std::vector<Eigen::Vector3d> point_scales_;
-  // Before the last step.
+  // Values before the last step.
   Eigen::VectorXd last_parameters_;
   std::vector<Eigen::Vector3d> last_points_;
 
-  // Of the residual block at hand.
+  // Of the current residual block.
   std::vector<double*> parameters_;
   std::vector<double*> pointers_;
   Eigen::VectorXd residuals_;
   std::vector<JacobianBlock> blocks_;
   const double* point_ = nullptr;
   RowMajorMatrix by_point_;
-  // Of the point at hand, when Ceres lists its observations.
+  // Of the current point, where the Ceres problem has its observations.
   const double* last_point_ = nullptr;
   Eigen::Matrix3d point_information_ = Eigen::Matrix3d::Zero();
   Eigen::Vector3d point_gradient_ = Eigen::Vector3d::Zero();
   std::vector<std::pair<int, PointColumns>> mixed_;
 };
 
-// Levenberg-Marquardt's, as in Ceres: scales from the diagonal of the first
-// linearisation, and what is added to a diagonal.
+// Levenberg-Marquardt damping as in Ceres: scales from the diagonal of the
+// first linearisation, and the amounts added to a diagonal.
 template <typename Vector>
 Vector DampingScales(const Vector& diagonal) {
   return (1.0 + diagonal.array().sqrt()).inverse();

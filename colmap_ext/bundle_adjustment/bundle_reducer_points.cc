@@ -11,10 +11,11 @@
 namespace adasfm {
 namespace {
 
-// Added up one by one, then by parts: the same for any number of threads.
+// Points of a part are summed one by one, then the parts: the same order for
+// any number of threads.
 constexpr size_t kNumPointsOfPart = 32;
-// Whose sums, some 10 kB a point, are in memory at the same time: as much as
-// the cache of a core holds.
+// Parts whose sums, some 10 kB a point, are in memory at the same time: as many
+// as fit into the cache of a core.
 constexpr size_t kNumPartsOfThread = 2;
 
 }  // namespace
@@ -119,7 +120,7 @@ void BundleReducer::Sum(size_t point, PointSums* sums) const {
     sums->gradient.noalias() += by_point.transpose() * residual;
     const int block = block_of_pose_[observation.pose - bundle_.Poses().data()];
     if (block < 0) continue;
-    // Twice in the same image.
+    // A track may observe the same image twice.
     const bool is_new =
         sums->images.empty() || sums->images.back().block != block;
     if (is_new) {
@@ -148,8 +149,8 @@ void BundleReducer::Damp(size_t point, PointSums* sums) const {
   if (!sums->covariance.allFinite()) sums->covariance.setZero();
 }
 
-// Column by column: each is added to by one thread, in the order of the points,
-// and stays in the processor's cache meanwhile.
+// One thread adds to each column, in the order of the points; the column stays
+// in the processor's cache meanwhile.
 void BundleReducer::Eliminate(const std::vector<PointSums>& points) {
   ListColumns(points);
   ParallelFor(num_threads_, num_columns_,
@@ -179,7 +180,7 @@ void BundleReducer::ListColumns(const std::vector<PointSums>& points) {
 
 void BundleReducer::AddToColumn(const std::vector<PointSums>& points,
                                 const PointColumn& column) {
-  // By the place of another block's column, that of its row in this one.
+  // Row of another block in this column, by the index of that block's column.
   std::vector<int> row_of_column(num_columns_, -1);
   const std::vector<int>& rows = matrix_.RowsOf(column.block);
   for (size_t k = 0; k < rows.size(); ++k) {
@@ -279,15 +280,15 @@ void BundleReducer::TakeBack() {
   }
 }
 
-double BundleReducer::SettlePoints(const SettlePointOptions& options) {
+double BundleReducer::MinimizePoints(const MinimizePointOptions& options) {
   bundle_.UpdatePoses();
   std::vector<Totals> parts;
-  const auto settle = [&](size_t point, PointSums*, Totals* part) {
+  const auto minimize = [&](size_t point, PointSums*, Totals* part) {
     part->cost +=
-        SettlePoint(options, bundle_.ObservationsOf(point),
-                    bundle_.ReprojectionLoss(), &bundle_.PointApart(point));
+        MinimizePoint(options, bundle_.ObservationsOf(point),
+                      bundle_.ReprojectionLoss(), &bundle_.PointApart(point));
   };
-  ForEachPoint(0, bundle_.NumPointsApart(), settle, &parts);
+  ForEachPoint(0, bundle_.NumPointsApart(), minimize, &parts);
   double cost = AddUp(parts).cost;
   for (const ceres::ResidualBlockId id : ids_) cost += Evaluate(id, true);
   return cost;

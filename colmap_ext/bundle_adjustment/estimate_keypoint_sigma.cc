@@ -14,10 +14,10 @@
 namespace adasfm {
 namespace {
 
-// A point of two images has one degree of freedom, whose median says little.
+// A point of two images has one degree of freedom; its median is of little use.
 constexpr size_t kMinTrackLength = 3;
 constexpr size_t kMinNumPoints = 100;
-// Of right observations 0.03 % err by more.
+// 0.03 % of correct observations err by more.
 constexpr double kMaxErrorPerSigma = 4.0;
 
 // The median of chi-square with k degrees of freedom over k.
@@ -39,9 +39,9 @@ double SquaredError(const colmap::Reconstruction& reconstruction,
   return (projected - XyOf(image.Point2D(element.point2D_idx))).squaredNorm();
 }
 
-// What the points and poses of one camera, or of all, tell of its sigma.
+// The data for the sigma of one camera, or of all.
 struct Residuals {
-  // Of each point, an estimate of sigma^2.
+  // An estimate of sigma^2 from each point.
   std::vector<double> variances;
   double num_dof_of_observations = 0.0;
   size_t num_images = 0;
@@ -57,7 +57,7 @@ struct Residuals {
   }
 };
 
-// None when the point lies behind an image, or when only two see it.
+// None for a point behind an image, or with fewer than three images.
 std::optional<double> EstimateVariance(
     const colmap::Reconstruction& reconstruction,
     const std::map<image_t, Rigid3d>& poses, const colmap::Point3D& point) {

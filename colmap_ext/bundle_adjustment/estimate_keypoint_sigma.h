@@ -10,29 +10,30 @@
 namespace adasfm {
 
 // 1 sigma of a keypoint's position per axis, in px, from the residuals of an
-// adjusted reconstruction. Of a point that n images see, the squared residuals
-// over sigma^2 are chi-square with k = 2 n - 3 degrees of freedom; the median
-// over the points of their sum / (k (1 - 2 / (9 k))^3), which is sigma^2 for
-// every k, does not feel wrong matches. The poses, which were adjusted to the
-// same residuals, are allowed for by the share of the degrees of freedom that
-// they took. Errors that keypoints have in common (calibration, forward motion)
-// leave no residuals: variance_components.h looks for those.
+// adjusted reconstruction. For a point that n images see, the sum of the
+// squared residuals over sigma^2 is chi-square with k = 2 n - 3 degrees of
+// freedom. The median over the points of sum / (k (1 - 2 / (9 k))^3) is sigma^2
+// for every k, and robust against wrong matches. It is corrected for the share
+// of the degrees of freedom that the poses took, which were adjusted to the
+// same residuals. Errors that keypoints share (calibration, forward motion)
+// leave no residuals; variance_components.h estimates those.
 struct KeypointSigmas {
-  // None with less than a hundred points of three images or more.
+  // None with fewer than a hundred points of three images or more, or where the
+  // poses took half of the degrees of freedom.
   std::optional<double> of_all_px;
-  // Of each camera of several, from the points that no other camera observes: a
-  // blurred lens has no part in the residuals of a sharp one. Cameras with less
-  // than a hundred such points are missing.
+  // For each camera of several, from the points that no other camera observes,
+  // so that a blurred lens does not affect a sharp one. Cameras with fewer than
+  // a hundred such points are missing.
   std::map<camera_t, double> of_cameras_px;
 };
 
 KeypointSigmas EstimateKeypointSigmas(
     const colmap::Reconstruction& reconstruction);
 
-// The largest reprojection error of a right observation of an adjusted
+// The largest reprojection error of a correct observation of an adjusted
 // reconstruction: min_error_px, or four sigmas of its keypoints where that is
-// more. A threshold below the noise takes right observations away, and what is
-// left understates the noise.
+// more. A threshold below the noise would remove correct observations, and the
+// remaining ones would understate the noise.
 double MaxReprojErrorPx(double min_error_px,
                         const colmap::Reconstruction& reconstruction);
 

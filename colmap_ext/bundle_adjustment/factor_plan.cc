@@ -11,22 +11,22 @@
 namespace adasfm {
 namespace {
 
-// Beyond so many blocks (1.2 GB) of the factor a point is one for each group of
-// its images of which any two share three points: of 30,000 images 12 to 37 %
-// of the pairs that see points together share fewer, which tell little of each
-// other, but take much of the memory (docs/reference/math.md). Where memory is
-// bounded they must share twice as many, and again, up to the last number.
+// If the factor has more blocks (1.2 GB), a point becomes one for each group of
+// its images of which any two share three points. Of 30,000 images 12 to 37 %
+// of the pairs that see points together share fewer; such pairs constrain each
+// other little, but take much of the memory (docs/reference/math.md). Where
+// memory is bounded, the required number doubles, up to the last one.
 constexpr size_t kMaxNumBlocksWhole = 4000000;
 constexpr int kMinNumSharedPoints = 3;
 constexpr int kMaxMinNumSharedPoints = 48;
-// Measured on 30,000 images: a block of the equations, with the rows of its
-// numbers, one of their factor, and an observation with its part of its point.
+// Measured on 30,000 images: a block of the equations with its row indices, a
+// block of the factor, and an observation with its share of its point.
 constexpr double kBytesPerBlock = 440.0;
 constexpr double kBytesPerFactorBlock = 380.0;
 constexpr double kBytesPerObservation = 100.0;
 
-// The reduced camera system. Priors tie images of one drive that see points
-// together anyway.
+// The reduced camera system. Priors need no more blocks: the images that they
+// tie see common points anyway.
 struct SystemSize {
   explicit SystemSize(const Covisibility& covisibility)
       : num_factor_blocks(
@@ -45,7 +45,7 @@ struct SystemSize {
   size_t num_factor_blocks = 0;
 };
 
-// What the points leave of the memory that the process may take.
+// The memory that the process may still take, without that of the points.
 double MaxSystemBytes(double max_memory_gb, const std::set<image_t>& images,
                       const colmap::Reconstruction& reconstruction) {
   if (max_memory_gb < 0.0) return std::numeric_limits<double>::infinity();

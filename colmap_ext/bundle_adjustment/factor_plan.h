@@ -14,13 +14,13 @@ namespace adasfm {
 // Cholesky factor.
 struct FactorPlan {
   // Whether the factor is no larger than that of max_num_images_sparse images
-  // that all see each other. Drives, nearly banded, stay far below.
+  // that all see each other. Drives are nearly banded and stay far below.
   bool is_small = true;
   // Images that share fewer points count as sharing none: 1, or more where the
   // factor is large or memory short (docs/reference/math.md).
   int min_num_shared_points = 1;
-  // The pairs that do share them, by which the tracks of points are cut; only
-  // where min_num_shared_points is above 1.
+  // The pairs that share enough points, by which tracks are cut; only where
+  // min_num_shared_points is above 1.
   std::optional<Covisibility> cut;
 };
 

@@ -22,18 +22,18 @@ using PoseJacobian = Eigen::Matrix<double, 3, 6, Eigen::RowMajor>;
 using Jacobian3 = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
 
 // 1 sigma, per axis, of a bias, and of its walk over a second: five times the
-// figure of a usual chip, since errors of the axes' scales and of the tilt walk
+// figure of a usual chip, since errors of the axes' scales and of the tilt vary
 // with the motion, too.
 constexpr double kBiasSigmaMps2 = 0.3;
 constexpr double kBiasWalk = 1e-3;
 constexpr double kBiasWindowS = 5.0;
-// Of the unit, which was found from the same log.
+// 1 sigma of the unit, which was estimated from the same log.
 constexpr double kUnitSigma = 0.2;
-// Fewer do not tell gravity, bias, unit and noise.
+// Fewer factors do not determine gravity, bias, unit and noise.
 constexpr size_t kMinNumFactors = 10;
 constexpr double kMinNoise = 1e-4;
 
-// What all factors share.
+// The unknowns that all factors share.
 struct SharedMotion {
   std::vector<double> gravity = {0.0, 0.0, 0.0};
   std::vector<double> bias = {0.0, 0.0, 0.0};
@@ -46,10 +46,10 @@ struct Factor {
   std::vector<image_t> images;
   const AdjustedPose* poses[3] = {nullptr, nullptr, nullptr};
 
-  // Of white noise of 1. One factor alone errs by sqrt(2/3) of it, but half of
-  // its time is its neighbours', too: what bends a model, and what vision can
-  // contradict, is what they err by together, as independent ones of this sigma
-  // do.
+  // 1 sigma for white noise of 1. One factor alone errs by sqrt(2/3) of it, but
+  // shares half of its time with its neighbours. Their joint error, which
+  // deforms a model and which vision can contradict, is that of independent
+  // factors with this sigma.
   double UnitSigma() const {
     return std::sqrt(0.5 * (motion1->dt_s + motion2->dt_s));
   }
@@ -59,8 +59,8 @@ struct Factor {
   }
 };
 
-// Of motions that follow each other, the first, where has_image holds for all
-// three images.
+// The first of each two consecutive motions where has_image holds for all three
+// images.
 template <typename HasImage>
 std::vector<size_t> FindMotionPairs(const std::vector<InertialMotion>& motions,
                                     const HasImage& has_image) {
@@ -96,7 +96,8 @@ std::vector<Factor> FindFactors(const std::vector<InertialMotion>& motions,
   return factors;
 }
 
-// With the poses held, robust (Cauchy) at the median. Returns the noise.
+// Fits the unknowns at fixed poses, robustly (Cauchy) with the median as scale.
+// Returns the noise.
 double FitSharedMotion(const std::vector<Factor>& factors,
                        const double* extrinsic_rotation, SharedMotion* shared) {
   constexpr int kNumUnknowns = 7;
@@ -191,13 +192,13 @@ bool InertialCost::Evaluate(double const* const* parameters, double* residuals,
   Eigen::Vector3d error = -mean_dt_s_ * gravity;
   Eigen::Matrix3d error_by_bias = Eigen::Matrix3d::Zero();
   Eigen::Vector3d error_by_unit = Eigen::Vector3d::Zero();
-  Eigen::Matrix3d error_by_turn = Eigen::Matrix3d::Zero();
+  Eigen::Matrix3d error_by_rotation = Eigen::Matrix3d::Zero();
   for (int k = 0; k < kNumPoses; ++k) {
     const Eigen::Matrix3d world_from_cam = poses_[k]->rotation.transpose();
     error += by_center_[k] * poses_[k]->center;
     error_by_bias -= world_from_cam * by_bias_[k];
     error_by_unit -= world_from_cam * (in_cam_[k] + turn.cross(measured_[k]));
-    error_by_turn += unit * world_from_cam * Hat(measured_[k]);
+    error_by_rotation += unit * world_from_cam * Hat(measured_[k]);
   }
   error += error_by_bias * bias + error_by_unit * unit;
   Eigen::Map<Eigen::Vector3d> whitened(residuals);
@@ -228,7 +229,7 @@ bool InertialCost::Evaluate(double const* const* parameters, double* residuals,
   }
   if (jacobians[kNumPoses + 3] != nullptr) {
     Eigen::Map<Jacobian3> jacobian(jacobians[kNumPoses + 3]);
-    jacobian = inverse_sigma_ * error_by_turn;
+    jacobian = inverse_sigma_ * error_by_rotation;
   }
   return true;
 }
@@ -277,12 +278,12 @@ InertialTerms AddInertialFactors(const PriorBundleAdjustmentOptions& options,
   const std::vector<Factor> factors = FindFactors(motions, *bundle);
   if (factors.size() < kMinNumFactors) return {};
   SharedMotion shared;
-  // Without lengths the shape would follow it.
-  const bool knows_turn = std::any_of(
+  // Without lengths the model's shape would follow the rotation error.
+  const bool knows_rotation = std::any_of(
       factors.begin(), factors.end(),
       [](const Factor& factor) { return factor.motion1->by_wheels; });
-  double* turn = knows_turn ? bundle->ExtrinsicRotation()
-                            : bundle->AddParameters({0.0, 0.0, 0.0});
+  double* turn = knows_rotation ? bundle->ExtrinsicRotation()
+                                : bundle->AddParameters({0.0, 0.0, 0.0});
   const double noise_at_start = FitSharedMotion(factors, turn, &shared);
   const double noise = options.accelerometer_noise > 0.0
                            ? options.accelerometer_noise
@@ -308,7 +309,7 @@ InertialTerms AddInertialFactors(const PriorBundleAdjustmentOptions& options,
     bundle->AddVelocityTerm(factor.Cost(sigma_factor * noise), factor.images,
                             {gravity, bias, unit, turn});
   }
-  if (!knows_turn) bundle->CeresProblem()->SetParameterBlockConstant(turn);
+  if (!knows_rotation) bundle->CeresProblem()->SetParameterBlockConstant(turn);
   return {noise, unit};
 }
 

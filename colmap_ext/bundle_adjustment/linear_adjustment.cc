@@ -10,7 +10,7 @@
 namespace adasfm {
 namespace {
 
-// A share near zero says that nothing but the priors holds the motions.
+// A share near zero means that only the priors constrain the motions.
 constexpr double kMinShare = 0.005;
 
 }  // namespace

@@ -9,38 +9,38 @@
 
 namespace adasfm {
 
-// What a linearised adjustment comes to with other sigmas of its priors.
+// Solves a linearised adjustment with other sigmas of its priors.
 //
-// Method: the normal equations of the reduced system, factorised once for each
-// set of sigmas; robust weights of the priors by the residuals of the call
-// before. CHOLMOD factorises: with Eigen's scalar factorisation this was 29 %
-// of the mapper's time on 1,000 images. The traces of the hat matrix come from
-// random signs on all rows (Hutchinson), each one solve: with kNumProbes the
-// standard deviation of a redundancy is at most sqrt(2 (1 - share) n /
-// kNumProbes) of n residuals.
+// Method: the normal equations of the reduced system are factorised once for
+// each set of sigmas; robust weights of the priors come from the residuals of
+// the previous call. CHOLMOD factorises: Eigen's scalar factorisation took 29 %
+// of the mapper's time on 1,000 images. The traces of the hat matrix are
+// estimated with random signs on all rows (Hutchinson), one solve each: with
+// kNumProbes the standard deviation of a redundancy is at most
+// sqrt(2 (1 - share) n / kNumProbes) of n residuals.
 class LinearAdjustment {
  public:
   static constexpr int kNumProbes = 4;
 
-  // Kept by reference; it holds the priors' information while it is
-  // factorised.
+  // The system is kept by reference; while it is factorised, its matrix
+  // contains the priors' information.
   LinearAdjustment(ReducedSystem* system, double prior_loss_scale);
   ~LinearAdjustment();
 
   // Steps to the optimum with the priors' sigmas times these factors (on top of
-  // those of the adjustment), and fills in the components there, with their
-  // redundancies. False when the equations are not positive definite.
+  // those of the adjustment), and sets the components at the optimum, with
+  // their redundancies. False when the equations are not positive definite.
   bool Solve(const PriorSigmaFactors& factors, PriorComponents* components);
-  // Of the unit that an accelerometer tells, at the factors of the last Solve;
-  // 0 where none does.
+  // Variance of the unit, which an accelerometer determines, at the factors of
+  // the last Solve; 0 without one.
   double UnitVariance() const;
 
  private:
   // One vector for each of the system's prior rows.
   using RowValues = std::vector<Eigen::VectorXd>;
 
-  // Calls function(row, column, number of the value) for the values of the
-  // lower triangle that the i-th rows add to; row and column are theirs.
+  // Calls function(row, column, index of the value) for the values of the lower
+  // triangle that the i-th rows add to; row and column index their `columns`.
   template <typename Function>
   void ForEachValueOf(size_t i, const Function& function) const;
   void FindChangedValues();
@@ -54,12 +54,12 @@ class LinearAdjustment {
 
   ReducedSystem& system_;
   const double loss_scale_;
-  // In the adjustment's sigmas.
+  // In units of the adjustment's sigmas.
   RowValues residuals_;
-  // Square roots; the factors of the sigmas are in them.
+  // Square roots of the weights, including the factors of the sigmas.
   std::vector<double> weights_;
-  // The values of system_.rest that the priors add to: where they are, in
-  // order, and what they are without priors.
+  // The values of system_.rest that the priors add to: their indices in
+  // ascending order, and their values without priors.
   std::vector<int> changed_;
   std::vector<double> without_priors_;
   struct Factorization;

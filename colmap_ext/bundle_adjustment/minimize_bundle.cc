@@ -13,19 +13,20 @@
 namespace adasfm {
 namespace {
 
-// Of the decrease that the linearised residuals predict.
+// Share of the decrease that the linearised residuals predict.
 constexpr double kMinRelativeDecrease = 1e-3;
 constexpr double kMaxRadius = 1e16;
 constexpr double kMinRadius = 1e-32;
-// Of the residual's norm, for steps without a factorisation of their own. Costs
-// of drives of 1,000 and 4,000 images agree to nine digits with exact steps'.
+constexpr int kMaxNumInvalidSteps = 10;  // One after another.
+// Relative residual of a step by conjugate gradients. Costs of drives of 1,000
+// and 4,000 images agree to nine digits with those of exact steps.
 constexpr double kStepTolerance = 1e-6;
-// An iteration of conjugate gradients waits for memory; for each of the
-// factor's entries a factorisation makes so many operations meanwhile (45 to 75
-// on those drives and on 30,000 images).
+// Conjugate gradients are bound by memory access: in the time of one iteration
+// a factorisation makes this many operations for each entry of the factor (45
+// to 75 on those drives and on 30,000 images).
 constexpr double kOperationsPerEntry = 60.0;
-// What has been freed on the way to the equations of thousands of images takes
-// as much as a tenth of all memory, beside the factor.
+// Memory that was freed while the equations of thousands of images were built
+// is as much as a tenth of all memory, beside the factor.
 constexpr int kMinNumResidualsToRelease = 1000000;
 
 class TrustRegion {
@@ -49,7 +50,7 @@ class TrustRegion {
   double divisor_ = 2.0;
 };
 
-// For conjugate gradients, the factor of a matrix like theirs.
+// Preconditions conjugate gradients with the factor of a similar matrix.
 class FactorPreconditioner : public Eigen::IdentityPreconditioner {
  public:
   using Eigen::IdentityPreconditioner::IdentityPreconditioner;
@@ -89,7 +90,7 @@ class BundleMinimizer {
         return Finish(true, "no gradient is left");
       }
       if (!std::isfinite(cost_)) return Finish(false, "the cost is infinite");
-      // CHOLMOD has no factor of nothing.
+      // CHOLMOD cannot factorise an empty matrix.
       if (!HasFreePoses()) return Finish(true, "no pose is free");
       if (Iterate()) return summary_;
       if (region_.Radius() <= kMinRadius) {
@@ -140,7 +141,7 @@ class BundleMinimizer {
     return step;
   }
 
-  // Whether it has come to an end.
+  // Returns whether the minimisation has ended.
   bool Iterate() {
     const std::optional<Eigen::VectorXd> step = SolveForStep();
     if (!step) return EndsWithInvalidStep();
@@ -150,15 +151,15 @@ class BundleMinimizer {
       return EndsWithInvalidStep();
     }
     num_invalid_steps_ = 0;
-    const double new_cost = reducer_.SettlePoints(
+    const double new_cost = reducer_.MinimizePoints(
         {options_.max_num_point_iterations, options_.function_tolerance});
     const double decrease = cost_ - new_cost;
     const bool is_short = std::sqrt(moved.squared_length) <=
                           options_.tolerance * (std::sqrt(moved.squared_norm) +
                                                 options_.tolerance);
     if (is_short || std::abs(decrease) <= options_.function_tolerance * cost_) {
-      // Ceres goes without the last step; the softest directions are nearer to
-      // the minimum with it.
+      // Ceres omits the last step; with it the most weakly constrained
+      // directions are nearer to the minimum.
       if (decrease > 0.0) {
         cost_ = new_cost;
       } else {
@@ -181,7 +182,7 @@ class BundleMinimizer {
   bool EndsWithInvalidStep() {
     region_.Reject();
     has_factor_ = false;  // Conjugate gradients may be what failed.
-    if (++num_invalid_steps_ < options_.max_num_invalid_steps) return false;
+    if (++num_invalid_steps_ < kMaxNumInvalidSteps) return false;
     Finish(false, "too many invalid steps");
     return true;
   }
@@ -191,7 +192,7 @@ class BundleMinimizer {
   TrustRegion region_;
   OrderedCholesky factorization_;
   bool has_factor_ = false;
-  // Conjugate gradients' iterations that take the time of a factorisation.
+  // Iterations of conjugate gradients that take the time of a factorisation.
   int max_num_gradients_ = 0;
   MinimizeBundleSummary summary_;
   double cost_ = 0.0;

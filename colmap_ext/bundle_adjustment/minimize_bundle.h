@@ -3,7 +3,7 @@
 
 #include <string>
 
-#include "colmap_ext/bundle_adjustment/settle_point.h"
+#include "colmap_ext/bundle_adjustment/minimize_point.h"
 
 namespace adasfm {
 
@@ -13,18 +13,18 @@ struct MinimizeBundleOptions {
   int max_num_iterations = 50;
   // Relative change of the cost at which the minimum is found.
   double function_tolerance = 1e-5;
-  // Of gradients and, relative to the parameters, of steps.
+  // Limit of gradients and, relative to the parameters, of steps.
   double tolerance = 1e-12;
-  // Of the trust region at first; the damping is its inverse.
+  // Initial radius of the trust region; the damping is its inverse.
   double initial_radius = 1e4;
-  int max_num_invalid_steps = 10;  // One after another.
-  // Of a point alone, after each step of all (settle_point.h).
-  int max_num_point_iterations = SettlePointOptions().max_num_iterations;
-  int num_threads = 1;  // 1: OpenMP has none either.
+  // Iterations of each point alone, after each joint step (minimize_point.h).
+  int max_num_point_iterations = MinimizePointOptions().max_num_iterations;
+  int num_threads = 1;  // For the loops of BundleReducer.
 };
 
 struct MinimizeBundleSummary {
-  // Whether the parameters may be used: they never cost more than before.
+  // Whether the parameters may be used. Their cost never exceeds the initial
+  // one.
   bool success = false;
   // The start counts as one.
   int num_iterations = 0;
@@ -40,9 +40,9 @@ struct MinimizeBundleSummary {
 // Method: Levenberg-Marquardt with the rules of Ceres for damping, acceptance
 // and end; the normal equations of bundle_reducer.h, factorised by CHOLMOD or,
 // where that takes longer, solved by conjugate gradients with the last factor
-// as preconditioner. Unlike in Ceres points go on alone after each step, and
-// the last step is kept. On failure, where no step is possible, the parameters
-// are the best found.
+// as preconditioner. Unlike in Ceres, each point is minimised alone after each
+// step, and the last step is kept. On failure, where no step is possible, the
+// parameters are the best found.
 MinimizeBundleSummary MinimizeBundle(const MinimizeBundleOptions& options,
                                      BundleProblem* bundle);
 

@@ -7,9 +7,9 @@
 namespace adasfm {
 
 // CHOLMOD's supernodal factorisation of the lower triangle of a matrix that is
-// in a fill-reducing order already (BlockMatrix::Reorder). Without an order of
-// its own CHOLMOD holds no permuted copies of the matrix beside the factor, and
-// no graph of its rows. It prints nothing: the caller says what failed.
+// in a fill-reducing order already (BlockMatrix::Reorder). Without its own
+// ordering, CHOLMOD keeps no permuted copies of the matrix beside the factor,
+// and no graph of its rows. It prints nothing: the caller reports failures.
 class OrderedCholesky
     : public Eigen::CholmodSupernodalLLT<Eigen::SparseMatrix<double>> {
  public:

@@ -15,7 +15,7 @@
 namespace adasfm {
 namespace {
 
-// Beyond so many loss scales a position is left out.
+// Positions beyond so many loss scales are left out.
 constexpr double kMaxDistance = 2.0;
 
 using PoseJacobian = Eigen::Matrix<double, 3, 6, Eigen::RowMajor>;
@@ -105,7 +105,7 @@ bool VerticalCost::Evaluate(double const* const* /*parameters*/,
 
 namespace {
 
-// The whitened distance of a position from where the poses have it now.
+// The whitened distance of a position from its prediction by the poses.
 double WhitenedDistance(const PositionPrior& prior,
                         const BundleProblem& bundle) {
   const AdjustedPose* pose1 = bundle.UsedPose(prior.image_id1);
@@ -117,10 +117,10 @@ double WhitenedDistance(const PositionPrior& prior,
   return residuals.norm();
 }
 
-// Those that take part and are no further off than kMaxDistance loss scales,
-// or as many times as much as half of the positions are more off than normal
-// ones: a model that is bent is drawn in, while what jumps alone in a model
-// that fits has no say at all.
+// The positions that take part and are at most kMaxDistance loss scales off.
+// The limit grows with the median distance where that exceeds its value for
+// normal errors. Positions thus correct a deformed model, while single jumps in
+// a model that fits have no effect.
 std::vector<PositionPrior> SelectPositions(
     double loss_scale, const std::vector<PositionPrior>& positions,
     const BundleProblem& bundle) {

@@ -51,12 +51,12 @@ class VerticalCost final : public ceres::CostFunction {
   const AdjustedPose* pose_;
 };
 
-// Fewer positions leave the frame open.
+// With fewer positions the gauge stays free.
 inline constexpr int kMinNumPositionsForGauge = 3;
 
-// Adds the problem's positions, each with a Cauchy loss from loss_scale sigmas
-// on, and with them the verticals. Positions that are far off where most are
-// near are left out. Returns the number of positions; with fewer than
+// Adds the problem's positions, with a Cauchy loss from loss_scale sigmas on,
+// and the verticals. Positions that are far off where most are near are left
+// out. Returns the number of positions; with fewer than
 // kMinNumPositionsForGauge nothing is added.
 int AddPositionPriors(double loss_scale,
                       const PriorBundleAdjustmentProblem& problem,

@@ -12,9 +12,10 @@
 namespace adasfm {
 namespace {
 
-// Terms count at most three sigmas, of those stated or of those found when they
-// are larger: beyond that the adjustment's loss takes a term for an outlier
-// (prior_loss_scale in bundle_adjustment.h), which says nothing of the others.
+// Terms count at most three sigmas, stated or estimated, whichever is larger:
+// beyond that the adjustment's loss treats a term as an outlier
+// (prior_loss_scale in bundle_adjustment.h), which is no evidence about the
+// others.
 constexpr double kMaxNumSigmas = 3.0;
 constexpr double kMeanSquareTolerance = 1e-3;
 // Fewer terms of a kind than this are no statistic.
@@ -23,9 +24,9 @@ constexpr int kMinNumTerms = 10;
 constexpr std::array<int, kNumPriorTerms> kNumDof = {3, 2, 1, 3, 3};
 
 // Huber's estimate of a scale, with its cap: the mean m of the squares, each at
-// most 3^2 max(1, m). The search begins at the plain mean and only falls, so
-// that errors which most terms share are told in full, and a few large ones,
-// up to one term in nine, are not.
+// most 3^2 max(1, m). The search begins at the plain mean and only falls.
+// Errors that most terms share count in full; a few large ones, up to one term
+// in nine, do not.
 double ComputeCappedMean(const std::vector<double>& squares, int num_dof) {
   double mean = std::numeric_limits<double>::infinity();
   double last = 0.0;
@@ -58,7 +59,8 @@ TermErrors ErrorsOf(const Rigid3d& motion, const Rigid3d& prior) {
   return errors;
 }
 
-// Of the motion between the prior's images; none when one is missing.
+// The errors of the motion between the prior's images; none when one is
+// missing.
 std::optional<TermErrors> ErrorsAt(
     const PosePriorEdge& edge, const colmap::Reconstruction& reconstruction) {
   if (!IsRegistered(reconstruction, edge.image_id1) ||

@@ -25,18 +25,18 @@ struct ReducedPriorRows {
 //   + sum over the rows r, J of priors of |r + J x|^2 / 2.
 // Its columns are those of bundle_reducer.h.
 struct ReducedSystem {
-  // Keypoints, and what is neither keypoint nor prior between two images: what
-  // is believed of shared errors and mounts, positions. The lower triangle,
-  // with zeros where the priors' rows would add.
+  // Keypoints, and everything else but the priors between two images: priors of
+  // shared errors and rig extrinsics, positions. The lower triangle, with zeros
+  // where the priors' rows would add.
   Eigen::SparseMatrix<double> rest;
   Eigen::VectorXd rest_gradient;
   std::vector<ReducedPriorRows> priors;
-  // Of the units a metre as an accelerometer tells them; -1 where none does.
+  // Column of the model's units per metre; -1 without an accelerometer.
   int unit_column = -1;
 };
 
-// With the robust weights of all but the priors as they are; priors have none.
-// unit: the parameter of unit_column.
+// The robust weights of all but the priors are applied; priors have none. unit:
+// the parameter of unit_column.
 std::unique_ptr<ReducedSystem> BuildReducedSystem(BundleProblem* bundle,
                                                   const double* unit = nullptr);
 

@@ -84,8 +84,8 @@ void SharedErrorBlocks::AddPriors(ceres::Problem* problem) {
   AddDirectionDriftPriors(problem);
 }
 
-// A random walk: once its first value is believed, each next one only by its
-// step, or a constant bias would be held back once a window.
+// A random walk: the first value has a prior, each later value only a prior on
+// its step. Priors on all values would penalise a constant bias once a window.
 void SharedErrorBlocks::AddGyroscopePriors(ceres::Problem* problem) {
   const double sigma = options_.gyroscope_bias_sigma_rad_s;
   const double step_sigma = options_.gyroscope_random_walk_rad_s_sqrt_s *
@@ -104,8 +104,8 @@ void SharedErrorBlocks::AddGyroscopePriors(ceres::Problem* problem) {
   }
 }
 
-// A stationary process: its first value has the sigma, each next one decays
-// towards zero and is stirred as much as keeps the sigma.
+// A stationary process: the first value has the sigma; each later value decays
+// towards zero, with process noise that keeps the sigma.
 void SharedErrorBlocks::AddDirectionDriftPriors(ceres::Problem* problem) {
   const double sigma = direction_drift_sigma_rad_;
   const double decay =

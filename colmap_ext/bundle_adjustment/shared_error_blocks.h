@@ -15,24 +15,23 @@
 namespace adasfm {
 
 // The errors that the priors of an adjustment share, as parameters of three
-// numbers each (shared_errors.h). Errors that no prior has part in do not take
-// part.
+// numbers each (shared_errors.h). Errors that affect no prior are not used.
 class SharedErrorBlocks {
  public:
-  // The edges' windows are set (AssignSharedErrorWindows).
+  // The windows of the edges must be set (AssignSharedErrorWindows).
   SharedErrorBlocks(const SharedErrorOptions& options,
                     const std::vector<PosePriorEdge>& edges);
   SharedErrorBlocks(const SharedErrorBlocks&) = delete;
   SharedErrorBlocks& operator=(const SharedErrorBlocks&) = delete;
 
-  // Those that the term of an edge has part in.
+  // The errors that affect a term of an edge; they are used from then on.
   std::vector<double*> ParametersOf(const PosePriorEdge& edge,
                                     const PosePriorCost& cost,
                                     PosePriorCost::Term term);
-  // What is believed of the errors that terms have part in. The problem owns no
-  // costs; these live as long as this object.
+  // Adds the priors of the errors that terms use. The problem owns no costs;
+  // these live as long as this object.
   void AddPriors(ceres::Problem* problem);
-  // The rotation by which T_cam_imu is wrong; it takes part from then on.
+  // The rotation error of T_cam_imu; it is used from then on.
   double* ExtrinsicRotation(ceres::Problem* problem);
 
   std::vector<double*> Used();
@@ -57,7 +56,7 @@ class SharedErrorBlocks {
   static constexpr size_t kGyroscopeBias = 2;  // of the first window
   const SharedErrorOptions options_;
   double direction_drift_sigma_rad_ = 0.0;
-  // Where the windows of the direction's drift begin.
+  // Index of the first window of the direction's drift.
   size_t direction_drift_ = kGyroscopeBias;
   std::vector<Block> blocks_;
   std::vector<std::unique_ptr<ceres::CostFunction>> costs_;

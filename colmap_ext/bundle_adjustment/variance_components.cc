@@ -17,34 +17,34 @@
 namespace adasfm {
 namespace {
 
-// Made-up keypoints have no noise, and weights need an end.
+// Synthetic keypoints have no noise; weights need a bound.
 constexpr double kMinKeypointSigmaPx = 0.02;
 // Relative change of the cost at which an adjustment of the search ends.
 constexpr double kSearchFunctionTolerance = 1e-3;
-// Steps of the search: small ones would only repeat the adjustment.
+// Factors of the sigma per step; smaller ones would only repeat the adjustment.
 constexpr double kMinStep = 1.25;
 constexpr double kMaxStep = 2.0;
-// Where the priors' sigmas are found the model is as good as in its last
-// adjustment; the linear step does the rest.
+// Before the priors' sigmas are estimated. The model is as good as after its
+// last adjustment; the linear step makes up for the remainder.
 constexpr int kNumIterationsBeforeSigmas = 1;
-// Sigmas of priors are lowered to this share at most, as the importer grants
-// noise figures that factor, and not raised. That of velocities begins as a
-// guess, with vision's noise.
+// Sigmas of priors are lowered to this share at most, the factor that the
+// importer allows for noise figures, and not raised. The sigma of velocities
+// starts as a guess that contains vision's noise.
 constexpr PriorSigmaFactors kMinSigmaFactors = {0.2, 0.2, 0.2, 0.2, 0.02};
 constexpr PriorSigmaFactors kMaxSigmaFactors = {1.0, 1.0, 1.0, 1.0, 10.0};
-// The search for them, each step a linear one, ends when none changes by more.
+// The search for the factors, in linear steps, ends when none changes by more.
 constexpr double kMaxSigmaChange = 1.03;
 constexpr int kMaxNumSigmaSteps = 20;
 
 struct PriorSigmaEstimate {
   PriorSigmaFactors factors = kStatedPriorSigmas;
-  // At these sigmas.
+  // The components at these sigmas.
   PriorComponents components;
 };
 
-// Lowers the sigmas that the residuals refute as too large, as far as one
-// standard deviation of the estimate goes, and finds those of velocities. None
-// when the system is singular.
+// Lowers the sigmas that the residuals show to be too large, to the estimate
+// plus one standard deviation, and estimates that of velocities. None when the
+// system is singular.
 std::optional<PriorSigmaEstimate> EstimatePriorSigmas(
     LinearAdjustment* linear) {
   PriorSigmaEstimate estimate;
@@ -95,7 +95,7 @@ class VarianceComponentAdjustment {
     given_.keypoint_sigma_px =
         std::max(kMinKeypointSigmaPx,
                  sigmas.of_all_px.value_or(options.keypoint_sigma_px));
-    // Follows the noise, not what keypoints have in common.
+    // The loss scale follows the noise, not the errors that keypoints share.
     options_.reproj_loss_scale_px *=
         given_.keypoint_sigma_px / options.keypoint_sigma_px;
     for (const auto& [camera_id, sigma_px] : sigmas.of_cameras_px) {
@@ -136,21 +136,21 @@ class VarianceComponentAdjustment {
         std::max(summary.min_num_shared_points, before.min_num_shared_points);
   }
 
-  // The linear system's factorisation has been timed on less than that only.
+  // The linear system's factorisation has been timed below this size only.
   bool IsSmallEnough() const {
     return static_cast<int>(problem_.images.size()) <=
            options_.max_num_images_sparse;
   }
 
-  // For the redundancies of the priors, which an estimate of their sigmas has
-  // found already as long as keypoints weigh the same.
+  // For the redundancies of the priors. An estimate of the priors' sigmas has
+  // found them already, as long as the keypoint sigma stays the same.
   bool NeedsSystem() const {
     return is_final_ && balance_.estimate_keypoint_sigma &&
            !problem_.priors.empty() && IsSmallEnough() &&
            redundancies_factor_ != factor_;
   }
 
-  // At the poses as they are, with the shares of the last estimate.
+  // The components at the present poses, with the shares of the last estimate.
   PriorComponents Components() const {
     PriorComponents components = ComputePriorComponents(
         options_.prior_sigma_factors,
@@ -163,8 +163,8 @@ class VarianceComponentAdjustment {
     return components;
   }
 
-  // While keypoints weigh what their residuals show: a larger sigma would
-  // explain what is left of the priors by itself.
+  // Runs before the keypoint sigma is raised: a larger one would explain the
+  // residuals of the priors by itself.
   void EstimateSigmas() {
     PriorBundleAdjustmentOptions options = options_;
     options.keypoint_sigma_px = given_.keypoint_sigma_px * factor_;
@@ -182,8 +182,8 @@ class VarianceComponentAdjustment {
     redundancies_factor_ = factor_;
   }
 
-  // Where nothing is to be raised, the first adjustment is the last. The search
-  // needs no last digits.
+  // Where the sigma needs no raising, the first adjustment is the last. The
+  // search uses a looser tolerance.
   void RaiseKeypointSigma() {
     const double tolerance =
         std::max(given_.function_tolerance, kSearchFunctionTolerance);
@@ -228,10 +228,10 @@ class VarianceComponentAdjustment {
   double& factor_;
   colmap::Reconstruction& reconstruction_;
   PriorBundleAdjustmentSummary summary_;
-  // Linearised at its end, where asked for.
+  // The last adjustment linearised at its end, where needed.
   std::unique_ptr<ReducedSystem> system_;
-  // The newest known, and the factor of the keypoint sigma at which its
-  // redundancies were found.
+  // The newest components, and the factor of the keypoint sigma at which their
+  // redundancies were estimated.
   PriorComponents components_;
   double redundancies_factor_ = 0.0;
   double unit_sigma_ = 0.0;

@@ -17,7 +17,7 @@
 namespace adasfm {
 namespace {
 
-// Cameras are those of the model before, as far as it has adjusted them.
+// Takes the cameras of the previous model, where it has them.
 colmap::Reconstruction CreateReconstruction(
     const SceneData& scene, const std::map<image_t, Rigid3d>& cams_from_world,
     const colmap::Reconstruction& before) {
@@ -99,8 +99,9 @@ void FillFigures(const CoarseStructureOptions& options, CoarseModel* model) {
 void AlignInput(const SceneData& scene, CoarseModelInput* input,
                 PositionAlignment* alignment) {
   if (scene.positions.empty()) return;
-  *alignment = AlignSceneToPositions(scene, input->cams_from_world,
-                                     input->metric, input->camera_mount);
+  *alignment =
+      AlignSceneToPositions(scene, input->cams_from_world, input->metric,
+                            input->camera_imu_correction);
   if (!alignment->success) return;
   input->cams_from_world =
       TransformCamsFromWorld(alignment->enu_from_world, input->cams_from_world);
@@ -110,13 +111,13 @@ void AddPositions(const SceneData& scene, const CoarseModelInput& input,
                   PriorBundleAdjustmentProblem* problem) {
   problem->positions = scene.positions;
   Verticals verticals =
-      FindVerticals(scene, input.cams_from_world, input.camera_mount);
+      FindVerticals(scene, input.cams_from_world, input.camera_imu_correction);
   problem->gravity_in_cam = std::move(verticals.gravity_in_cam);
   problem->gravity_sigma_rad = verticals.sigma_rad;
 }
 
 // The threshold falls from round to round, geometrically; in the last one not
-// below the noise of the model before.
+// below the noise of the previous model.
 TrackTriangulationOptions TriangulationOptions(
     const CoarseStructureOptions& options, int round,
     const colmap::Reconstruction& before) {
@@ -139,7 +140,7 @@ TrackTriangulationOptions TriangulationOptions(
 
 struct RoundTracks {
   std::vector<Track> all;
-  // Of the rounds before the last, unless all images are keyframes.
+  // For the rounds before the last, unless all images are keyframes.
   std::vector<Track> within_keyframes;
   bool has_keyframes = false;
   size_t num_keyframes = 0;
@@ -152,7 +153,7 @@ struct RoundTracks {
 RoundTracks BuildRoundTracks(const CoarseStructureOptions& options,
                              const CoarseModelInput& input,
                              const std::set<image_t>& images) {
-  std::vector<Track> joined = JoinMatches(options.tracks, input.matches);
+  std::vector<Track> joined = BuildTracks(options.tracks, input.matches);
   const bool has_metres = input.metric && options.use_priors;
   const std::set<image_t> keyframes =
       has_metres
@@ -194,8 +195,8 @@ void BuildRound(const CoarseStructureOptions& options, const SceneData& scene,
       &model->reconstruction);
 }
 
-// The noise of keypoints, and its balance with the priors, mean something near
-// the optimum only, so the last round finds them.
+// The noise of keypoints and its balance with the priors are meaningful near
+// the optimum only, so the last round estimates them.
 PriorBundleAdjustmentSummary AdjustRound(
     const CoarseStructureOptions& options,
     const PriorBundleAdjustmentProblem& problem, int round,
@@ -227,8 +228,8 @@ std::set<camera_t> FindCameras(const colmap::Reconstruction& reconstruction,
   return camera_ids;
 }
 
-// The last round once more, after an adjustment that has found the focal
-// length, and the distortion where nobody measured it.
+// Repeats the last round after an adjustment of the focal lengths and, with
+// refine_lenses, of the distortion.
 void RepeatWithFreeLenses(
     CoarseStructureOptions options, const SceneData& scene,
     const std::map<image_t, std::vector<Bearing>>& bearings,
@@ -249,8 +250,8 @@ void RepeatWithFreeLenses(
                                       keypoint_sigma_factor));
 }
 
-// Refines the lenses that nobody knows where they are wrong, the known ones
-// held, then looks for errors of those, which it leaves.
+// Refines unknown lenses where they are wrong, with the known ones held. Then
+// tests the known ones, whose errors are only reported.
 void AdjustLenses(const CoarseStructureOptions& options, const SceneData& scene,
                   const std::map<image_t, std::vector<Bearing>>& bearings,
                   const CoarseModelInput& input, const RoundTracks& tracks,
@@ -330,7 +331,7 @@ CoarseModel BuildCoarseModel(
       &model.reconstruction);
   model.gravity_aligned =
       is_georeferenced ||
-      AlignToGravity(scene, &model.reconstruction, input.camera_mount);
+      AlignToGravity(scene, &model.reconstruction, input.camera_imu_correction);
   model.keypoint_sigma_px = model.rounds.back().keypoint_sigma_px;
   FillFigures(options, &model);
   return model;

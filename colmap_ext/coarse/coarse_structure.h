@@ -26,29 +26,30 @@ struct CoarseStructureOptions {
   TrackOptions tracks;
   TrackTriangulationOptions triangulation;
   PriorBundleAdjustmentOptions bundle;
-  // Vision that needs more than eight times its own noise to agree with the
-  // sensors contradicts them, which is to be said (priors_agree).
+  // Its max_sigma_factor is 8: vision that needs more than eight times its own
+  // noise to agree with the sensors contradicts them, as priors_agree reports.
   VarianceComponentOptions balance;
-  // The rounds before the last see points in keyframes only.
+  // Rounds before the last use points in keyframes only.
   KeyframeOptions keyframes;
   // Motion straight ahead leaves some images without points of a wide angle.
-  // Images with fewer points than this get those with the next smaller angles,
+  // Images with fewer points than this get those with the next smaller angles.
   int min_num_points_per_image = 40;
-  // down to this one.
+  // Smallest angle of such points.
   double min_angle_floor_deg = 1.0;
-  // Rounds of triangulation and adjustment; the largest reprojection error
-  // shrinks from triangulation.max_reproj_error_px to this, or to what the
-  // keypoints' noise asks for where that is more (MaxReprojErrorPx).
+  // Rounds of triangulation and adjustment. The largest reprojection error
+  // shrinks from triangulation.max_reproj_error_px to
+  // final_max_reproj_error_px, or to the limit by the keypoints' noise where
+  // that is more (MaxReprojErrorPx).
   int num_rounds = 3;
   double final_max_reproj_error_px = 4.0;
-  // Relative change of the cost at which the rounds before the last end: their
-  // points are dropped, so only the way matters, not the last digits.
+  // Relative change of the cost at which the rounds before the last end. Their
+  // points are discarded, so they need no last digits.
   double early_function_tolerance = 1e-3;
   // Sensor priors take part in the adjustment.
   bool use_priors = true;
   // Focal lengths that the database does not mark as known are adjusted when
-  // FindFocalLengthError finds them wrong, beside known ones that are held;
-  // of wrong ones among those is only told.
+  // FindFocalLengthError finds them wrong. Known ones are held, and their
+  // errors are only reported.
   bool refine_unknown_focal_length = true;
 
   CoarseStructureOptions() { balance.max_sigma_factor = 8.0; }
@@ -56,21 +57,21 @@ struct CoarseStructureOptions {
 };
 
 struct CoarseModelInput {
-  // One component's poses; images without matches are welcome.
+  // Poses of one component; images without matches are allowed.
   std::map<image_t, Rigid3d> cams_from_world;
-  // Whether their unit is the metre; otherwise the priors' lengths say nothing.
+  // Whether their unit is the metre; otherwise lengths of priors are not used.
   bool metric = false;
   // Verified matches that the view graph kept, both images in the component.
   std::map<ImagePair, std::vector<FeatureMatch>> matches;
-  // Those of images of other components are passed over.
+  // Priors on images of other components are ignored.
   std::vector<RelativePosePrior> priors;
-  // By which the cameras are turned against the scene's gravity directions;
-  // the priors have it already.
-  Eigen::Quaterniond camera_mount = Eigen::Quaterniond::Identity();
-  // Pairs told focal lengths and distortions of lenses that nobody measured
-  // (CalibrateFocalLengths), which the adjustment goes on with: points that
-  // many images see tell them better, and so do the sensors' rotations. Lenses
-  // that are known are held.
+  // Correction of the camera-IMU rotation for the scene's gravity directions;
+  // the priors include it already.
+  Eigen::Quaterniond camera_imu_correction = Eigen::Quaterniond::Identity();
+  // Whether pairs determined focal lengths and distortions of unknown lenses
+  // (CalibrateFocalLengths). The adjustment then refines them, since points in
+  // many images determine them better, and so do the sensors' rotations. Known
+  // lenses are held.
   bool refine_lenses = false;
 };
 
@@ -78,11 +79,11 @@ struct CoarseModel {
   // Poses of all images of the component, points, and all of their keypoints.
   colmap::Reconstruction reconstruction;
   bool metric = false;
-  // 1 sigma of the unit, as a ratio, where the accelerometer tells it; else 0.
+  // Relative 1 sigma of the unit, where the accelerometer set it; else 0.
   double inertial_scale_sigma = 0.0;
   // The world's z axis points up.
   bool gravity_aligned = false;
-  // To the scene's positions; if it succeeded, the world is their frame.
+  // Alignment to the scene's positions; on success the world is their frame.
   PositionAlignment positions;
   size_t num_tracks = 0;
   // Images that see points in the rounds before the last.
@@ -95,32 +96,32 @@ struct CoarseModel {
   // As in RefineModelSummary.
   double keypoint_sigma_px = 0.0;
   double prior_chi2_per_dof = 0.0;
-  // Whether vision and the priors agree within what the balance may ask for.
+  // Whether vision and the priors agree within the limits of the balance.
   bool priors_agree = true;
-  // FindFocalLengthError, of the focal lengths that the scene states: of the
-  // unknown ones or, where these are right or refined with their distortion, of
-  // the known ones.
+  // Result of FindFocalLengthError on the focal lengths that the scene states:
+  // the unknown ones or, where these are right or refined with their
+  // distortion, the known ones.
   std::optional<FocalLengthError> focal_length_error;
-  // The cameras are not the scene's any more.
+  // Whether the cameras differ from the scene's.
   bool cameras_refined = false;
   // Smallest triangulation angle that had to be accepted.
   double min_angle_deg = 0.0;
   // Images with fewer points than asked for, in spite of that.
   int num_images_with_few_points = 0;
   int num_images_without_points = 0;
-  // Of the verified pairs with the poses; measured by the stage.
+  // Agreement of the verified pairs with the poses; set by the stage.
   PairAgreement pair_agreement;
-  // Of the refined pairs; found by the stage.
+  // Best one of the refined pairs; set by the stage.
   std::optional<MapperStart> mapper_start;
   // One per round; the poses before a failed round are kept.
   std::vector<PriorBundleAdjustmentSummary> rounds;
 };
 
 // Step 2.7: tracks, points with an angle, and rounds of bundle adjustment with
-// priors and tightening thresholds. Points start afresh from the adjusted poses
-// in every round. With enough positions of GNSS, which then take part in the
+// priors and tightening thresholds. Every round triangulates points anew from
+// the adjusted poses. With enough GNSS positions, which then take part in the
 // adjustments, the world is their frame. Otherwise the unit of the poses is
-// kept, and the world is turned z-up when images know where the ground is.
+// kept, and the world is rotated z-up when images have gravity directions.
 CoarseModel BuildCoarseModel(
     const CoarseStructureOptions& options, const SceneData& scene,
     const std::map<image_t, std::vector<Bearing>>& bearings,

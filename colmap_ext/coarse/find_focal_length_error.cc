@@ -12,19 +12,19 @@ namespace {
 
 // Calibrations of one camera differ by some tenths of a per cent.
 constexpr double kMinRatio = 0.003;
-// Priors share errors from step to step, which the cost's change does not
-// show: against a measured focal length it takes many sigmas, and never less
-// than this sigma.
+// Priors share errors from step to step, which the cost's change does not show.
+// Against a measured focal length many sigmas are needed, and the sigma is
+// never less than kMinSigma.
 constexpr double kMinNumSigmas = 10.0;
 constexpr double kMinNumSigmasOfUnknown = 3.0;
 constexpr double kMinSigma = 0.001;
-// Straight on such errors pass for 8 % of focal length; turns tell.
+// Straight on, such errors pass for 8 % of focal length; turns separate them.
 constexpr double kMinTurnDeg = 20.0;
 // One focal length needs no more, and the time stays bounded.
 constexpr size_t kMaxNumImages = 300;
 
-// The consecutive images, by their priors, that turn most: a straight drive
-// says nothing of focal lengths.
+// The consecutive images, by their priors, with most rotation: a straight drive
+// does not observe focal lengths.
 PriorBundleAdjustmentProblem SelectImages(
     const PriorBundleAdjustmentProblem& problem) {
   const std::vector<PosePriorEdge>& priors = problem.priors;
@@ -52,7 +52,7 @@ PriorBundleAdjustmentProblem SelectImages(
   return selected;
 }
 
-// The farthest that the drive turns from its first direction.
+// The largest rotation from the drive's first orientation.
 double LargestTurnRad(const std::vector<PosePriorEdge>& priors) {
   Eigen::Quaterniond turned = Eigen::Quaterniond::Identity();
   double largest = 0.0;
@@ -64,7 +64,7 @@ double LargestTurnRad(const std::vector<PosePriorEdge>& priors) {
   return largest;
 }
 
-// The camera whose ratio is farthest from 1; the sigma is left open.
+// The camera whose ratio is farthest from 1; the sigma is not set.
 FocalLengthError FindFarthest(const colmap::Reconstruction& before,
                               const colmap::Reconstruction& after) {
   FocalLengthError farthest;
@@ -79,7 +79,7 @@ FocalLengthError FindFarthest(const colmap::Reconstruction& before,
   return farthest;
 }
 
-// Whether all cameras that are tried are marked as of measured focal length.
+// Whether all tested cameras are marked as having a measured focal length.
 bool HasPriorFocalLengths(const std::set<camera_t>& constant_cameras,
                           const colmap::Reconstruction& reconstruction) {
   return std::all_of(reconstruction.Cameras().begin(),
@@ -100,9 +100,9 @@ std::optional<FocalLengthError> FindFocalLengthError(
   if (LargestTurnRad(problem.priors) < DegToRad(kMinTurnDeg)) {
     return std::nullopt;
   }
-  // Wrong points fall behind their cameras, or away from them, sooner or later;
-  // two costs compare only where the same ones have. So the given lens comes
-  // once more, after the free one.
+  // In the course of adjustments wrong points fall behind their cameras, or
+  // away from them. Two costs are comparable only where the same points have.
+  // So the given lens is adjusted once more, after the free one.
   colmap::Reconstruction free = reconstruction;
   AdjustBundle(options, problem, &free);
   PriorBundleAdjustmentOptions free_options = options;

@@ -18,16 +18,16 @@ struct FocalLengthError {
   double sigma = 0.0;
 };
 
-// Whether the focal lengths of an adjusted model are wrong, those of the
-// problem's constant cameras taken for right, as vision and the priors together
-// see it: at most 300 consecutive images, those that turn most, are adjusted
-// with given and with free focal lengths, keypoints at their plain sigma. An
-// error counts when it lowers the cost by 10 sigmas of the residuals as they
-// are (3 where a focal length is not measured), is beyond what calibrations
-// repeat to, and leaves priors that err no more than the balance allows: where
-// they still do, keypoints share errors of other kinds, and free focal lengths
-// would take those up. None without priors, or where these turn by less than 20
-// deg in all. The model is left as it is.
+// Tests whether the focal lengths of an adjusted model contradict vision and
+// the priors together; those of the problem's constant cameras are taken as
+// correct. At most 300 consecutive images, those with most rotation, are
+// adjusted with given and with free focal lengths, at the plain keypoint sigma.
+// An error counts when it lowers the cost by 10 sigmas of the present residuals
+// (3 where a focal length is not measured), exceeds the repeatability of
+// calibrations, and leaves the priors within the limit of the balance. Beyond
+// that limit keypoints share errors of other kinds, which free focal lengths
+// would absorb. None without priors, or where they never rotate by 20 deg from
+// the first orientation. The model is unchanged.
 std::optional<FocalLengthError> FindFocalLengthError(
     const VarianceComponentOptions& balance,
     const PriorBundleAdjustmentOptions& options,

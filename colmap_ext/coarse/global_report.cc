@@ -14,7 +14,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-// Fewer pairs between two parts are no news.
+// Fewer pairs between two parts are not reported.
 constexpr int kMinNumReportedPairs = 3;
 
 Json ClosuresJson(const SceneData& scene,
@@ -64,12 +64,12 @@ Json WeakPlacesJson(const SceneData& scene, const CoarsePoses& poses) {
 std::string DescribeUnconfirmedClosure(const SceneData& scene,
                                        const UnconfirmedClosure& closure) {
   std::ostringstream text;
-  text << "a part of " << closure.num_images
-       << " images may join another where " << closure.num_pairs
+  text << "a segment of " << closure.num_images
+       << " images may meet another where " << closure.num_pairs
        << " pairs like " << scene.images.at(closure.image_id1).name << " and "
        << scene.images.at(closure.image_id2).name
        << " agree, but neither sensors nor a second place confirm it, and "
-          "look-alike places do the same: both stay apart "
+          "places that look alike would do the same: they become two models "
           "(--AdaSfmGlobal.split_unconfirmed_closures 0 joins them)";
   return text.str();
 }
@@ -100,54 +100,56 @@ Json ModelJson(const SceneData& scene, const CoarseComponent& component,
                       {"seconds", round.seconds},
                       {"message", round.message}});
   }
-  return {
-      {"images", model.reconstruction.NumRegImages()},
-      {"images_without_points", model.num_images_without_points},
-      {"images_with_few_points", model.num_images_with_few_points},
-      {"tracks", model.num_tracks},
-      {"keyframes", model.num_keyframes},
-      {"max_track_bytes", model.max_track_bytes},
-      {"points", model.num_points},
-      {"observations", model.num_observations},
-      {"mean_reproj_error_px", model.mean_reproj_error_px},
-      {"min_triangulation_angle_deg", model.min_angle_deg},
-      {"keypoint_sigma_px", model.keypoint_sigma_px},
-      {"prior_chi2_per_dof", model.prior_chi2_per_dof},
-      {"priors_agree", model.priors_agree},
-      {"focal_length_ratio", focal.ratio},
-      {"focal_length_camera",
-       model.focal_length_error ? Json(focal.camera_id) : Json()},
-      {"focal_length_ratio_sigma", focal.sigma},
-      {"cameras_refined", model.cameras_refined},
-      {"metric", model.metric},
-      {"inertial_scale_sigma", model.inertial_scale_sigma},
-      {"gravity_aligned", model.gravity_aligned},
-      {"rotations_converged", component.rotations_converged},
-      {"positions_converged", component.positions_converged},
-      {"pairs_agree", model.pair_agreement.IsSound()},
-      {"pair_agreement", model.pair_agreement.share},
-      {"least_pair_agreement", model.pair_agreement.least_image_share},
-      {"rotation_optimality", component.sdp_optimality},
-      {"unverified_joins", ClosuresJson(scene, component.unconfirmed_closures)},
-      {"mapper_start", MapperStartJson(model.mapper_start)},
-      {"adjustments", rounds}};
+  return {{"images", model.reconstruction.NumRegImages()},
+          {"images_without_points", model.num_images_without_points},
+          {"images_with_few_points", model.num_images_with_few_points},
+          {"tracks", model.num_tracks},
+          {"keyframes", model.num_keyframes},
+          {"max_track_bytes", model.max_track_bytes},
+          {"points", model.num_points},
+          {"observations", model.num_observations},
+          {"mean_reproj_error_px", model.mean_reproj_error_px},
+          {"min_triangulation_angle_deg", model.min_angle_deg},
+          {"keypoint_sigma_px", model.keypoint_sigma_px},
+          {"prior_chi2_per_dof", model.prior_chi2_per_dof},
+          {"priors_agree", model.priors_agree},
+          {"focal_length_ratio", focal.ratio},
+          {"focal_length_camera",
+           model.focal_length_error ? Json(focal.camera_id) : Json()},
+          {"focal_length_ratio_sigma", focal.sigma},
+          {"cameras_refined", model.cameras_refined},
+          {"metric", model.metric},
+          {"inertial_scale_sigma", model.inertial_scale_sigma},
+          {"gravity_aligned", model.gravity_aligned},
+          {"rotations_converged", component.rotations_converged},
+          {"positions_converged", component.positions_converged},
+          {"pairs_agree", model.pair_agreement.IsSound()},
+          {"pair_agreement", model.pair_agreement.share},
+          {"least_pair_agreement", model.pair_agreement.least_image_share},
+          {"rotation_optimality", component.sdp_optimality},
+          {"unconfirmed_closures",
+           ClosuresJson(scene, component.unconfirmed_closures)},
+          {"mapper_start", MapperStartJson(model.mapper_start)},
+          {"adjustments", rounds}};
 }
 
-Json MountJson(const CameraMountReport& mount) {
-  const Eigen::Matrix3d turn = ExpSo3(mount.turn_rad).toRotationMatrix();
+Json CameraImuRotationJson(const CameraImuRotationReport& camera_imu) {
+  const Eigen::Matrix3d rotation =
+      ExpSo3(camera_imu.rotation_rad).toRotationMatrix();
   Json rows = Json::array();
   for (int row = 0; row < 3; ++row) {
-    rows.push_back({turn(row, 0), turn(row, 1), turn(row, 2)});
+    rows.push_back({rotation(row, 0), rotation(row, 1), rotation(row, 2)});
   }
-  return {{"corrected", mount.corrected},
-          {"pairs", mount.num_pairs},
-          {"angle_deg", RadToDeg(mount.turn_rad.norm())},
-          {"sigma_deg", RadToDeg(mount.sigma_rad)},
-          {"chi2", mount.chi2},
-          {"residual_variance", mount.residual_variance},
+  return {{"corrected", camera_imu.corrected},
+          {"pairs", camera_imu.num_pairs},
+          {"angle_deg", RadToDeg(camera_imu.rotation_rad.norm())},
+          {"sigma_deg", RadToDeg(camera_imu.sigma_rad)},
+          {"chi2", camera_imu.chi2},
+          {"residual_variance", camera_imu.residual_variance},
           {"turn_deg",
-           {RadToDeg(mount.turn_rad.x()), RadToDeg(mount.turn_rad.y()),
-            RadToDeg(mount.turn_rad.z())}},
+           {RadToDeg(camera_imu.rotation_rad.x()),
+            RadToDeg(camera_imu.rotation_rad.y()),
+            RadToDeg(camera_imu.rotation_rad.z())}},
           {"true_from_stated", rows}};
 }
 
@@ -173,21 +175,23 @@ void AppendLostImages(const SceneData& scene, const GlobalStageResult& result,
   }
 }
 
-void AppendMountWarning(const CameraMountReport& mount,
-                        std::vector<std::string>* warnings) {
-  // Below it the direction of driving is as likely to be wrong, by what the
-  // import states for it.
+void AppendCameraImuWarning(const CameraImuRotationReport& camera_imu,
+                            std::vector<std::string>* warnings) {
+  // Below this an error of the direction of driving is as likely, by the sigma
+  // that the import states for it.
   constexpr double kMinNumSigmas = 3.0;
-  if (!mount.corrected ||
-      mount.turn_rad.norm() < kMinNumSigmas * mount.sigma_rad) {
+  if (!camera_imu.corrected ||
+      camera_imu.rotation_rad.norm() < kMinNumSigmas * camera_imu.sigma_rad) {
     return;
   }
   std::ostringstream text;
-  text << std::fixed << std::setprecision(2) << "the camera's mount is "
-       << RadToDeg(mount.turn_rad.norm()) << " +- " << RadToDeg(mount.sigma_rad)
+  text << std::fixed << std::setprecision(2) << "the camera-IMU rotation is "
+       << RadToDeg(camera_imu.rotation_rad.norm()) << " +- "
+       << RadToDeg(camera_imu.sigma_rad)
        << " deg off what T_cam_imu says (turned by "
-       << RadToDeg(mount.turn_rad.x()) << ", " << RadToDeg(mount.turn_rad.y())
-       << ", " << RadToDeg(mount.turn_rad.z())
+       << RadToDeg(camera_imu.rotation_rad.x()) << ", "
+       << RadToDeg(camera_imu.rotation_rad.y()) << ", "
+       << RadToDeg(camera_imu.rotation_rad.z())
        << " deg about the camera's x, y, z); priors were corrected. Put "
           "true_from_stated of summary.json, times T_cam_imu, into "
           "--sensors_path";
@@ -246,9 +250,11 @@ std::string FormatGlobalReportJson(const SceneData& scene,
     removals[EdgeRemovalName(removal)] = count;
   }
   report["edges"] = removals;
-  report["camera_mount"] = MountJson(result.poses.camera_mount);
+  report["camera_imu_rotation"] =
+      CameraImuRotationJson(result.poses.camera_imu_rotation);
   report["loop_closures"] = LoopClosuresJson(result.poses.loop_closures);
-  report["joins"] = SegmentClosuresJson(scene, result.poses.loop_closures);
+  report["segment_closures"] =
+      SegmentClosuresJson(scene, result.poses.loop_closures);
   report["weak_places"] = WeakPlacesJson(scene, result.poses);
   for (size_t i = 0; i < result.models.size(); ++i) {
     report["models"].push_back(
@@ -307,7 +313,7 @@ std::vector<std::string> ListGlobalWarnings(const SceneData& scene,
                                             const GlobalStageResult& result) {
   std::vector<std::string> warnings;
   AppendLostImages(scene, result, &warnings);
-  AppendMountWarning(result.poses.camera_mount, &warnings);
+  AppendCameraImuWarning(result.poses.camera_imu_rotation, &warnings);
   for (const CoarseModel& model : result.models) {
     AppendPriorWarnings(model, &warnings);
     if (model.positions.failure.empty()) continue;

@@ -17,8 +17,9 @@ std::string FormatGlobalReportJson(const SceneData& scene,
 std::string FormatGlobalReportText(const GlobalStageResult& result,
                                    double total_seconds);
 
-// Warnings for the user: positions that did not converge, parts of a model that
-// hang on one place.
+// Warnings for the user: lost images, a corrected camera-IMU rotation, models
+// that contradict sensors, positions or verified pairs, and parts of a model
+// that are joined at one place only.
 std::vector<std::string> ListGlobalWarnings(const SceneData& scene,
                                             const GlobalStageResult& result);
 

@@ -8,6 +8,7 @@
 
 #include "colmap_ext/coarse/join_models.h"
 #include "colmap_ext/coarse/measure_size.h"
+#include "colmap_ext/coarse/model_input.h"
 #include "colmap_ext/coarse/refine_stage_matches.h"
 #include "colmap_ext/coarse/split_models.h"
 #include "colmap_ext/host/pose_conversion.h"
@@ -23,14 +24,18 @@
 namespace adasfm {
 namespace {
 
-// One number of threads for all steps but the adjustment, whose own option says
-// why.
-GlobalStageOptions WithThreads(GlobalStageOptions options) {
+// Sets what several steps share: threads (the adjustment has its own option),
+// the memory budget, and the error that the scene's lengths share.
+GlobalStageOptions SetSharedOptions(GlobalStageOptions options,
+                                    const SceneData& scene) {
   options.focal_lengths.num_threads = options.num_threads;
   options.two_view.num_threads = options.num_threads;
   options.poses.num_threads = options.num_threads;
   options.structure.triangulation.num_threads = options.num_threads;
   options.refinement.num_threads = options.num_threads;
+  PriorBundleAdjustmentOptions& bundle = options.structure.bundle;
+  bundle.max_memory_gb = options.max_memory_gb;
+  bundle.shared_errors.length_drift_ratio = scene.length_drift_ratio;
   return options;
 }
 
@@ -61,9 +66,9 @@ Status NothingHoldsTogether() {
       "a relative pose and no usable priors; match the images first");
 }
 
-// Of the pairs that hold the parts. Of 38 drives with gaps 0.98 or more were
-// kept by an odometry that was right, and 0.28 on a phone's walk by one that
-// was not.
+// Least ratio of the kept visual pairs with bridged gaps to those without. Of
+// 38 drives with gaps correct odometry kept 0.98 or more; wrong odometry on a
+// phone's walk kept 0.28.
 constexpr double kMinKeptRatio = 0.9;
 
 std::map<image_t, Rigid3d> PosesHeldByPoints(
@@ -86,7 +91,7 @@ size_t NumImagesOfLargest(const GlobalStageResult& result) {
   return num_images;
 }
 
-// Of vision.
+// Does not count edges of sensors.
 size_t NumKeptPairs(const GlobalStageResult& result) {
   const std::vector<ViewGraphEdge>& edges = result.poses.graph.edges;
   return std::count_if(
@@ -100,9 +105,9 @@ std::string DescribeLargest(const GlobalStageResult& result) {
          std::to_string(NumKeptPairs(result)) + " pairs in all";
 }
 
-// What two-view verification took for the motion of a pair was that of
-// something else, as of cars that carry most of its matches: those of its raw
-// matches that agree with the poses.
+// New matches for pairs whose two-view verification found the motion of
+// something else, as of cars with most of the matches: the raw matches that
+// agree with the poses.
 std::map<ImagePair, std::vector<FeatureMatch>> MatchAnew(
     const MatchRefinementOptions& options, const SceneData& scene,
     const RawMatchSource& raw_matches,
@@ -129,32 +134,21 @@ std::map<ImagePair, std::vector<FeatureMatch>> MatchAnew(
   return matched;
 }
 
-// The matches of the edges that hold the component together, taken out of the
-// correspondences, and those of pairs that are matched anew.
-CoarseModelInput CreateModelInput(
-    std::map<ImagePair, std::vector<FeatureMatch>> matched_anew,
-    const CoarseComponent& component, const CoarsePoses& poses,
-    GlobalCorrespondences* correspondences) {
-  CoarseModelInput input;
-  input.priors = poses.priors;
-  if (poses.camera_mount.corrected) {
-    input.camera_mount = ExpSo3(poses.camera_mount.turn_rad);
-  }
-  input.cams_from_world = component.cams_from_world;
-  input.metric = component.metric;
-  input.matches = std::move(matched_anew);
-  for (const ViewGraphEdge& edge : poses.graph.edges) {
+// Moves the matches of the component's edges from the correspondences.
+void TakeMatches(const CoarseComponent& component, const ViewGraph& graph,
+                 GlobalCorrespondences* correspondences,
+                 std::map<ImagePair, std::vector<FeatureMatch>>* matches) {
+  for (const ViewGraphEdge& edge : graph.edges) {
     if (!edge.IsKept() || edge.source == EdgeSource::kSensor) continue;
     if (component.cams_from_world.count(edge.image_id1) == 0 ||
         component.cams_from_world.count(edge.image_id2) == 0) {
       continue;
     }
-    input.matches.insert(correspondences->matches.extract(edge.Pair()));
+    matches->insert(correspondences->matches.extract(edge.Pair()));
   }
-  return input;
 }
 
-// Before it is used.
+// Reported before the memory is used.
 std::string DescribeTrackMemory(const CoarseModelInput& input) {
   std::ostringstream text;
   text << "structure, tracks take at most "
@@ -279,24 +273,24 @@ class GlobalStage {
 
   // 2.7
   void BuildModel(const CoarseComponent& component) {
-    CoarseStructureOptions options = options_.structure;
-    options.bundle.shared_errors.length_drift_ratio = scene_.length_drift_ratio;
-    options.bundle.max_memory_gb = options_.max_memory_gb;
-    CoarseModelInput input = CreateModelInput(
+    CoarseModelInput input =
+        CreateModelInput(options_, result_, component.cams_from_world);
+    input.metric = component.metric;
+    input.matches =
         MatchAnew(options_.refinement, scene_, raw_matches_,
-                  correspondences_.bearings, component, result_.poses.graph),
-        component, result_.poses, &correspondences_);
-    input.refine_lenses = options_.structure.refine_unknown_focal_length &&
-                          !result_.focal_lengths.empty();
+                  correspondences_.bearings, component, result_.poses.graph);
+    TakeMatches(component, result_.poses.graph, &correspondences_,
+                &input.matches);
     Begin(DescribeTrackMemory(input), 0.5);
-    result_.models.push_back(BuildCoarseModel(
-        options, scene_, correspondences_.bearings, std::move(input)));
+    result_.models.push_back(BuildCoarseModel(options_.structure, scene_,
+                                              correspondences_.bearings,
+                                              std::move(input)));
     End("structure", DescribeModel(result_.models.back()));
   }
 
-  // Once more where the accelerometer tells the way between parts of a drive
-  // whose metres nothing else knows: odometry then tests the loops between
-  // them, too.
+  // Estimates the models again where the accelerometer alone gives the metres
+  // and the way between parts of a drive: odometry then checks the loop
+  // closures between parts, too.
   void EstimateModelsAcrossGaps() {
     if (scene_.inertial_motions.empty() || HasLengths(scene_.priors) ||
         HasLengths(scene_.frame_priors) || !scene_.positions.empty()) {
@@ -308,17 +302,15 @@ class GlobalStage {
       models.push_back(PosesHeldByPoints(model.reconstruction));
     }
     InertialOdometry odometry =
-        BridgeGaps(MotionsOfCamera(scene_, result_.poses.camera_mount),
+        BridgeGaps(MotionsOfCamera(scene_, result_.poses.camera_imu_rotation),
                    result_.poses.priors, models);
     End("gaps", std::to_string(odometry.num_gaps) +
                     " bridged by the accelerometer, over " +
                     std::to_string(odometry.bridges.size()) + " steps");
     if (odometry.num_gaps == 0) return;
-    if (result_.poses.camera_mount.corrected) {
-      const Eigen::Quaterniond back =
-          ExpSo3(-result_.poses.camera_mount.turn_rad);
-      for (RelativePosePrior& prior : odometry.priors) TurnPrior(back, &prior);
-    }
+    const Eigen::Quaterniond back =
+        result_.poses.camera_imu_rotation.Correction().conjugate();
+    for (RelativePosePrior& prior : odometry.priors) RotatePrior(back, &prior);
     GlobalStageResult in_parts = std::move(result_);
     const int num_split = num_split_;
     result_ = GlobalStageResult();
@@ -375,7 +367,7 @@ class GlobalStage {
     Begin("metres from the accelerometer", 0.95);
     for (CoarseModel& model : result_.models) {
       const std::vector<InertialLength> lengths = MeasureSize(
-          scene_, result_.poses.camera_mount, result_.bridges, &model);
+          scene_, result_.poses.camera_imu_rotation, result_.bridges, &model);
       result_.inertial_lengths.insert(result_.inertial_lengths.end(),
                                       lengths.begin(), lengths.end());
     }
@@ -389,7 +381,7 @@ class GlobalStage {
   Stopwatch watch_;
   GlobalCorrespondences correspondences_;
   InitialViewGraph initial_;
-  // Where models may be split or joined, or estimated once more.
+  // Kept where models may be split, joined or estimated again.
   std::map<ImagePair, std::vector<FeatureMatch>> all_matches_;
   int num_split_ = 0;
   GlobalStageResult result_;
@@ -421,8 +413,8 @@ StatusOr<GlobalStageResult> RunGlobalStage(const GlobalStageOptions& options,
   std::string error;
   if (!options.IsValid(&error)) throw std::invalid_argument(error);
   if (!raw_matches) raw_matches = RawMatchesOfScene(*scene);
-  return GlobalStage(WithThreads(options), progress, std::move(raw_matches),
-                     scene)
+  return GlobalStage(SetSharedOptions(options, *scene), progress,
+                     std::move(raw_matches), scene)
       .Run();
 }
 

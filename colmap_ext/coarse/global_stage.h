@@ -30,41 +30,41 @@ struct GlobalStageOptions {
   // Whether the coarse positions and the directions of gravity go into the
   // table pose_priors of COLMAP 4, for its own mappers.
   bool write_pose_priors = false;
-  // 1 sigma of a coarse position there, in m or the model's unit: what coarse
-  // models of drives err by.
+  // 1 sigma of a coarse position there, in m or the model's unit: the typical
+  // error of coarse models of drives.
   double pose_prior_sigma = 0.5;
-  // In GB (1e9 bytes); -1: no bound. EstimateCoarseModel does not begin what
-  // is estimated to take more.
+  // Memory in GB (1e9 bytes); -1: no bound. EstimateCoarseModel returns an
+  // error where its estimate exceeds this.
   double max_memory_gb = -1.0;
-  // Of all steps but structure.bundle; -1: all of the machine's.
+  // Threads of all steps but structure.bundle; -1: all of the machine's.
   int num_threads = -1;
 
   bool IsValid(std::string* error) const;
 };
 
 struct GlobalStageResult {
-  // Those that were changed in the scene.
+  // The focal lengths that were changed in the scene.
   std::vector<CalibratedFocalLength> focal_lengths;
   // One per component of the view graph, largest first.
   std::vector<CoarseModel> models;
-  // What EstimateCoarsePoses says of each component, in the same order, and its
-  // view graph with the reasons of removal.
+  // Result of EstimateCoarsePoses for each component, in the same order, and
+  // the view graph with the reasons of removal.
   CoarsePoses poses;
   MatchRefinementReport refinement;
   // The new two-view geometries, and the pairs that have none any more: they
-  // lost their matches, or the view graph refuted them. Pairs of images without
-  // pose are in neither. Both empty without match refinement.
+  // lost their matches, or the view graph rejected them. Pairs of images
+  // without pose are in neither. Both empty without match refinement.
   std::vector<NewTwoViewGeometry> geometries;
   std::vector<ImagePair> removed_pairs;
-  // Of priors that know none, in models that have metres by the accelerometer.
+  // Lengths for priors without one, in models with metres by accelerometer.
   std::vector<InertialLength> inertial_lengths;
-  // BridgeGaps: of translations across gaps that had part in the poses.
+  // Covariances of translations across gaps (BridgeGaps), where poses use them.
   std::map<ImagePair, Eigen::Matrix3d> bridges;
   std::vector<CoarseStep> steps;
 };
 
-// Whether an odometry that leads across gaps between models (BridgeGaps) did
-// good: the largest model has more images, and vision's pairs bear it out.
+// Whether odometry across the gaps between models (BridgeGaps) was an
+// improvement: the largest model has more images, and visual pairs confirm it.
 bool IsBetterAcrossGaps(const GlobalStageResult& in_parts,
                         const GlobalStageResult& across);
 
@@ -81,9 +81,9 @@ using StageProgress = std::function<void(const std::string&, double)>;
 //            gaps, then 2.1 to 2.7 anew  BridgeGaps
 //   2.8      match refinement            RefineMatches
 //   2.9      metres without wheels       MeasureSize, per component
-// The scene is read with original two-view geometries; raw matches, those of
-// the scene if there is no other source, are asked for while the stage works.
-// An error when the scene has no two images that hold together. Throws
+// The scene must be read with its original two-view geometries. Raw matches are
+// requested while the stage works; without a source they are the scene's. An
+// error when no two images of the scene are connected. Throws
 // std::invalid_argument for invalid options.
 StatusOr<GlobalStageResult> RunGlobalStage(const GlobalStageOptions& options,
                                            SceneData* scene,

@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "colmap_ext/coarse/measure_size.h"
+#include "colmap_ext/coarse/model_input.h"
 #include "colmap_ext/coarse/model_sights.h"
 #include "colmap_ext/coarse/refine_stage_matches.h"
 #include "colmap_ext/host/pose_conversion.h"
@@ -106,8 +107,8 @@ class ModelJoiner {
                                 MatchesWithin({model}, false));
   }
 
-  // From the world of the components' rotations, which is one, to a model's, by
-  // these images.
+  // Rotation from the components' common world to that of a model, by these
+  // images.
   Eigen::Quaterniond ModelFromRotations(int model,
                                         const std::set<image_t>& images) const {
     Eigen::Vector4d sum = Eigen::Vector4d::Zero();
@@ -148,8 +149,8 @@ class ModelJoiner {
   std::map<int, ModelPoints> points_;
 };
 
-// Joins known well enough, the best first; fills in for each model the first of
-// its group, and how the model lies in the world of that.
+// Applies the joins known well enough, the best first. Sets, for each model,
+// the representative of its group and the similarity into the world of that.
 void GroupModels(std::vector<Join> joins, std::vector<int>* group_of_model,
                  std::vector<Sim3d>* group_from_models) {
   std::sort(joins.begin(), joins.end(), [](const Join& x, const Join& y) {
@@ -200,19 +201,14 @@ int ModelJoiner::MakeJoins(std::vector<Join> joins) {
   return num_joins;
 }
 
-// Takes the place of the first of the models; the others are emptied.
+// Adjusts the joined model, which replaces the first of the models; the others
+// are emptied. False where it fails or is contradicted.
 bool ModelJoiner::Adjust(const std::set<int>& models,
                          std::map<image_t, Rigid3d> cams_from_world) {
   const CoarsePoses& poses = result_.poses;
-  CoarseModelInput input;
-  input.priors = poses.priors;
-  if (poses.camera_mount.corrected) {
-    input.camera_mount = ExpSo3(poses.camera_mount.turn_rad);
-  }
-  input.cams_from_world = std::move(cams_from_world);
+  CoarseModelInput input =
+      CreateModelInput(options_, result_, std::move(cams_from_world));
   input.matches = MatchesWithin(models, true);
-  input.refine_lenses = options_.structure.refine_unknown_focal_length &&
-                        !result_.focal_lengths.empty();
   CoarseComponent joined = poses.components[*models.begin()];
   joined.cams_from_world = input.cams_from_world;
   CoarseModel model =
@@ -220,7 +216,7 @@ bool ModelJoiner::Adjust(const std::set<int>& models,
   if (!model.rounds.back().success ||
       !MeasureModelAgreement(options_, scene_, poses.graph, bearings_, model)
            .IsSound() ||
-      !FindPartsByInertia(MotionsOfCamera(scene_, poses.camera_mount),
+      !FindPartsByInertia(MotionsOfCamera(scene_, poses.camera_imu_rotation),
                           poses.priors, CamsFromWorld(model.reconstruction))
            .empty()) {
     return false;

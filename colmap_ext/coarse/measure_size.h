@@ -8,23 +8,23 @@
 #include "colmap_ext/coarse/coarse_structure.h"
 #include "colmap_ext/scene/scene_data.h"
 #include "core/inertial_motion.h"
-#include "global/calibration/correct_camera_mount.h"
+#include "global/calibration/correct_camera_imu_rotation.h"
 
 namespace adasfm {
 
-// The scene's motions in the true camera frame; camera_mount: that from the
-// frame that they are stated in.
+// The scene's motions in the true camera frame. camera_imu_rotation: rotation
+// to it from the frame that they are stated in.
 std::vector<InertialMotion> MotionsOfCamera(
-    const SceneData& scene, const CameraMountReport& camera_mount);
+    const SceneData& scene, const CameraImuRotationReport& camera_imu_rotation);
 
-// Scales an adjusted model without metres to those of the accelerometer, where
-// it tells them (EstimateInertialScale); else the model stays as it is. Returns
-// the lengths of the scene's priors in the model, by which the mapper gives its
-// own model the unit (KeepInertialUnit). They are not to hold the shape, which
-// vision knows better: all of them together tell the size to 100 %. Bridges
-// (BridgeGaps) are to hold it.
+// Scales an adjusted model without metres to metres of the accelerometer, where
+// that determines them (EstimateInertialScale); else the model is unchanged.
+// Returns the lengths of the scene's priors in the model, by which the mapper
+// gives its own model the unit (KeepInertialUnit). They must not constrain the
+// shape, which vision determines better: all of them together constrain the
+// size to 100 % only. Bridges (BridgeGaps) must constrain the shape.
 std::vector<InertialLength> MeasureSize(
-    const SceneData& scene, const CameraMountReport& camera_mount,
+    const SceneData& scene, const CameraImuRotationReport& camera_imu_rotation,
     const std::map<ImagePair, Eigen::Matrix3d>& bridges, CoarseModel* model);
 
 }  // namespace adasfm

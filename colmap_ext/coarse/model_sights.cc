@@ -10,15 +10,15 @@
 namespace adasfm {
 namespace {
 
-// Of the rays of a point, for a depth known to 5 % or so.
+// Least angle between the rays of a point, for a depth known to 5 % or so.
 constexpr double kMinAngleDeg = 2.0;
-// Points and poses of two adjustments differ by more than keypoints err.
+// Between two adjustments, points and poses differ by more than keypoints err.
 constexpr double kMaxErrorFactor = 2.0;
 
 using Sights = std::map<std::pair<int, TrackElement>, SightAcross>;
 
-// Of a point of `from`, which its keypoint `seen` sees, by the matched keypoint
-// of the other model.
+// Adds an observation of the point of `from` with keypoint `seen`, by the
+// matched `keypoint` of the other model.
 void AddSight(const CoarseStructureOptions& options, const ModelPoints& from,
               const TrackElement& seen, const ModelPoints& by,
               const TrackElement& keypoint, bool is_point_of_a,
@@ -53,7 +53,7 @@ ModelPoints TriangulateModel(
       ComputeModelBearings(model.reconstruction, triangulation.num_threads);
   for (const TriangulatedTrack& track :
        TriangulateTracks(triangulation, points.cams_from_world, points.bearings,
-                         JoinMatches(options.tracks, matches))) {
+                         BuildTracks(options.tracks, matches))) {
     for (const TrackElement& element : track.track) {
       points.point_of[element] = static_cast<int>(points.points.size());
     }

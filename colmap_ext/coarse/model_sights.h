@@ -26,8 +26,8 @@ ModelPoints TriangulateModel(
     const CoarseStructureOptions& options, const CoarseModel& model,
     const std::map<ImagePair, std::vector<FeatureMatch>>& matches);
 
-// What images of either model see of the other one's points, by the matches of
-// these pairs, each between an image of a and one of b.
+// Observations of points of one model by images of the other, in both ways,
+// from matches of these pairs, each between an image of a and one of b.
 std::vector<SightAcross> FindSightsAcross(
     const CoarseStructureOptions& options, const ModelPoints& a,
     const ModelPoints& b, const std::vector<ImagePair>& pairs,

@@ -27,7 +27,7 @@ PairAgreement MeasurePairAgreement(
     const MatchRefinementOptions& options, const SceneData& scene,
     const ViewGraph& graph, const std::map<image_t, Rigid3d>& cams_from_world,
     const std::map<image_t, std::vector<Bearing>>& bearings) {
-  // Images with fewer pairs say nothing of their surroundings.
+  // Shares of images with fewer pairs are not reliable.
   constexpr int kMinNumPairs = 5;
   std::vector<const ScenePair*> pairs;
   for (const ScenePair& pair : scene.pairs) {

@@ -16,20 +16,20 @@ namespace adasfm {
 // Shares of the verified pairs that fit poses.
 struct PairAgreement {
   double share = 1.0;
-  // The same of the pairs of one image, where it is least: a world bent by
-  // look-alike places fits nearly everywhere, but not where it is bent.
+  // The smallest share among the pairs of single images: a model deformed by
+  // aliased pairs fits nearly everywhere, but not at the deformation.
   double least_image_share = 1.0;
 
-  // Whether no bend shows: an image beside one loses its pairs to one side,
-  // half of them.
+  // Whether no deformation shows: an image beside one loses the pairs to one
+  // side, half of its pairs.
   bool IsSound() const { return share >= 0.8 && least_image_share >= 0.7; }
 };
 
-// What: how far vision agrees with the poses of one model after its adjustment.
-// Method: a pair fits when half of its verified matches do, by the rule of
-// match refinement; pairs that the stage removed as off the rotations or the
-// positions count too, others that it refuted do not.
-// On failure: without pairs all of none fit.
+// Measures how far vision agrees with the poses of one model after its
+// adjustment. A pair fits when half of its verified matches do, by the rule of
+// match refinement. Pairs that the stage removed because they contradict the
+// rotations or the positions count, too; other removed pairs do not. Without
+// pairs the shares are 1.
 PairAgreement MeasurePairAgreement(
     const MatchRefinementOptions& options, const SceneData& scene,
     const ViewGraph& graph, const std::map<image_t, Rigid3d>& cams_from_world,

@@ -16,11 +16,12 @@
 namespace adasfm {
 namespace {
 
-// Noise of both keypoints moves either one off its line by sqrt(2) sigma; 3 of
-// these, in both views, is what the distances of a true match sum to at most.
+// The noise of both keypoints moves either one off its line by sqrt(2) sigma.
+// The distances of a true match in both views sum to at most twice three of
+// these.
 constexpr double kMaxErrorPerSigma = 2.0 * 3.0 * 1.4142;
 
-// eps_M, or what the keypoints' noise asks for where that is more: photos of
+// eps_M, or the limit by the keypoints' noise where that is more: photos of
 // large sensors have keypoints that err by two pixels, and half of their true
 // matches lie beyond 4 px.
 MatchRefinementOptions FitToNoise(MatchRefinementOptions options,
@@ -34,11 +35,11 @@ MatchRefinementOptions FitToNoise(MatchRefinementOptions options,
   return options;
 }
 
-// Pairs whose matches show another place than the poses say. Refinement cannot
-// tell: two look-alike places on one straight street differ only by a motion
-// along the line of sight, which leaves their matches on the epipolar lines.
-std::set<ImagePair> FindRefutedPairs(const ViewGraph& graph) {
-  std::set<ImagePair> refuted;
+// Pairs whose matches contradict the poses. Refinement cannot detect them: two
+// aliased places on one straight street differ only by a motion along the line
+// of sight, which leaves their matches on the epipolar lines.
+std::set<ImagePair> FindRejectedPairs(const ViewGraph& graph) {
+  std::set<ImagePair> rejected;
   for (const ViewGraphEdge& edge : graph.edges) {
     switch (edge.removal) {
       case EdgeRemoval::kOdometry:
@@ -46,22 +47,21 @@ std::set<ImagePair> FindRefutedPairs(const ViewGraph& graph) {
       case EdgeRemoval::kUnconfirmedClosure:
       case EdgeRemoval::kRotation:
       case EdgeRemoval::kTranslation:
-        refuted.insert(edge.Pair());
+        rejected.insert(edge.Pair());
         break;
       case EdgeRemoval::kKept:
       case EdgeRemoval::kFewInliers:
-      case EdgeRemoval::kRelativePose:
       case EdgeRemoval::kOdometryPose:
       case EdgeRemoval::kUnknownSize:
       case EdgeRemoval::kDisconnected:
         break;
     }
   }
-  return refuted;
+  return rejected;
 }
 
-// By model, the pairs within it. Refuted pairs and those between models go to
-// the removed ones.
+// The pairs within each model. Rejected pairs and those between models are
+// added to the removed ones.
 std::vector<std::vector<const ScenePair*>> SortPairs(
     const SceneData& scene, GlobalStageResult* result) {
   std::map<image_t, int> component_of;
@@ -71,13 +71,13 @@ std::vector<std::vector<const ScenePair*>> SortPairs(
     }
   }
   std::vector<std::vector<const ScenePair*>> pairs(result->models.size());
-  const std::set<ImagePair> refuted = FindRefutedPairs(result->poses.graph);
+  const std::set<ImagePair> rejected = FindRejectedPairs(result->poses.graph);
   for (const ScenePair& pair : scene.pairs) {
     const auto it1 = component_of.find(pair.image_id1);
     const auto it2 = component_of.find(pair.image_id2);
     if (it1 == component_of.end() || it2 == component_of.end()) {
       ++result->refinement.num_skipped_pairs;
-    } else if (refuted.count(ImagePair(pair.image_id1, pair.image_id2))) {
+    } else if (rejected.count(ImagePair(pair.image_id1, pair.image_id2))) {
       result->removed_pairs.emplace_back(pair.image_id1, pair.image_id2);
     } else if (it1->second == it2->second) {
       pairs[it1->second].push_back(&pair);

@@ -12,9 +12,9 @@
 
 namespace adasfm {
 
-// RefineMatches on the raw matches of the pairs, or the verified ones where the
-// database has no others, a block of pairs in memory at a time. Appends to the
-// report.
+// RefineMatches on the raw matches of the pairs, or on the verified ones where
+// the database has no raw ones, a block of pairs in memory at a time. Appends
+// to the report.
 void RefineRawMatches(const MatchRefinementOptions& options,
                       const RawMatchSource& source,
                       const std::map<image_t, Rigid3d>& cams_from_world,
@@ -22,16 +22,15 @@ void RefineRawMatches(const MatchRefinementOptions& options,
                       const std::vector<const ScenePair*>& pairs,
                       MatchRefinementReport* total);
 
-// How far the verified pairs agree with a model, by the noise of its keypoints;
-// bearings are those of the scene.
+// How far the verified pairs agree with a model, with a threshold by the noise
+// of its keypoints. bearings are those of the scene.
 PairAgreement MeasureModelAgreement(
     const GlobalStageOptions& options, const SceneData& scene,
     const ViewGraph& graph,
     const std::map<image_t, std::vector<Bearing>>& bearings,
     const CoarseModel& model);
 
-// Measures how far the verified pairs agree with every model of the result, by
-// the noise of its keypoints.
+// Sets pair_agreement of every model of the result (MeasureModelAgreement).
 void MeasurePairAgreements(
     const GlobalStageOptions& options, const SceneData& scene,
     const std::map<image_t, std::vector<Bearing>>& bearings,
@@ -41,7 +40,7 @@ void MeasurePairAgreements(
 // model of the result, under the model's poses and, where its adjustment has
 // refined them, its cameras (else the bearings of the scene). Fills the
 // result's refinement (its pairs become geometries), geometries, removed_pairs
-// and every model's mapper_start; pairs that the view graph refuted and pairs
+// and every model's mapper_start; pairs that the view graph rejected and pairs
 // between two models are removed ones.
 void RefineStageMatches(const GlobalStageOptions& options,
                         const SceneData& scene, const RawMatchSource& source,

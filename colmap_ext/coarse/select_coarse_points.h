@@ -8,9 +8,9 @@
 
 namespace adasfm {
 
-// The points whose angles the images need: all tracks of the wanted angle,
-// then, widest first, those that help an image with too few points. The
-// smallest angle that was taken goes to min_angle_deg. Order is kept.
+// Selects the points of the coarse model: all tracks of the wanted angle, then,
+// widest first, those in an image with too few points. min_angle_deg receives
+// the smallest angle that was taken. The order is kept.
 std::vector<TriangulatedTrack> SelectCoarsePoints(
     const CoarseStructureOptions& options,
     std::vector<TriangulatedTrack> triangulated, double* min_angle_deg);

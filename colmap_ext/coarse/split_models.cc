@@ -5,9 +5,9 @@
 #include <utility>
 
 #include "colmap_ext/coarse/measure_size.h"
+#include "colmap_ext/coarse/model_input.h"
 #include "colmap_ext/host/pose_conversion.h"
 #include "colmap_ext/scene/untied_parts.h"
-#include "core/so3.h"
 #include "global/odometry/inertial_breaks.h"
 
 namespace adasfm {
@@ -24,7 +24,7 @@ class ModelSplitter {
         scene_(scene),
         bearings_(bearings),
         matches_(matches),
-        motions_(MotionsOfCamera(scene, result->poses.camera_mount)),
+        motions_(MotionsOfCamera(scene, result->poses.camera_imu_rotation)),
         result_(*result) {}
 
   // These return the number of parts taken out of a model.
@@ -94,12 +94,8 @@ class ModelSplitter {
   }
 
   CoarseModel Build(const CoarseComponent& component) const {
-    CoarseModelInput input;
-    input.priors = result_.poses.priors;
-    if (result_.poses.camera_mount.corrected) {
-      input.camera_mount = ExpSo3(result_.poses.camera_mount.turn_rad);
-    }
-    input.cams_from_world = component.cams_from_world;
+    CoarseModelInput input =
+        CreateModelInput(options_, result_, component.cams_from_world);
     for (const ViewGraphEdge& edge : result_.poses.graph.edges) {
       const auto found = matches_.find(edge.Pair());
       if (edge.IsKept() && found != matches_.end() &&
@@ -108,8 +104,6 @@ class ModelSplitter {
         input.matches.insert(*found);
       }
     }
-    input.refine_lenses = options_.structure.refine_unknown_focal_length &&
-                          !result_.focal_lengths.empty();
     return BuildCoarseModel(options_.structure, scene_, bearings_,
                             std::move(input));
   }
@@ -128,7 +122,7 @@ int SplitModels(const GlobalStageOptions& options, const SceneData& scene,
                 const std::map<image_t, std::vector<Bearing>>& bearings,
                 const Matches& matches, GlobalStageResult* result) {
   ModelSplitter splitter(options, scene, bearings, matches, result);
-  // Positions tie each image by itself.
+  // Positions constrain each image by itself.
   const auto may_split = [result](size_t k) {
     return !result->models[k].metric && !result->models[k].positions.success;
   };

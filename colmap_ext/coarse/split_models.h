@@ -11,13 +11,13 @@
 
 namespace adasfm {
 
-// What: takes adjusted coarse models without metres apart where nothing tells
-// the place of one part against the rest (FindUntiedParts): pairs held the
-// model together before the adjustment, which found their matches wrong. And
-// where an accelerometer puts a part elsewhere (FindPartsByInertia).
+// Splits adjusted coarse models without metres where nothing determines the
+// place of a part relative to the others (FindUntiedParts): pairs connected the
+// parts before the adjustment, which found their matches wrong. Also splits
+// where an accelerometer contradicts the place of a part (FindPartsByInertia).
 // Inputs: the stage's models and components, in the same order; the verified
 // matches of the pairs that the view graph keeps.
-// Method. Each part is adjusted by itself, from its present poses; pairs
+// Method: each part is adjusted by itself, from its present poses. Pairs
 // between parts are removed as of unknown size, and JoinModels may try them.
 // Returns the number of models that were added, at the end.
 int SplitModels(const GlobalStageOptions& options, const SceneData& scene,

@@ -36,7 +36,7 @@ Status RunAdasfmPairGenerator(int argc, char** argv) {
   if (!parsed.ok() || command.HelpShown()) return parsed;
   const Status valid = CheckOptions(options);
   if (!valid.ok()) return valid;
-  // A name that no list can hold is better known before the search.
+  // Names that no list allows are reported before the search.
   Status names = CheckOutputIsNoInput(
       output_path, {{"database_path", database_path},
                     {"image_times_path", options.image_times_path},

@@ -199,7 +199,7 @@ Status Translate(SynthesizerOptions* options) {
   return CheckOptions(world);
 }
 
-// A world of ours may be replaced, somebody's own files may not.
+// Allows replacing a world of ours, but not files of the user.
 Status CheckWorldFolder(const std::string& path) {
   std::error_code none;
   if (fs::exists(path + "/landmarks.txt", none)) return Status::Ok();
@@ -214,7 +214,7 @@ Status CheckWorldFolder(const std::string& path) {
   return Status::Ok();
 }
 
-// Photos of another world in the folder would end up in the user's model.
+// Photos of another world in the folder would become part of the user's model.
 Status CheckPhotoFolder(const SyntheticWorld& world, const fs::path& folder) {
   std::set<std::string> names;
   for (const SyntheticImage& image : world.images) names.insert(image.name);
@@ -241,7 +241,7 @@ Status WritePhotos(const SyntheticWorld& world, const fs::path& folder) {
     try {
       written = cv::imwrite(path.string(), renderer.Render(i));
     } catch (const cv::Exception&) {
-      // OpenCV reports a full disk either way.
+      // OpenCV reports a full disk by an exception or by its result.
     }
     if (!written) {
       return Status::Error("cannot write " + path.string() +

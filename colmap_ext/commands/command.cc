@@ -35,7 +35,7 @@ constexpr char kOutOfMemory[] =
 constexpr char kTooFewThreads[] =
     "the system gives too few threads; use a smaller --num_threads";
 
-// Messages of other libraries may have several lines; an error has one.
+// Messages of other libraries may have several lines; ours have one.
 std::string OneLine(std::string message) {
   while (!message.empty() && std::isspace(message.back())) message.pop_back();
   std::replace(message.begin(), message.end(), '\n', ' ');
@@ -47,14 +47,14 @@ void PrintError(const std::string& message) {
   std::cerr << "ERROR: " << OneLine(message) << std::endl;
 }
 
-// Whatever std::cerr writes to at that time, as a log of a library's work.
+// Writes to standard error even while std::cerr is redirected.
 void WriteToStderr(const char* text) {
   const ssize_t ignored = write(STDERR_FILENO, text, std::strlen(text));
   static_cast<void>(ignored);
 }
 
-// A failed CHECK of the host would abort with a core dump; glog has already
-// written the check itself to standard error.
+// Without this function, a failed CHECK of the host would abort with a core
+// dump; glog has already printed the check on standard error.
 [[noreturn]] void ExitOnFailedCheck() {
   std::fflush(nullptr);
   WriteToStderr(
@@ -66,9 +66,9 @@ void WriteToStderr(const char* text) {
 bool has_command_ended = false;
 std::atomic<bool> may_exit_go_on{false};
 
-// COLMAP's database class and OpenMP end the process when something fails, the
-// latter in several threads at once, which must not meet in the destructors of
-// what is static.
+// COLMAP's database class and OpenMP exit the process on failures. OpenMP may
+// do so in several threads at once, which must not run static destructors
+// concurrently.
 void ReportExitOfLibrary() {
   if (has_command_ended) {
     may_exit_go_on = true;
@@ -81,13 +81,13 @@ void ReportExitOfLibrary() {
   _exit(EXIT_FAILURE);
 }
 
-// A second thread passes over the handler that the first one is in.
+// A second thread skips the handler that the first one is running.
 void WaitForReportOfExit() {
   while (!may_exit_go_on) std::this_thread::yield();
 }
 
-// An exception that nobody could catch: in a thread of a library, or where
-// memory ran out in a function that must not throw. Takes no memory itself.
+// Handles exceptions that could not be caught: in a thread of a library, or
+// when memory ran out in a noexcept function. Allocates no memory itself.
 [[noreturn]] void ReportUncaughtException() {
   WriteToStderr("ERROR: ");
   try {
@@ -109,8 +109,8 @@ void WaitForReportOfExit() {
   _exit(EXIT_FAILURE);
 }
 
-// Eigen frees a matrix again that it could not get memory to resize, and glibc
-// then aborts; it has already said so on standard error.
+// Eigen frees a matrix twice when resizing it ran out of memory, and glibc then
+// aborts, after a message on standard error.
 void ReportAbort(int) {
   WriteToStderr(
       "ERROR: a library aborted; mend its cause (most likely memory that is "
@@ -124,14 +124,15 @@ void SetUpLogging(const char* name) {
   google::InitGoogleLogging(name);
   google::InstallFailureFunction(
       reinterpret_cast<google::logging_fail_func_t>(&ExitOnFailedCheck));
-  // Log files in /tmp are of no use to anybody who did not ask for them.
+  // Nobody asked for log files in /tmp.
   FLAGS_logtostderr = true;
-  // A write beyond a limit fails like one to a full disk, and is reported.
+  // A write beyond a size limit then fails like a write to a full disk, and is
+  // reported.
   std::signal(SIGXFSZ, SIG_IGN);
 }
 
-// OpenBLAS waits for ever for the buffers that a limit denies it: below this
-// beside the program itself adasfm_global did.
+// OpenBLAS waits forever for buffers that a limit denies. With less than this
+// beyond the program's own size, adasfm_global waited forever.
 constexpr uint64_t kMinAddressSpace = 256 << 20;
 
 Status CheckAddressSpace() {
@@ -155,14 +156,14 @@ constexpr char kUnsafeBlas[] =
     "libopenblas0-pthread or libopenblas0-openmp in place of "
     "libopenblas0-serial)";
 
-// The exit code of the command.
+// Returns the exit code of the command.
 int CatchAndRun(const Command& command, int argc, char** argv) {
   try {
     const OneOpenMpThread one_thread;
     if (!IsBlasSafeInThreads()) std::cerr << kUnsafeBlas << std::endl;
     Status status = CheckAddressSpace();
     if (status.ok()) {
-      UseOneBlasThread();  // OpenBLAS takes a buffer for it.
+      UseOneBlasThread();  // OpenBLAS allocates a buffer for it.
       status = command.run(argc, argv);
     }
     if (status.ok()) return EXIT_SUCCESS;
@@ -228,8 +229,8 @@ Status CommandOptions::ReadProject(const std::string& path,
                          "; check --project_path");
   }
   SkipByteOrderMark(&file);
-  // A project file serves several commands, so other commands' options are
-  // passed over; a misspelt option of ours is not.
+  // Several commands share a project file, so options of other commands are
+  // ignored; a misspelt option of this command is an error.
   po::parsed_options parsed =
       po::parse_config_file(file, options_, /*allow_unregistered=*/true);
   for (po::option& option : parsed.options) {
@@ -315,7 +316,7 @@ Status CommandOptions::Check(const std::function<Status()>& check) {
 
 int RunCommand(const Command& command, int argc, char** argv) {
   SetUpLogging(command.name);
-  std::atexit(&WaitForReportOfExit);  // The last one is called first.
+  std::atexit(&WaitForReportOfExit);  // Exit handlers run in reverse order.
   std::atexit(&ReportExitOfLibrary);
   const int code = CatchAndRun(command, argc, argv);
   has_command_ended = true;

@@ -14,11 +14,11 @@
 
 namespace adasfm {
 
-// The options of one command, in COLMAP's manner: `--name value`, grouped
+// The options of one command, in COLMAP's style: `--name value`, grouped
 // `--Group.name value`, 0/1 booleans, and `--project_path` for an .ini file
-// with the same names. The command line wins over the file. Unlike COLMAP's
-// OptionManager it never exits the process, and names are not guessed from
-// their beginning.
+// with the same names. The command line overrides the file. Unlike COLMAP's
+// OptionManager, this class never exits the process and does not accept
+// abbreviated names.
 //
 //   Status RunAdasfmExample(int argc, char** argv) {
 //     ExampleOptions options;
@@ -35,15 +35,15 @@ class CommandOptions {
  public:
   CommandOptions(const std::string& name, const std::string& description);
 
-  // The help says what the value is, with its unit.
+  // `help` describes the value, with its unit.
   template <typename T>
   void AddRequired(const std::string& name, T* value, const std::string& help);
-  // The value that *value holds now is the default, and is shown as such.
+  // The present *value is the default, and is shown as such.
   template <typename T>
   void AddDefault(const std::string& name, T* value, const std::string& help);
 
-  // An earlier name of an option that is there already: taken as the new one,
-  // with a note on standard error.
+  // Adds an earlier name of an existing option, which is accepted with a note
+  // on standard error.
   void AddOldName(const std::string& old_name, const std::string& name);
 
   // Reads argv[1..]; -h prints the help, after which HelpShown() is true and
@@ -51,13 +51,14 @@ class CommandOptions {
   Status Parse(int argc, const char* const* argv);
   bool HelpShown() const { return help_shown_; }
 
-  // The outcome of a check of the options' values; an error names the option as
-  // the user types it, found by checking with each option's default in turn.
+  // Returns the result of a check of the options' values. The error names the
+  // option as the user types it; it is found by checking with each option's
+  // default in turn.
   Status Check(const std::function<Status()>& check);
 
  private:
   void PrintHelp() const;
-  // The name in use, after a note if it is another one.
+  // The present name of an option; prints a note if `name` is an old one.
   std::string PresentName(const std::string& name) const;
   Status ReadProject(const std::string& path,
                      boost::program_options::variables_map* values) const;
@@ -71,7 +72,7 @@ class CommandOptions {
   bool help_shown_ = false;
   struct Default {
     std::string name;
-    // Exchanges the value and the default.
+    // Swaps the value and the default.
     std::function<void()> exchange;
   };
   std::vector<Default> defaults_;
@@ -89,8 +90,8 @@ struct Command {
 };
 
 // Runs the command with logging set up, prints `ERROR: message` on standard
-// error when it fails, and returns the exit code: 0, 1, or 130 after Ctrl-C. No
-// exception and no failed check of the host gets past it as an abort.
+// error when it fails, and returns the exit code: 0, 1, or 130 after Ctrl-C.
+// Exceptions and failed checks of the host do not end in an abort.
 int RunCommand(const Command& command, int argc, char** argv);
 
 // A value as the help shows it.
@@ -104,7 +105,7 @@ inline std::string OptionText(const std::string& value) {
   return value.empty() ? "none" : value;
 }
 
-// The help, which says of a switch what may be given.
+// The help; for a switch it states the allowed values.
 template <typename T>
 std::string OptionHelp(const std::string& help) {
   const bool is_switch = std::is_same_v<T, bool>;

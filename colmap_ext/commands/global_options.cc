@@ -14,7 +14,7 @@ class GlobalOptionAdder {
 
   void AddPaper();
   void AddRotations();
-  void AddMount();
+  void AddCameraImuRotation();
   void AddLoops();
   void AddPositions();
   void AddStructure();
@@ -31,7 +31,7 @@ class GlobalOptionAdder {
   CommandOptions* command_;
 };
 
-// Those that the paper names.
+// Options from the paper.
 void GlobalOptionAdder::AddPaper() {
   Add("max_prior_time_gap_s", &stage_->poses.augmentation.max_prior_time_gap_s,
       "sensor priors over longer times are edges only if their covariance is "
@@ -63,17 +63,17 @@ void GlobalOptionAdder::AddRotations() {
       "rounds of relative poses and rotations for pairs without odometry");
 }
 
-void GlobalOptionAdder::AddMount() {
-  CameraMountOptions* mount = &stage_->poses.camera_mount;
-  Add("camera_imu_max_num_steps", &mount->max_num_steps,
+void GlobalOptionAdder::AddCameraImuRotation() {
+  CameraImuRotationOptions* camera_imu = &stage_->poses.camera_imu_rotation;
+  Add("camera_imu_max_num_steps", &camera_imu->max_num_steps,
       "pairs at most this many images apart tell the rotation between camera "
       "and "
       "IMU");
-  Add("camera_imu_sigma_deg", &mount->sigma_deg,
+  Add("camera_imu_sigma_deg", &camera_imu->sigma_deg,
       "1 sigma of what T_cam_imu may be wrong by, per axis [deg]");
-  Add("camera_imu_min_sigma_deg", &mount->min_sigma_deg,
+  Add("camera_imu_min_sigma_deg", &camera_imu->min_sigma_deg,
       "least error granted to what pairs say of it, per axis [deg]");
-  Add("camera_imu_min_num_sigmas", &mount->min_num_sigmas,
+  Add("camera_imu_min_num_sigmas", &camera_imu->min_num_sigmas,
       "priors are corrected when it is off by so many sigmas");
 }
 
@@ -84,7 +84,7 @@ void GlobalOptionAdder::AddLoops() {
       "1 sigma of the gyroscope bias that is left, per axis, where the import "
       "does not state it [rad/s]");
   Add("visual_odometry_length_error",
-      &stage_->poses.visual_steps.length_error_ratio,
+      &stage_->poses.visual_odometry.length_error_ratio,
       "1 sigma of the drift of lengths where vision completes the odometry, as "
       "a ratio");
   LoopClosureOptions* loops = &stage_->poses.loops;
@@ -156,7 +156,7 @@ void GlobalOptionAdder::AddMatches() {
       "pairs with fewer matches are removed");
 }
 
-// What each step buys.
+// Switches to disable single steps.
 void GlobalOptionAdder::AddAblations() {
   Add("use_sdp_start", &stage_->poses.rotations.use_sdp_start,
       "start the rotations from the SDP, as the paper does; without it they "
@@ -167,12 +167,12 @@ void GlobalOptionAdder::AddAblations() {
       &stage_->poses.loops.split_unconfirmed_closures,
       "parts of a drive (with sensor priors, or images in order) that only "
       "loop closures at one place join become models of their own");
-  Add("use_visual_odometry", &stage_->poses.visual_steps.enabled,
+  Add("use_visual_odometry", &stage_->poses.visual_odometry.enabled,
       "vision completes the odometry that gates loops, where sensors have no "
       "position (0 or 1)");
   Add("refine_relative_poses", &stage_->poses.relative_poses.enabled,
       "least-squares relative poses");
-  Add("correct_camera_imu_rotation", &stage_->poses.camera_mount.enabled,
+  Add("correct_camera_imu_rotation", &stage_->poses.camera_imu_rotation.enabled,
       "take a wrong rotation of T_cam_imu out of the priors, by vision");
   Add("refine_translations", &stage_->poses.translations.enabled,
       "directions anew under the global rotations");
@@ -194,7 +194,7 @@ void AddGlobalOptions(GlobalStageOptions* stage, CommandOptions* command) {
   GlobalOptionAdder adder(stage, command);
   adder.AddPaper();
   adder.AddRotations();
-  adder.AddMount();
+  adder.AddCameraImuRotation();
   adder.AddLoops();
   adder.AddPositions();
   adder.AddStructure();

@@ -22,7 +22,7 @@ void AddFusionOptions(OdometryFusionOptions* fusion, CommandOptions* command) {
       "scale of the track width before any data, 1 sigma [1 = 100 %]");
   add("wheel_curvature_sigma_per_m", &fusion->wheel_curvature_sigma,
       "difference of the wheels before any data, 1 sigma [1/m]");
-  add("wheel_mount_sigma_deg", &fusion->wheel_mount_sigma_deg,
+  add("driving_direction_sigma_deg", &fusion->driving_direction_sigma_deg,
       "driving direction against T_imu_wheel, 1 sigma [deg]; 0 trusts it");
   add("wheel_delay_sigma_s", &fusion->wheel_delay_sigma_s,
       "how long wheel readings lie behind their times, 1 sigma [s]");
@@ -52,6 +52,7 @@ void AddOldNames(CommandOptions* command) {
       {"gyroscope_bias_sigma", "gyroscope_bias_sigma_rad_s"},
       {"accelerometer_bias_sigma", "accelerometer_bias_sigma_m_s2"},
       {"wheel_curvature_sigma", "wheel_curvature_sigma_per_m"},
+      {"wheel_mount_sigma_deg", "driving_direction_sigma_deg"},
       {"lateral_speed_noise", "lateral_speed_noise_m_s_sqrt_hz"},
       {"vertical_speed_noise", "vertical_speed_noise_m_s_sqrt_hz"},
       {"planar_rotation_noise", "planar_rotation_noise_rad_sqrt_s"},
@@ -65,7 +66,7 @@ void AddOldNames(CommandOptions* command) {
   }
 }
 
-// Trajectories, rigs and GNSS.
+// Adds options of trajectories, rigs and GNSS.
 void AddOtherSources(PriorImportOptions* options, CommandOptions* command) {
   TrajectoryPriorOptions* trajectory = &options->trajectory;
   command->AddDefault("AdaSfmTrajectory.sigma_m_per_m",

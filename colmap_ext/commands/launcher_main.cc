@@ -25,27 +25,28 @@ using adasfm::IsThisProgram;
 
 constexpr char kHostVariable[] = "ADASFM_HOST_COLMAP";
 
-// OpenBLAS built with OpenMP takes a buffer for each thread before main begins,
-// and waits for ever where a limit of address space denies it one. Our commands
-// need the buffer of one thread only: under a limit the program begins anew
-// with a single thread for OpenMP, and main puts the user's variable back.
+// OpenBLAS built with OpenMP allocates a buffer for each thread before main
+// begins, and waits forever when an address space limit denies a buffer. Our
+// commands need the buffer of one thread only. Under a limit, the program
+// therefore restarts itself with a single OpenMP thread, and main restores the
+// user's variable.
 constexpr char kThreadsVariable[] = "OMP_NUM_THREADS";
 constexpr char kOneThread[] = "OMP_NUM_THREADS=1";
 constexpr char kUsersThreadsVariable[] = "ADASFM_USERS_OMP_NUM_THREADS";
 
-// Measured on Debian 12: at 380000 kB that buffer has no room either, at 390000
-// other libraries abort, at 400000 our commands begin.
+// Measured on Debian 12: with 380000 kB there is no room for even one buffer,
+// with 390000 kB other libraries abort, with 400000 kB our commands start.
 constexpr rlim_t kMinAddressSpaceToBegin = 400 << 20;
 constexpr char kNoRoomToBegin[] =
     "ERROR: the limit of address space (ulimit -v) is below 409600 kB, in "
     "which this program cannot begin; raise the limit\n";
 
-// Sanitizers' own libraries have not begun yet when it runs.
+// Runs before the sanitizers' libraries are initialised.
 #define ADASFM_NOT_SANITIZED \
   __attribute__((no_sanitize("address", "thread", "undefined")))
 
-// What follows the name and "=" in an entry of the environment; null in that of
-// another variable.
+// The value of an environment entry `name=value`; null for entries of other
+// variables.
 ADASFM_NOT_SANITIZED
 const char* FindValue(const char* entry, const char* name) {
   const size_t length = std::strlen(name);
@@ -54,8 +55,8 @@ const char* FindValue(const char* entry, const char* name) {
   return is_it ? entry + length + 1 : nullptr;
 }
 
-// Called when libraries are loaded and none of their code has run, so that it
-// must do without most of them. Where it fails the program just goes on.
+// Called after libraries are loaded but before any of their code has run, so it
+// cannot use most of them. On failure the program just continues.
 ADASFM_NOT_SANITIZED
 void BeginWithOneOpenMpThread(int, char** argv, char** environment) {
   rlimit limit;
@@ -100,7 +101,7 @@ using Start = void(int, char**, char**);
 __attribute__((section(".preinit_array"), used)) Start* const kBeforeLibraries =
     &BeginWithOneOpenMpThread;
 
-// For the programs that this one calls.
+// Restores the user's value for the programs that this one calls.
 void RestoreUsersThreads() {
   const char* value = std::getenv(kUsersThreadsVariable);
   if (value == nullptr) return;
@@ -140,12 +141,12 @@ bool CheckHost(const std::string& path) {
               << advice << std::endl;
     return false;
   }
-  // If the host is another of our kind, it must not hand back to us.
+  // If the host is a launcher like this one, it must not call this one again.
   setenv(kHostVariable, path.c_str(), /*overwrite=*/1);
   return true;
 }
 
-// Replaces this process, so that exit code and signals are the host's.
+// Replaces this process, so that the host determines exit code and signals.
 int HandOver(char** argv) {
   const std::string path = FindHostProgram();
   if (!CheckHost(path)) return EXIT_FAILURE;

@@ -17,10 +17,10 @@ namespace adasfm {
 namespace {
 
 constexpr int kBarWidth = 24;
-// Before this much is done, the time so far says little about the rest.
+// With less progress or time, extrapolation is unreliable.
 constexpr double kMinShareForEta = 0.02;
 constexpr double kMinSecondsForEta = 2.0;
-// In a log a step that counts up gets a line so often.
+// Interval between lines in a log for a step that counts.
 constexpr double kSecondsBetweenLines = 10.0;
 
 std::atomic<int> received_signal{0};
@@ -65,7 +65,7 @@ std::string FormatDuration(double seconds) {
   return text;
 }
 
-// "Matching pairs 3 of 9" and "Matching pairs 4 of 9" are one step.
+// Digits are ignored: "Matching pairs 3 of 9" and "4 of 9" are the same step.
 std::string WithoutDigits(std::string text) {
   text.erase(std::remove_if(text.begin(), text.end(),
                             [](char c) { return c >= '0' && c <= '9'; }),
@@ -140,7 +140,7 @@ std::string FormatProgressBar(const std::string& what, double share_done,
         "  " + FormatDuration(elapsed_s * (1.0 / share_done - 1.0)) + " left";
   }
   text += "  " + what;
-  // A line that wraps could not be drawn over.
+  // A wrapped line could not be overwritten.
   return text.substr(0, std::max(1, num_columns - 1));
 }
 

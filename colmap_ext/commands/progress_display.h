@@ -10,11 +10,11 @@
 
 namespace adasfm {
 
-// Shows the progress of a command on standard output: a bar with the time left
-// on a terminal, plain lines in a log. While one exists Ctrl-C (and SIGTERM)
-// asks for an interruption, which the next Update follows by throwing; a second
-// one ends the process at once. Commands without a display have nothing to lose
-// and end at the first.
+// Shows the progress of a command on standard output: on a terminal a bar with
+// the time left, in a log plain lines. While a display exists, Ctrl-C (or
+// SIGTERM) requests an interruption, and the next Update throws; a second
+// signal ends the process at once. Commands without a display have no
+// unfinished work to keep and end at the first signal.
 class ProgressDisplay {
  public:
   ProgressDisplay();
@@ -29,7 +29,7 @@ class ProgressDisplay {
       Update(what, share_done);
     };
   }
-  // A text between the steps, as its own lines.
+  // Prints a text between the steps on lines of its own.
   void Print(const std::string& text);
   // Ends the bar's line, so that other text can follow.
   void Finish();
@@ -51,7 +51,7 @@ class ProgressDisplay {
 };
 
 // "[#####-----]  50 %  1:05 left  what", cut to the columns of the terminal.
-// The time left follows from the time so far, once that says something.
+// The time left is extrapolated from the elapsed time once enough is done.
 std::string FormatProgressBar(const std::string& what, double share_done,
                               double elapsed_s, int num_columns);
 

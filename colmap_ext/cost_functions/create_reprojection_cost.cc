@@ -7,12 +7,13 @@
 
 namespace adasfm {
 
-// A keypoint whose undistortion does not lead back to it, in px.
+// Largest error, in px, of a keypoint undistorted and projected again.
 static constexpr double kMaxUndistortionErrorPx = 0.5;
 
 bool NormalizeKeypoint(const colmap::Camera& camera, const Eigen::Vector2d& xy,
                        double sigma_px, NormalizedKeypoint* keypoint) {
-  // Half a step to either side: exact for pinholes, error of third order else.
+  // Half a pixel to either side: exact for pinholes, else an error of second
+  // order.
   const double step = 0.5 / camera.MeanFocalLength();
   const Eigen::Vector2d normalized = PlaneFromPixel(camera, xy);
   const Eigen::Vector2d dx(step, 0.0), dy(0.0, step);

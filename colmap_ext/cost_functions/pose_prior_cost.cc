@@ -10,7 +10,8 @@ namespace {
 
 // Translations shorter than this have no direction.
 constexpr double kMinLength = 1e-12;
-// Within this of the opposite direction an error has no direction either.
+// Sine of the angle to the opposite direction below which an error has no
+// direction either.
 constexpr double kMinSineOpposite = 0.02;
 
 Eigen::Matrix<double, 3, 2> OrthonormalComplement(const Eigen::Vector3d& unit) {
@@ -35,7 +36,7 @@ void WriteJacobian(const Eigen::Matrix<double, kRows, 3>& rotation,
   }
 }
 
-// Those of a term with this Jacobian by t.
+// The Jacobians of a term that has this Jacobian by t.
 template <int kRows>
 void WriteTranslationJacobians(
     const Eigen::Matrix<double, kRows, 3>& from_translation,
@@ -64,7 +65,7 @@ Eigen::Vector2d DirectionError(const Eigen::Vector3d& vector,
   const double sine = in_plane.norm();
   const double cosine = unit.dot(unit_reference);
   const double angle = std::atan2(sine, cosine);
-  // Nearly opposite: every way back is equally long.
+  // Nearly opposite: rotations about all axes are equally long.
   if (cosine < 0.0 && sine < kMinSineOpposite) {
     return Eigen::Vector2d(kPi, 0.0);
   }
@@ -107,7 +108,7 @@ PosePriorCost::PosePriorCost(const PosePriorEdge& edge, Term term,
     const Eigen::Matrix3d from_middle = CameraFromMiddle(rotation_);
     const Eigen::Matrix3d from_direction =
         -inverse_sigma_ * Hat(translation_) * from_middle;
-    // How the drift lengthens the motion, as a ratio.
+    // Relative length error per unit of drift.
     const Eigen::RowVector3d length_ratio = edge.windows.length_per_direction *
                                             direction_.transpose() *
                                             from_middle;
@@ -194,7 +195,7 @@ void PosePriorCost::EvaluateTranslation(double* residuals,
     if (length > kMinLength) {
       from_translation = inverse_sigma_ * translation.transpose() / length;
     }
-    // A turn of camera 2 leaves the length as it is.
+    // A rotation of camera 2 does not change the length.
     const Eigen::Matrix<double, 1, 3> zero =
         Eigen::Matrix<double, 1, 3>::Zero();
     const Eigen::Matrix<double, 1, 3> from_center =

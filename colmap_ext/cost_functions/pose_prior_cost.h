@@ -29,13 +29,13 @@ Eigen::Vector2d DirectionError(const Eigen::Vector3d& vector,
 //   kLength:    (|t| - |t^|) / sigma     1 residual
 //   kTranslation: (t - t^) / sigma       3 residuals
 // Parameters: AdjustedPose::parameters of image 1 (6) and of image 2 (6), then,
-// when the edge has part in the errors that all priors share (shared_errors.h),
+// when errors that all priors share affect the edge (shared_errors.h),
 //   kRotation: extrinsic_rotation (3), gyroscope_bias of the window (3)
 //   kDirection, kTranslation: driving_direction (3), direction_drift (3)
-//   kLength: direction_drift (3), where it has part in the drift
-// whose effect on R^ and t^ is taken off to first order. The poses are read
+//   kLength: direction_drift (3), where length_per_direction > 0
+// whose effect on R^ and t^ is subtracted to first order. The poses are read
 // from the objects, which must be up to date. One cost per term, so that the
-// robust loss can drop a wrong term and keep the others.
+// robust loss can reject a wrong term and keep the others.
 class PosePriorCost final : public ceres::CostFunction {
  public:
   using Term = PriorTerm;
@@ -50,7 +50,7 @@ class PosePriorCost final : public ceres::CostFunction {
  private:
   void EvaluateRotation(double* residuals, double** jacobians) const;
   void EvaluateTranslation(double* residuals, double** jacobians) const;
-  // Takes the shared errors off the residuals that the poses give.
+  // Subtracts the shared errors from the residuals of the poses.
   void SubtractSharedErrors(double const* const* parameters, double* residuals,
                             double** jacobians) const;
 
@@ -63,7 +63,8 @@ class PosePriorCost final : public ceres::CostFunction {
   Eigen::Vector3d translation_;
   double length_ = 0.0;
   double inverse_sigma_ = 1.0;
-  // Of the residuals, by the shared parameters; as many rows as residuals.
+  // Effect of the shared parameters, subtracted from the residuals; as many
+  // rows as residuals are used.
   std::vector<Eigen::Matrix3d> from_shared_;
 };
 

@@ -9,7 +9,7 @@
 namespace adasfm {
 namespace {
 
-// Of priors: beyond, a direction is nearly any; below, there is no motion.
+// A larger sigma leaves the direction unknown; a smaller length is no motion.
 constexpr double kMaxDirectionSigmaRad = 0.5;
 constexpr double kMinLengthM = 1e-9;
 
@@ -56,15 +56,15 @@ PosePriorEdge PosePriorEdgeFromPrior(const RelativePosePrior& prior) {
   const Eigen::Vector3d direction = translation / length;
   const double variance_along = direction.dot(covariance * direction);
   const double variance_across = (covariance.trace() - variance_along) / 2.0;
-  // What the accelerometer tells of the unit is given back to the adjusted
-  // model as a whole (KeepInertialUnit); but across a gap it is a measurement.
+  // The accelerometer's information on the unit is applied to the adjusted
+  // model as a whole (KeepInertialUnit); only across a gap it is a measurement.
   if (prior.HasOwnLength()) {
     edge.length_sigma_m = sigma_or_infinity(variance_along);
   }
   if (prior.HasDirection()) {
     edge.direction_sigma_rad = sigma_or_infinity(variance_across) / length;
   }
-  // A motion that drowns in its own noise has no direction.
+  // A motion below its own noise has no direction.
   if (edge.direction_sigma_rad > kMaxDirectionSigmaRad) {
     edge.direction_sigma_rad = std::numeric_limits<double>::infinity();
     if (prior.HasTranslation()) {

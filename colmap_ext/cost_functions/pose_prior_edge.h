@@ -21,7 +21,7 @@ enum class PriorTerm {
 };
 inline constexpr int kNumPriorTerms = 5;
 
-// What the sigmas that sensors state are multiplied by, by PriorTerm.
+// Factors of the sigmas that sensors state, by PriorTerm.
 using PriorSigmaFactors = std::array<double, kNumPriorTerms>;
 inline constexpr PriorSigmaFactors kStatedPriorSigmas = {1.0, 1.0, 1.0, 1.0,
                                                          1.0};
@@ -33,8 +33,8 @@ inline constexpr PriorSigmaFactors kStatedPriorSigmas = {1.0, 1.0, 1.0, 1.0,
 //   direction  angle between t and t^ / direction_sigma_rad 2 residuals
 //   length     (|t| - |t^|) / length_sigma_m                1 residual
 //   translation  (t - t^) / translation_sigma_m             3 residuals
-// A term with an infinite sigma is left out. What an accelerometer says of
-// three images (kVelocity) is no edge's (inertial_factors.h).
+// A term with an infinite sigma is left out. kVelocity, the accelerometer's
+// term on three images, belongs to no edge (inertial_factors.h).
 struct PosePriorEdge {
   image_t image_id1 = kInvalidImageId;
   image_t image_id2 = kInvalidImageId;
@@ -42,18 +42,19 @@ struct PosePriorEdge {
   double rotation_sigma_rad = std::numeric_limits<double>::infinity();
   double direction_sigma_rad = std::numeric_limits<double>::infinity();
   double length_sigma_m = std::numeric_limits<double>::infinity();
-  // In place of direction and length where the motion is too short to have a
+  // Replaces direction and length where the motion is too short to have a
   // direction: with its length alone, every position around it would fit.
   double translation_sigma_m = std::numeric_limits<double>::infinity();
-  // Whether keypoints hold both images too. An edge that bridges a gap by
-  // itself keeps its full weight, as dropping it would open the gap, and says
-  // nothing of the balance between keypoints and priors.
+  // Whether keypoints constrain both images, too. An edge that bridges a gap by
+  // itself keeps its full weight, as rejecting it would open the gap, and does
+  // not count in the balance between keypoints and priors.
   bool is_held_by_points = true;
-  // Whether a sensor measured the length: otherwise it ties images to others
-  // and says nothing of the unit, nor of its own noise.
+  // Whether a sensor measured the length. Otherwise the length only ties images
+  // to each other and does not measure the unit, nor its own noise.
   bool is_length_measured = true;
-  // Duration of a motion that sensors measured: it has part in the errors that
-  // their whole log shares (shared_errors.h). Negative: it has none of them.
+  // Duration of a motion that sensors measured; the errors shared by their
+  // whole log affect it (shared_errors.h). Negative: not measured, no shared
+  // errors.
   double dt_s = -1.0;
   // Set by AssignSharedErrorWindows.
   SharedErrorWindows windows;
@@ -66,20 +67,20 @@ struct PosePriorEdge {
   }
 };
 
-// The edge of a sensor prior with the sigmas of its covariance; what its flags
-// do not claim stays infinite.
+// The edge of a sensor prior with the sigmas of its covariance; sigmas of
+// quantities without a flag stay infinite.
 PosePriorEdge PosePriorEdgeFromPrior(const RelativePosePrior& prior);
 
-// Of the directions that the motions of sensors state; 0 when none does.
+// Median of the direction sigmas of edges with a duration; 0 without any.
 double MedianDirectionSigma(const std::vector<PosePriorEdge>& edges);
 
-// Gives edges with a duration, in order of time, the windows of the errors that
-// they share. A window ends where an edge does not begin with the image that
-// the last one ended with.
+// Sets the windows of the shared errors of edges with a duration, in order of
+// time. A window ends where an edge does not begin with the image that ended
+// the previous one.
 void AssignSharedErrorWindows(const SharedErrorOptions& options,
                               std::vector<PosePriorEdge>* edges);
 
-// The priors of an adjustment without the shared errors that it found.
+// Returns the priors, corrected by the shared errors of an adjustment.
 std::vector<PosePriorEdge> CorrectSharedErrors(
     const SharedErrorOptions& options, const SharedErrors& shared_errors,
     std::vector<PosePriorEdge> priors);

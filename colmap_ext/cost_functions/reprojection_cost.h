@@ -22,8 +22,8 @@ struct NormalizedKeypoint {
 
 // Points nearer to the camera's plane than this do not project.
 inline constexpr double kMinProjectionDepth = 1e-6;
-// What an observation costs per coordinate, in sigmas, once its point does not
-// project: a constant, so that steps are judged by it but not drawn by it.
+// Residual per coordinate, in sigmas, of an observation whose point does not
+// project: a constant, so that it counts in the cost but has no gradient.
 inline constexpr double kBehindCameraResidual = 1e3;
 
 // One observation of a point, r = W (pi(R (X - C)) - x), x and W of the
@@ -33,7 +33,7 @@ struct PointObservation {
   NormalizedKeypoint keypoint;
   const AdjustedPose* pose = nullptr;
 
-  // The residual, and where asked for its derivatives by the parameters of the
+  // The residual and, unless null, its derivatives by the parameters of the
   // pose (2 x 6) and by X (2 x 3), row by row.
   void Evaluate(const Eigen::Vector3d& point, double* residuals,
                 double* by_pose, double* by_point) const {
@@ -60,10 +60,12 @@ struct PointObservation {
       // dx = -Hat(x) Jl dw - R dc; a row n of -Hat(x) is (x cross n)^T.
       Eigen::Map<Eigen::Matrix<double, 2, 6, Eigen::RowMajor>> jacobian(
           by_pose);
-      Eigen::Matrix<double, 2, 3> from_turn;
-      from_turn.row(0) = x_in_cam.cross(residual_from_cam.row(0).transpose());
-      from_turn.row(1) = x_in_cam.cross(residual_from_cam.row(1).transpose());
-      jacobian.leftCols<3>().noalias() = from_turn * pose->left_jacobian;
+      Eigen::Matrix<double, 2, 3> from_rotation;
+      from_rotation.row(0) =
+          x_in_cam.cross(residual_from_cam.row(0).transpose());
+      from_rotation.row(1) =
+          x_in_cam.cross(residual_from_cam.row(1).transpose());
+      jacobian.leftCols<3>().noalias() = from_rotation * pose->left_jacobian;
       jacobian.rightCols<3>() = -residual_from_world;
     }
     if (by_point != nullptr) {

@@ -17,7 +17,7 @@ RigCost::RigCost(const ceres::CostFunction* inner, std::vector<RigPose> poses)
     part.pose = pose;
     if (pose.IsDerived()) {
       part.frame_block = IndexOf(pose.frame->parameters);
-      part.mount_block = IndexOf(pose.mount->parameters);
+      part.cam_from_rig_block = IndexOf(pose.cam_from_rig->parameters);
     } else {
       part.frame_block = IndexOf(pose.pose->parameters);
     }
@@ -75,18 +75,19 @@ bool RigCost::Evaluate(double const* const* parameters, double* residuals,
         jacobian += by_pose[k];
       } else {
         const AdjustedPose& frame = *part.pose.frame;
-        const AdjustedPose& mount = *part.pose.mount;
-        jacobian.leftCols<3>() +=
-            (by_rotation * mount.rotation +
-             by_center * frame.rotation.transpose() * Hat(mount.center)) *
-            frame.left_jacobian;
+        const AdjustedPose& cam_from_rig = *part.pose.cam_from_rig;
+        jacobian.leftCols<3>() += (by_rotation * cam_from_rig.rotation +
+                                   by_center * frame.rotation.transpose() *
+                                       Hat(cam_from_rig.center)) *
+                                  frame.left_jacobian;
         jacobian.rightCols<3>() += by_center;
       }
     }
-    if (part.mount_block < 0) continue;
-    if (double* values = jacobians[part.mount_block]) {
+    if (part.cam_from_rig_block < 0) continue;
+    if (double* values = jacobians[part.cam_from_rig_block]) {
       Eigen::Map<Jacobian> jacobian(values, num_residuals(), 6);
-      jacobian.leftCols<3>() += by_rotation * part.pose.mount->left_jacobian;
+      jacobian.leftCols<3>() +=
+          by_rotation * part.pose.cam_from_rig->left_jacobian;
       jacobian.rightCols<3>() +=
           by_center * part.pose.frame->rotation.transpose();
     }

@@ -10,43 +10,43 @@
 
 namespace adasfm {
 
-// What is believed, before an adjustment, of the errors that all motions of a
-// sequence share (docs/reference/math.md, Shared errors of the odometry). The
-// adjustment estimates them together with the poses; 0 holds an error at zero.
+// Priors of mean zero on the errors that all motions of a sequence share
+// (docs/reference/math.md, Shared errors of the odometry). The adjustment
+// estimates the errors together with the poses; a sigma of 0 holds one at zero.
 struct SharedErrorOptions {
   bool enabled = true;
-  // 1 sigma, per axis, of what the import left of the gyroscope's bias, and of
-  // its random walk.
+  // 1 sigma, per axis, of the gyroscope bias that the import left, and of its
+  // random walk.
   double gyroscope_bias_sigma_rad_s = 1e-3;
   double gyroscope_random_walk_rad_s_sqrt_s = 2e-5;
-  // One bias for each of these spans.
+  // Length of the windows with one bias each.
   double gyroscope_window_s = 20.0;
-  // Of the rotation of T_cam_imu, per axis.
+  // 1 sigma of the rotation of T_cam_imu, per axis.
   double extrinsic_rotation_sigma_rad = 5e-3;
-  // Of the direction of driving in the camera, per axis: T_imu_wheel, and again
-  // T_cam_imu.
+  // 1 sigma of the direction of driving in the camera, per axis. It covers the
+  // errors of T_imu_wheel and, again, of T_cam_imu.
   double driving_direction_sigma_rad = 0.035;
-  // Within the drive the direction drifts with the tilt and the velocity that
-  // the smoother found: a Gauss-Markov process of this correlation time, with
-  // one value for each window and the sigma that the motions state (the
-  // median). docs/reference/math.md has what was measured.
+  // Within the drive the direction drifts with errors of the smoother's tilt
+  // and velocity: a Gauss-Markov process of this correlation time, with one
+  // value for each window and the median sigma that the motions state.
+  // docs/reference/math.md has measurements.
   double direction_drift_time_s = 3.0;
   double direction_window_s = 2.0;
-  // The smoother's velocity errs along the motion, too, as wheels do that slip
-  // for seconds: 1 sigma of the same process in lengths, as a ratio. The import
+  // Relative 1 sigma of the same process in lengths: the smoother's velocity
+  // also errs along the motion, as where wheels slip for seconds. The import
   // states it; 0 leaves lengths independent.
   double length_drift_ratio = 0.0;
 
   bool IsValid(std::string* error) const;
 };
 
-// What one motion has of the errors that vary within a sequence.
+// Selects the values of varying errors that apply to a motion.
 struct SharedErrorWindows {
-  // Counted through the sequence.
+  // Numbers of the windows, counted through the sequence.
   int gyroscope = 0;
   int direction = 0;
-  // By how much larger than across the motion the drift is along it: sigma of
-  // lengths, as a ratio, over sigma of directions.
+  // Drift along the motion over drift across it: relative sigma of lengths over
+  // sigma of directions.
   double length_per_direction = 0.0;
 };
 
@@ -55,23 +55,24 @@ struct SharedErrorWindows {
 //   R = Exp(dt H b + (I - R^) e) R^,  t = (1 + k u . H d) Exp(H (m + d)) t^
 // with b: gyroscope_bias of its window, e: extrinsic_rotation, m:
 // driving_direction, d: direction_drift of its window, all in the frame of the
-// camera, u = t^ / |t^| and k = length_per_direction. A turn about u moves
-// nothing, so that component of d is free to be the drift of the length. A
-// common scale of all lengths is none of them: it leaves the shape of the model
-// as it is, and nothing but the lengths observes it.
+// camera, u = t^ / |t^| and k = length_per_direction. A rotation about u does
+// not change t^, so that component of d serves as the drift of the length. A
+// common scale of all lengths is not included: it does not change the shape of
+// the model, and only the lengths observe it.
 struct SharedErrors {
-  // By window, rad/s; zero where there is none.
+  // By window, rad/s; zero for missing windows.
   std::map<int, Eigen::Vector3d> gyroscope_bias;
   Eigen::Vector3d extrinsic_rotation = Eigen::Vector3d::Zero();  // rad
   Eigen::Vector3d driving_direction = Eigen::Vector3d::Zero();   // rad
-  // By window, rad across the motion and 1 / length_per_direction along it.
+  // By window: rad across the motion; along it relative length error over
+  // length_per_direction.
   std::map<int, Eigen::Vector3d> direction_drift;
 
   Rigid3d Correct(const Rigid3d& cam2_from_cam1, double dt_s,
                   const SharedErrorWindows& windows) const;
 };
 
-// H: from the frame in the middle of a motion to the later camera.
+// H: rotation from the frame in the middle of a motion to the later camera.
 Eigen::Matrix3d CameraFromMiddle(const Eigen::Quaterniond& cam2_from_cam1);
 
 }  // namespace adasfm

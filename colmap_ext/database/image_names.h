@@ -11,8 +11,8 @@
 
 namespace adasfm {
 
-// The images of a database as its tables of priors name them: by name, which
-// stays when the ids of a database are made anew.
+// Ids and names of a database's images. Tables of priors refer to images by
+// name, since names stay when ids are assigned anew.
 class ImageNames {
  public:
   // Throws SqliteError.
@@ -24,11 +24,11 @@ class ImageNames {
   // None when the database has no image of this name.
   std::optional<image_t> Id(const std::string& name) const;
 
-  // Of the names in the first two columns that were selected.
+  // The ids of the names in the first two selected columns.
   std::optional<std::pair<image_t, image_t>> Ids(
       const SqliteStatement& statement) const;
 
-  // Ids and names as the first four values of a row.
+  // Binds ids and names as the first four values of a row.
   void BindPair(image_t image_id1, image_t image_id2,
                 SqliteStatement* statement) const;
 

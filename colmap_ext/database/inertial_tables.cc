@@ -16,7 +16,7 @@ std::string RowOf(const std::string& table, const SqliteStatement& statement) {
          statement.Text(1);
 }
 
-// None where two columns are null.
+// None where both columns are NULL.
 std::optional<MeasuredTranslation> TranslationFromRow(
     const SqliteStatement& statement, int column, const std::string& row) {
   if (statement.IsNull(column) && statement.IsNull(column + 1)) {
@@ -38,14 +38,14 @@ void BindTranslation(const MeasuredTranslation& measured, int column,
   BindDoubles(statement, column + 1, measured.covariance.data(), 9);
 }
 
-// Older tables are of drives without wheels.
+// Tables of older versions lack the columns of the wheels.
 bool HasWheelColumns(SqliteConnection* database) {
   constexpr size_t kNumColumnsWithoutWheels = 10;
   return database->Columns("adasfm_inertial_motions").size() >
          kNumColumnsWithoutWheels;
 }
 
-// Older tables know no bridges.
+// Tables of older versions lack the columns of bridges.
 bool HasBridgeColumns(SqliteConnection* database) {
   constexpr size_t kNumColumnsWithoutBridges = 7;
   return database->Columns(kInertialLengthTable).size() >
@@ -63,7 +63,7 @@ InertialMotion MotionFromRow(const SqliteStatement& statement) {
   DoublesFromBlob(statement, 5, row, 9, motion.velocity_by_bias.data());
   DoublesFromBlob(statement, 6, row, 9, motion.position_by_bias.data());
   DoublesFromBlob(statement, 7, row, 3, motion.camera_from_imu_origin.data());
-  // Rows first.
+  // Stored row by row.
   motion.velocity_by_bias.transposeInPlace();
   motion.position_by_bias.transposeInPlace();
   motion.by_wheels = TranslationFromRow(statement, 8, row);
@@ -101,7 +101,7 @@ void WriteInertialMotions(const ImageNames& names,
                             "INSERT INTO adasfm_inertial_motions VALUES "
                             "(?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)");
   for (const InertialMotion& motion : motions) {
-    // Rows first.
+    // Stored row by row.
     const Eigen::Matrix3d velocity_rows = motion.velocity_by_bias.transpose();
     const Eigen::Matrix3d position_rows = motion.position_by_bias.transpose();
     statement.Reset();

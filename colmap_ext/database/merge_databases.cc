@@ -99,7 +99,8 @@ int64_t CountRows(SqliteConnection* database, const std::string& table) {
   return statement.Step() ? statement.Int(0) : 0;
 }
 
-// By the first image, so that the order of arrival does not matter.
+// Sorts by the first image's name, so that the order of the inputs does not
+// matter.
 void SortInputs(std::vector<DatabaseKeys>* inputs) {
   const auto first_name = [](const DatabaseKeys& keys) {
     std::string first;
@@ -138,7 +139,7 @@ void CheckSameTables(const std::vector<DatabaseKeys>& inputs,
   }
 }
 
-// Everything within the caller's transaction.
+// Runs within the caller's transaction.
 int64_t MergeInto(const std::vector<DatabaseKeys>& inputs,
                   const std::vector<MergedIds>& ids, SqliteConnection* target) {
   int64_t num_new_rows = 0;
@@ -195,7 +196,7 @@ MergedDatabase Merge(const MergeDatabasesOptions& options,
   return merged;
 }
 
-// An empty file that becomes the output under its name when it is complete.
+// An empty file that is renamed to the output when it is complete.
 class TemporaryDatabase {
  public:
   explicit TemporaryDatabase(const std::string& path)
@@ -247,7 +248,7 @@ StatusOr<MergedDatabase> MergeDatabases(
   Status status = CheckOutputIsNoInput(output_path, named);
   if (status.ok()) status = CheckOutputFile(output_path);
   if (!status.ok()) return status;
-  // Two runs would write to the same temporary file.
+  // Two runs would use the same temporary file.
   const fs::path folder = fs::path(output_path).parent_path();
   const auto lock =
       FolderLock::Acquire(folder.empty() ? "." : folder.string(),

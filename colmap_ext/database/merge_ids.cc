@@ -12,7 +12,7 @@
 namespace adasfm {
 namespace {
 
-// Sensors of frames that are cameras; COLMAP's number for them.
+// COLMAP's number for sensors that are cameras.
 constexpr int64_t kCameraSensor = 0;
 
 void ReadCameraKeys(SqliteConnection* database, DatabaseKeys* keys) {
@@ -85,9 +85,10 @@ class ImageIds {
 struct CameraEntry {
   size_t input = 0;
   int64_t old_id = 0;
-  // Of its images, in the merged database; larger than all without images.
+  // Smallest id of its images in the merged database; the maximum without
+  // images.
   int64_t first_image = std::numeric_limits<int64_t>::max();
-  // That its images have in the target; 0 for none.
+  // Id of the camera that its images have in the target; 0 for none.
   int64_t target_id = 0;
 };
 
@@ -166,7 +167,7 @@ class CameraIds {
                       " than in " + path_b);
   }
 
-  // Sets of entries that are one camera.
+  // Joins the entries that are one camera.
   DisjointSets JoinEntries(const std::vector<MergedIds>& images,
                            bool share_cameras) const {
     DisjointSets sets(entries_.size());
@@ -226,15 +227,15 @@ class CameraIds {
 
   const DatabaseKeys& target_;
   const std::vector<DatabaseKeys>& inputs_;
-  // Camera of every image of the target, by the camera's content and the
+  // The camera of every image of the target, by the camera's content and the
   // image's name.
   std::map<std::string, std::map<std::string, int64_t>> target_by_content_;
   std::vector<CameraEntry> entries_;
   std::map<size_t, std::map<int64_t, int64_t>> ids_;
 };
 
-// The new ids of rigs and frames, which are known by a key. Those of the target
-// keep theirs, the others follow in the order of their keys.
+// Assigns new ids to rigs and frames, which are identified by a key. The
+// target's keep their ids; the others follow in the order of their keys.
 class KeyedIds {
  public:
   void AddKnown(int64_t key, int64_t id) {
@@ -254,7 +255,7 @@ class KeyedIds {
   int64_t last_ = 0;
 };
 
-// A rig is known by its reference camera.
+// A rig is identified by its reference camera.
 void AssignRigs(const DatabaseKeys& target,
                 const std::vector<DatabaseKeys>& inputs,
                 std::vector<MergedIds>* merged) {
@@ -275,8 +276,8 @@ void AssignRigs(const DatabaseKeys& target,
   }
 }
 
-// The image by which a frame is known: one that the target has in a frame or,
-// for a new frame, its first.
+// The image that identifies a frame: one that is in a frame of the target or,
+// for a new frame, its first image.
 int64_t FrameKey(const std::vector<int64_t>& images, const MergedIds& ids,
                  const KeyedIds& known) {
   int64_t first = std::numeric_limits<int64_t>::max();

@@ -8,7 +8,7 @@
 
 namespace adasfm {
 
-// What of a COLMAP database decides about its ids in a merged one.
+// Contents of a COLMAP database that determine its ids in a merged one.
 struct DatabaseKeys {
   struct Image {
     // With the prefix of its database.
@@ -17,10 +17,10 @@ struct DatabaseKeys {
   };
   std::string path;
   std::string prefix;
-  // All columns of a camera but its id, as text.
+  // All columns of a camera except its id, as text.
   std::map<int64_t, std::string> cameras;
   std::map<int64_t, Image> images;
-  // COLMAP 3.12 and later: the reference camera of a rig, the images of a
+  // COLMAP 3.12 and later: the reference camera of each rig, the images of each
   // frame.
   std::map<int64_t, int64_t> rigs;
   std::map<int64_t, std::vector<int64_t>> frames;
@@ -38,16 +38,16 @@ struct MergedIds {
   std::map<int64_t, int64_t> frames;
 };
 
-// The ids of every input in a database that has those of `target` already
-// (empty for a new one) and all inputs; in the order of the inputs, on which
-// the ids themselves do not depend.
+// Assigns the ids of all inputs in a merged database that already has the ids
+// of `target` (empty for a new database). The result is in the order of the
+// inputs; the ids do not depend on this order.
 //
-// Images of equal names are one image, and their cameras one camera. With
-// share_cameras, equal cameras of inputs of the same prefix are one too. The
-// target's ids stay; new images are numbered behind them by name, and new
-// cameras, rigs and frames by their first image. Throws SqliteError when inputs
-// contradict each other: two prefixes give one name, or one image has cameras
-// that differ.
+// Images of equal names become one image, and their cameras one camera. With
+// share_cameras, equal cameras of inputs of the same prefix become one, too.
+// The target's ids stay; new images get the following ids in order of their
+// names, and new cameras, rigs and frames in order of their first image. Throws
+// SqliteError when inputs contradict each other: two prefixes give one name, or
+// one image has different cameras.
 std::vector<MergedIds> AssignMergedIds(const DatabaseKeys& target,
                                        const std::vector<DatabaseKeys>& inputs,
                                        bool share_cameras);

@@ -14,7 +14,7 @@ namespace {
 
 using Row = std::map<std::string, SqliteValue>;
 
-// The ids that a column's values are looked up in; null for other columns.
+// The ids that replace the values of a column; null for other columns.
 const std::map<int64_t, int64_t>* IdsOfColumn(const std::string& column,
                                               const MergedIds& ids) {
   for (const char* name : {"camera_id", "sensor_id", "ref_sensor_id",
@@ -43,7 +43,7 @@ int64_t NewId(const std::map<int64_t, int64_t>& ids, int64_t old_id,
                     std::to_string(old_id) + ", which is missing");
 }
 
-// The pair's new id; true when its images change their order.
+// Replaces the pair's id; true when its images change their order.
 bool RenumberPair(const MergedIds& ids, int64_t* pair_id) {
   const ImagePair old_pair = ImagePairFromPairId(*pair_id);
   const int64_t id1 = NewId(ids.images, old_pair.image_id1, "pair_id");
@@ -52,7 +52,7 @@ bool RenumberPair(const MergedIds& ids, int64_t* pair_id) {
   return id1 > id2;
 }
 
-// COLMAP deletes images without what the adasfm_ tables say about them.
+// COLMAP deletes images but not their rows in the adasfm_ tables.
 bool IsOfMissingImage(const std::string& table, const Row& row,
                       const MergedIds& ids) {
   if (table.rfind("adasfm_", 0) != 0) return false;
@@ -81,8 +81,8 @@ void Renumber(const std::string& table, const std::string& prefix,
   }
 }
 
-// The columns by which a row is found again: the primary key or, for tables
-// without one that tells rows apart, the sensors' key.
+// The columns that identify a row: the primary key or, for tables whose primary
+// key does not, the sensors' key.
 std::vector<std::string> KeyColumns(const std::string& table,
                                     SqliteConnection* database) {
   if (table == "rig_sensors") return {"sensor_id", "sensor_type"};
@@ -125,7 +125,7 @@ class RowWriter {
                               JoinColumns(columns_, "\"", ", ", "\"") +
                               ") VALUES (" + Marks(columns_.size()) + ")") {}
 
-  // True for a new row; throws for another one of the same key.
+  // True for a new row; throws when a different row with the same key exists.
   bool Write(const Row& row) {
     find_.Reset();
     for (size_t i = 0; i < key_columns_.size(); ++i) {
@@ -160,7 +160,7 @@ class RowWriter {
   SqliteStatement insert_;
 };
 
-// What a row is about, for an error.
+// Describes the subject of a row for an error message.
 std::string DescribeRow(const DatabaseKeys& input, const Row& row) {
   const auto name = [&input](int64_t id) {
     const auto image = input.images.find(id);
@@ -186,7 +186,7 @@ int64_t MergeRows(const std::string& table, const DatabaseKeys& input,
                   const MergedIds& ids, SqliteConnection* source,
                   SqliteConnection* target) {
   std::vector<std::string> columns = source->Columns(table);
-  // SQLite numbers these; nothing refers to them.
+  // SQLite assigns these ids; no other table refers to them.
   columns.erase(std::remove(columns.begin(), columns.end(), "pose_prior_id"),
                 columns.end());
   RowWriter writer(table, columns, target);

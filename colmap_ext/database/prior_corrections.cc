@@ -9,12 +9,12 @@
 #include "colmap_ext/database/inertial_tables.h"
 #include "colmap_ext/database/prior_tables.h"
 #include "colmap_ext/io/double_blob.h"
-#include "global/calibration/correct_camera_mount.h"
+#include "global/calibration/correct_camera_imu_rotation.h"
 
 namespace adasfm {
 namespace {
 
-constexpr char kMountTable[] = "adasfm_camera_mount";
+constexpr char kCorrectionTable[] = "adasfm_camera_mount";
 
 std::array<double, 4> ToQvec(const Eigen::Quaterniond& q) {
   return {q.w(), q.x(), q.y(), q.z()};
@@ -30,50 +30,53 @@ Eigen::Quaterniond ReadRotation(const SqliteStatement& statement, int column,
   return Eigen::Quaterniond(qvec(0), qvec(1), qvec(2), qvec(3));
 }
 
-void WriteCameraMount(const Eigen::Quaterniond& camera_mount,
-                      SqliteConnection* database) {
+void WriteCameraImuCorrection(const Eigen::Quaterniond& camera_imu_correction,
+                              SqliteConnection* database) {
   database->Execute("CREATE TABLE adasfm_camera_mount (qvec BLOB NOT NULL)");
   SqliteStatement statement(database,
                             "INSERT INTO adasfm_camera_mount VALUES (?)");
-  BindDoubles(&statement, 1, ToQvec(camera_mount).data(), 4);
+  BindDoubles(&statement, 1, ToQvec(camera_imu_correction).data(), 4);
   statement.Step();
 }
 
 }  // namespace
 
 void WritePriorCorrections(
-    const std::optional<Eigen::Quaterniond>& camera_mount,
+    const std::optional<Eigen::Quaterniond>& camera_imu_correction,
     const std::vector<InertialLength>& lengths, SqliteConnection* database) {
   RemovePriorCorrections(database);
-  if (!camera_mount && lengths.empty()) return;
+  if (!camera_imu_correction && lengths.empty()) return;
   CreateMetaTable(database);
-  if (camera_mount) WriteCameraMount(*camera_mount, database);
+  if (camera_imu_correction)
+    WriteCameraImuCorrection(*camera_imu_correction, database);
   WriteInertialLengths(lengths, database);
 }
 
 bool HasPriorCorrections(SqliteConnection* database) {
-  return database->HasTable(kMountTable) ||
+  return database->HasTable(kCorrectionTable) ||
          database->HasTable(kInertialLengthTable);
 }
 
 void RemovePriorCorrections(SqliteConnection* database) {
-  for (const char* table : {kMountTable, kInertialLengthTable}) {
+  for (const char* table : {kCorrectionTable, kInertialLengthTable}) {
     database->Execute(std::string("DROP TABLE IF EXISTS ") + table);
   }
 }
 
-std::optional<Eigen::Quaterniond> ReadCameraMount(SqliteConnection* database) {
-  if (!database->HasTable(kMountTable)) return std::nullopt;
-  SqliteStatement statement(database,
-                            std::string("SELECT qvec FROM ") + kMountTable);
+std::optional<Eigen::Quaterniond> ReadCameraImuCorrection(
+    SqliteConnection* database) {
+  if (!database->HasTable(kCorrectionTable)) return std::nullopt;
+  SqliteStatement statement(
+      database, std::string("SELECT qvec FROM ") + kCorrectionTable);
   if (!statement.Step()) return std::nullopt;
-  return ReadRotation(statement, 0, std::string("table ") + kMountTable);
+  return ReadRotation(statement, 0, std::string("table ") + kCorrectionTable);
 }
 
 double ApplyPriorCorrections(SqliteConnection* database,
                              std::vector<RelativePosePrior>* priors) {
-  if (const auto camera_mount = ReadCameraMount(database)) {
-    for (RelativePosePrior& prior : *priors) TurnPrior(*camera_mount, &prior);
+  if (const auto camera_imu_correction = ReadCameraImuCorrection(database)) {
+    for (RelativePosePrior& prior : *priors)
+      RotatePrior(*camera_imu_correction, &prior);
   }
   return AddInertialLengths(ReadInertialLengths(database), priors);
 }

@@ -14,6 +14,12 @@ namespace adasfm {
 namespace {
 
 constexpr int kSchemaVersion = 1;
+// Those of CreateTables.
+constexpr const char* kTables[] = {
+    "adasfm_image_times",    "adasfm_relative_pose_priors",
+    "adasfm_gravity",        "adasfm_position_priors",
+    "adasfm_gyroscope_bias", "adasfm_length_drift",
+    "adasfm_wheel_scale"};
 
 void CreateTables(SqliteConnection* database) {
   CreateMetaTable(database);
@@ -73,7 +79,7 @@ void WritePriors(const ImageNames& names,
     statement.BindInt(5, row.dt_ns);
     BindDoubles(&statement, 6, qvec.data(), 4);
     BindDoubles(&statement, 7, row.cam2_from_cam1.translation.data(), 3);
-    // Symmetric, so rows or columns first is the same.
+    // Symmetric, so row and column order are the same.
     BindDoubles(&statement, 8, row.covariance.data(), 36);
     statement.BindInt(9, row.flags);
     statement.Step();
@@ -110,7 +116,7 @@ void WritePositions(const ImageNames& names,
   }
 }
 
-// Of the import that began with the first prior.
+// Stored under the first image of the first prior, which identifies the import.
 void WriteGyroscopeBias(const ImageNames& names, const PriorTables& tables,
                         SqliteConnection* database) {
   if (!tables.gyroscope_bias_covariance || tables.priors.empty()) return;
@@ -192,14 +198,9 @@ Status WritePriorTables(const std::string& database_path,
     SqliteTransaction transaction(&database);
     const ImageNames names(&database);
     CreateTables(&database);
-    database.Execute(
-        "DELETE FROM adasfm_image_times;"
-        "DELETE FROM adasfm_relative_pose_priors;"
-        "DELETE FROM adasfm_gravity;"
-        "DELETE FROM adasfm_position_priors;"
-        "DELETE FROM adasfm_gyroscope_bias;"
-        "DELETE FROM adasfm_length_drift;"
-        "DELETE FROM adasfm_wheel_scale;");
+    for (const char* table : kTables) {
+      database.Execute(std::string("DELETE FROM ") + table);
+    }
     WriteImageTimes(names, tables.image_times, &database);
     WritePriors(names, tables.priors, &database);
     WriteGravity(names, tables.gravity, &database);
@@ -217,6 +218,16 @@ Status WritePriorTables(const std::string& database_path,
                          error.what() + "; the database is as it was");
   }
   return Status::Ok();
+}
+
+void RemovePriorTables(SqliteConnection* database) {
+  for (const char* table : kTables) {
+    database->Execute(std::string("DROP TABLE IF EXISTS ") + table);
+  }
+  database->Execute("DROP TABLE IF EXISTS adasfm_inertial_motions");
+  if (database->HasTable("adasfm_meta")) WritePositionOrigin({}, database);
+  WriteRigCameras({}, database);
+  RemovePriorCorrections(database);
 }
 
 }  // namespace adasfm

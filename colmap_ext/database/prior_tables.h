@@ -20,9 +20,9 @@ namespace adasfm {
 
 // The tables adasfm_image_times, adasfm_relative_pose_priors, adasfm_gravity,
 // adasfm_position_priors, adasfm_gyroscope_bias, adasfm_length_drift,
-// adasfm_inertial_motions and adasfm_rig_cameras inside a COLMAP database
-// (docs/reference/formats.md). Databases of before the last five are read as
-// having no positions, no stated bias or drift, no such motions and no rig.
+// adasfm_wheel_scale, adasfm_inertial_motions and adasfm_rig_cameras in a
+// COLMAP database (docs/reference/formats.md). Older databases may lack the
+// last six; their values are then absent.
 
 struct ImageTimeRow {
   image_t image_id = kInvalidImageId;
@@ -41,21 +41,25 @@ struct PriorTables {
   std::vector<RelativePosePrior> priors;
   std::vector<GravityRow> gravity;
   std::vector<PositionPrior> positions;
-  // Of the positions' ENU frame; none for positions in a frame of their own.
+  // Origin of the positions' ENU frame; none for positions in a frame of their
+  // own.
   std::optional<GeodeticPosition> position_origin;
-  // Of what the import left of the gyroscope's bias, in the camera frame,
-  // rad^2/s^2, and without an IMU of the rate that wheels err by alike; none
-  // where neither tells a turn, and in databases of before it.
+  // Covariance of the gyroscope bias that remains after the import, in the
+  // camera frame [rad^2/s^2]; without an IMU, of the common error of the
+  // wheels' turn rate. None where neither sensor measures rotation, and in
+  // databases without the table.
   std::optional<Eigen::Matrix3d> gyroscope_bias_covariance;
   // 1 sigma of the error that the lengths of neighbouring priors share, as a
-  // ratio; 0 where nothing shows one, and in databases of before it.
+  // ratio; 0 where no such error was observed, and in databases without the
+  // table.
   double length_drift_ratio = 0.0;
-  // None without wheels, in databases of before it, and of merged imports.
+  // None without wheels, for merged imports, and in databases without the
+  // table.
   std::optional<WheelScale> wheel_scale;
-  // Of imports with an IMU: consecutive images, in order of time.
+  // Of imports with an IMU: between consecutive images, in order of time.
   std::vector<InertialMotion> inertial_motions;
-  // Of one rig of several cameras; all known. Written here, and read by
-  // ReadCameraRigs.
+  // Of one rig of several cameras, all with known cam_from_rig. Written by
+  // WritePriorTables, but read by ReadCameraRigs.
   std::map<camera_t, RigCamera> rig_cameras;
 };
 
@@ -64,22 +68,25 @@ struct PriorTables {
 Status WritePriorTables(const std::string& database_path,
                         const PriorTables& tables);
 
+// Removes what WritePriorTables and adasfm_global wrote. Throws SqliteError.
+void RemovePriorTables(SqliteConnection* database);
+
 struct LoadedPriorTables {
   PriorTables tables;
-  // Rows of images that the database does not have any more.
+  // Rows of images that the database no longer has.
   int num_ignored_rows = 0;
 };
 
 // Without the tables the result is empty. Rows are matched by image name: where
-// the ids have changed since the import the present ones are returned. An error
-// for rows that could not have been written by WritePriorTables.
+// ids have changed since the import, the present ids are returned. An error for
+// rows that WritePriorTables could not have written.
 StatusOr<LoadedPriorTables> ReadPriorTables(const std::string& database_path);
 
 // As above on an open connection; throws SqliteError.
 LoadedPriorTables ReadPriorTables(SqliteConnection* database);
 
-// Creates adasfm_meta when needed, and throws SqliteError when its schema
-// version is not ours.
+// CreateMetaTable creates adasfm_meta when needed. Both throw SqliteError when
+// the schema version is not ours.
 void CreateMetaTable(SqliteConnection* database);
 void CheckMetaTable(SqliteConnection* database);
 

@@ -19,7 +19,7 @@
 namespace adasfm {
 namespace {
 
-// As imported: lengths of adasfm_global are no rows here.
+// Flags of imported priors; lengths of adasfm_global are not stored here.
 constexpr uint32_t kAllFlags =
     kPriorRotation | kPriorDirection | kPriorLength | kPriorWheelSlip;
 
@@ -50,7 +50,7 @@ RelativePosePrior PriorFromRow(const SqliteStatement& statement) {
   DoublesFromBlob(statement, 4, row, 3, tvec.data());
   DoublesFromBlob(statement, 5, row, 36, prior.covariance.data());
   const int64_t flags = statement.Int(6);
-  // Variances may be infinite, and what is not observed may be anything finite.
+  // Variances may be infinite, and unobserved values may be anything finite.
   if (!tvec.allFinite() || !(std::abs(qvec.norm() - 1.0) < 1e-6) ||
       prior.covariance.hasNaN() ||
       !(prior.covariance.diagonal().array() >= 0.0).all() || prior.dt_ns < 0 ||
@@ -63,8 +63,8 @@ RelativePosePrior PriorFromRow(const SqliteStatement& statement) {
   return prior;
 }
 
-// Chains of consecutive images one after the other, by their first times, and
-// each in order of time: several drives may have gone on at the same time.
+// Sorts by chains of consecutive images: chains by their first time, and the
+// priors of a chain by time. Several drives may overlap in time.
 void SortByChain(const std::map<image_t, timestamp_t>& times,
                  std::vector<RelativePosePrior>* priors) {
   std::map<image_t, int> index_of;
@@ -94,7 +94,8 @@ void SortByChain(const std::map<image_t, timestamp_t>& times,
       });
 }
 
-// The images that a row names first; counts it when the database lacks one.
+// The images that a row names in its first columns; counts the row when the
+// database lacks one.
 std::optional<std::pair<image_t, image_t>> ResolvePair(
     const ImageNames& names, const SqliteStatement& statement,
     LoadedPriorTables* loaded) {
@@ -186,7 +187,7 @@ void ReadPositions(const ImageNames& names, SqliteConnection* database,
   }
 }
 
-// Of merged imports, the one that knows its gyroscope's bias worst.
+// For merged imports, the covariance with the largest trace.
 void ReadGyroscopeBias(SqliteConnection* database, PriorTables* tables) {
   if (!database->HasTable("adasfm_gyroscope_bias")) return;
   SqliteStatement statement(
@@ -205,7 +206,7 @@ void ReadGyroscopeBias(SqliteConnection* database, PriorTables* tables) {
   }
 }
 
-// Of merged imports, the one with the largest.
+// For merged imports, the largest value.
 void ReadLengthDrift(SqliteConnection* database, PriorTables* tables) {
   if (!database->HasTable("adasfm_length_drift")) return;
   SqliteStatement statement(
@@ -220,7 +221,7 @@ void ReadLengthDrift(SqliteConnection* database, PriorTables* tables) {
   }
 }
 
-// Of several imports each has its own.
+// Several imports have different scales; the result then has none.
 void ReadWheelScale(SqliteConnection* database, PriorTables* tables) {
   if (!database->HasTable("adasfm_wheel_scale")) return;
   SqliteStatement statement(

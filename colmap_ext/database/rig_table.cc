@@ -32,7 +32,7 @@ RigCamera CameraFromRow(const SqliteStatement& statement) {
   return camera;
 }
 
-// One frame for all images of one time.
+// All images with the same time form one frame.
 void FillFramesByTime(SqliteConnection* database, CameraRigs* rigs) {
   SqliteStatement statement(database,
                             "SELECT images.image_id, camera_id, "
@@ -87,7 +87,8 @@ CameraRigs ReadCameraRigs(SqliteConnection* database) {
     cameras[static_cast<camera_t>(statement.Int(0))] = CameraFromRow(statement);
   }
   if (!rigs.empty()) {
-    // The host's ids and frames; what the import knows of the poses.
+    // Keeps the host's ids and frames, and takes poses and sigmas of the
+    // import.
     for (auto& [camera_id, camera] : rigs.cameras) {
       const auto known = cameras.find(camera_id);
       if (known == cameras.end() ||

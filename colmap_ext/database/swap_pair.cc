@@ -73,7 +73,7 @@ void SwapPair(std::map<std::string, SqliteValue>* row) {
     ChangeMatrix<Matrix>(row, column,
                          [](const Matrix& m) { return m.transpose(); });
   }
-  // Rows or columns first is the same for transposing and inverting.
+  // Row and column order do not matter for transposing and inverting.
   ChangeMatrix<Matrix>(row, "H",
                        [](const Matrix& m) -> Matrix { return m.inverse(); });
   InvertPose(row);

@@ -8,10 +8,10 @@
 
 namespace adasfm {
 
-// A row of matches or two_view_geometries by its columns, with the two images
-// of the pair exchanged: columns of the matches, F and E transposed, H and pose
-// inverted, camera1 and camera2 exchanged. Missing values (NULL, zeros) stay
-// missing. Throws SqliteError for blobs of wrong sizes.
+// Exchanges the two images of a pair in a row of matches or
+// two_view_geometries: swaps the columns of the matches, transposes F and E,
+// inverts H and the pose, and swaps camera1 and camera2. Missing values (NULL,
+// zeros) stay missing. Throws SqliteError for blobs of wrong sizes.
 void SwapPair(std::map<std::string, SqliteValue>* row);
 
 }  // namespace adasfm

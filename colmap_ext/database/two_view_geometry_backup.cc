@@ -13,9 +13,9 @@
 namespace adasfm {
 namespace {
 
-// Like two_view_geometries, all of whose columns it has, those of a newer
-// COLMAP too. written_digest belongs to the row that took this one's place;
-// NULL when none did.
+// The table has all columns of two_view_geometries, including those of newer
+// COLMAPs. written_digest is the digest of the row that replaced this one; NULL
+// when none did.
 void CreateTable(SqliteConnection* database) {
   CreateMetaTable(database);
   database->Execute(
@@ -41,9 +41,9 @@ std::string CommonColumns(SqliteConnection* database) {
   return list;
 }
 
-// Digests of the present two_view_geometries. A matrix or pose that is missing
-// counts as zeros: COLMAP 4 replaces the zeros of an older file by NULL when it
-// opens it.
+// Digests of the present two_view_geometries. A missing matrix or pose is
+// digested as zeros, since COLMAP 4 replaces the zeros of an older file by NULL
+// when it opens the file.
 class RowDigester {
  public:
   explicit RowDigester(SqliteConnection* database)
@@ -96,7 +96,7 @@ std::map<image_t, std::string> ReadNames(SqliteConnection* database) {
   return names;
 }
 
-// Sorts the kept rows into those that count and the number of the others.
+// Returns the valid kept rows, and the number of the others.
 std::vector<int64_t> FindCurrentRows(SqliteConnection* database,
                                      int* num_outdated) {
   *num_outdated = 0;
@@ -137,7 +137,7 @@ bool AreZeros(const double* values, int num_values) {
                      [](double value) { return value == 0.0; });
 }
 
-// The doubles of a column; zeros when the row has none there.
+// The doubles of a column; zeros when the row has no such blob.
 std::vector<double> ReadDoubles(const SqliteStatement& statement, int column,
                                 int num_values) {
   std::vector<double> values(num_values, 0.0);
@@ -149,9 +149,8 @@ std::vector<double> ReadDoubles(const SqliteStatement& statement, int column,
   return values;
 }
 
-// Writes NULL for the matrices and poses of a row that mean "none" in a file of
-// COLMAP 3 (zeros, and the pose of no rotation and no translation), as COLMAP 4
-// does with such a file.
+// Replaces by NULL the matrices and poses that mean "none" in a file of COLMAP
+// 3 (zeros, and the identity pose), as COLMAP 4 does with such a file.
 void ClearMissing(int64_t pair_id, SqliteConnection* database) {
   std::vector<std::string> cleared;
   {
@@ -264,7 +263,7 @@ Status RewriteTwoViewGeometries(
     const std::string& database_path,
     const std::vector<NewTwoViewGeometry>& rows,
     const std::vector<ImagePair>& removed,
-    const std::optional<Eigen::Quaterniond>& camera_mount,
+    const std::optional<Eigen::Quaterniond>& camera_imu_correction,
     const std::vector<InertialLength>& lengths) {
   const Status checked = CheckDatabase(database_path);
   if (!checked.ok()) return checked;
@@ -280,7 +279,7 @@ Status RewriteTwoViewGeometries(
     RemoveRows(removed, &database);
     WriteTwoViewGeometries(&database, rows);
     RecordDigests(rows, &database);
-    WritePriorCorrections(camera_mount, lengths, &database);
+    WritePriorCorrections(camera_imu_correction, lengths, &database);
     transaction.Commit();
   } catch (const SqliteError& error) {
     return Status::Error("cannot rewrite the two-view geometries of " +

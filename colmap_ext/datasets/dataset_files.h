@@ -10,21 +10,21 @@
 
 namespace adasfm {
 
-// Helpers to read the calibration files of known datasets. What is wrong with a
-// file is thrown as std::runtime_error, with a message for the user.
+// Helpers to read the calibration files of known datasets. They throw faults of
+// a file as std::runtime_error, with a message for the user.
 
-// Throws unless the folder, or the file with something in it, exists.
+// Throws unless the folder or a non-empty file exists at the path.
 void RequireFile(const std::string& path);
 bool PathExists(const std::string& path);
 
 std::string ReadText(const std::string& path);
 
-// All numbers of a text, in order; throws for a word that is no finite number.
+// All numbers of a text, in order; throws for any other word.
 std::vector<double> NumbersFromText(const std::string& text,
                                     const std::string& path);
 
-// "key: numbers" lines, as in KITTI's calibration files; lines whose values are
-// no numbers (dates) are left out.
+// "key: numbers" lines, as in KITTI's calibration files; lines with other
+// values (dates) are skipped.
 std::map<std::string, std::vector<double>> ReadKeyedNumbers(
     const std::string& path);
 // The numbers of a key; throws when it is missing or has another count.
@@ -32,7 +32,7 @@ const std::vector<double>& FindNumbers(
     const std::map<std::string, std::vector<double>>& values,
     const std::string& key, size_t count, const std::string& path);
 
-// The matrix itself; throws unless it is a rotation.
+// Returns the matrix; throws unless it is a rotation.
 Eigen::Matrix3d RequireRotation(const Eigen::Matrix3d& matrix,
                                 const std::string& path);
 

@@ -16,7 +16,7 @@ namespace {
 
 YAML::Node ReadYaml(const std::string& path) {
   std::string text = ReadText(path);
-  // OpenCV's header is no YAML.
+  // OpenCV's header line is not valid YAML.
   if (text.rfind("%YAML:", 0) == 0) text.erase(0, text.find('\n'));
   try {
     return YAML::Load(text);

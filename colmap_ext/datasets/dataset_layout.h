@@ -7,30 +7,30 @@
 
 namespace adasfm {
 
-// Where a recording keeps what the reconstruction needs. What is empty, the
-// recording does not have.
+// Paths in a recording that the reconstruction needs. Empty members: the
+// recording does not have them.
 struct DatasetLayout {
   std::string image_path;  // folder of the photos
   // COLMAP's name and parameters (comma-separated); pixel centres at 0.5.
   std::string camera_model;
   std::string camera_params;
   std::string imu_path;
-  // Files that are there already, or the text of ones to be written.
+  // Existing files, or the text of files to write.
   std::string image_times_path;
   std::string image_times_text;
   std::string sensors_text;  // docs/reference/sensors.md
-  // The IMU's period: logs of 10 Hz are not taken for logs with gaps.
+  // Period of the IMU, so that a log of 10 Hz is not taken for a log with gaps.
   double imu_period_s = 0.0;
 };
 
-// Finds the recording of a known format at its root folder (docs/
-// automatic_reconstruction.md says what is read from where):
+// Finds the files of a recording of a known format at its root folder
+// (docs/guide/automatic_reconstruction.md lists them):
 //   euroc     a folder with mav0/, or mav0/ itself
 //   4seasons  a recording; its calibration/ inside or beside it
 //   kitti     a raw drive (the calibration in the folder above), or a sequence
 //             of the odometry benchmark
 //   tum       an RGB-D sequence; no calibration, no IMU
-// The first camera is used (KITTI: the left colour camera when it is there).
+// The first camera is used (KITTI: the left colour camera, if available).
 // Errors name the file that is missing or malformed.
 StatusOr<DatasetLayout> FindDatasetLayout(const std::string& format,
                                           const std::string& root);

@@ -21,14 +21,15 @@ namespace {
 using KeyedNumbers = std::map<std::string, std::vector<double>>;
 using ProjectionMatrix = Eigen::Matrix<double, 3, 4, Eigen::RowMajor>;
 
-// The left colour camera, else the left grey one: the folder's suffix.
+// Suffix of the left colour camera's folder if it exists, else of the left grey
+// one.
 std::string FindCamera(const std::string& root, const std::string& colour,
                        const std::string& grey) {
   return PathExists(root + "/image_" + colour) ? colour : grey;
 }
 
-// The numbered images of a folder, by name; what a file manager left there is
-// none.
+// The numbered images of a folder, sorted by name; skips files that a file
+// manager left there.
 std::vector<std::string> ListImages(const std::string& folder) {
   RequireFile(folder);
   std::vector<std::string> names;
@@ -42,8 +43,8 @@ std::vector<std::string> ListImages(const std::string& folder) {
   return names;
 }
 
-// PINHOLE of the rectified images. KITTI counts pixels from whole centres,
-// COLMAP from .5.
+// PINHOLE of the rectified images. KITTI has pixel centres at whole numbers,
+// COLMAP at .5.
 void SetCamera(const ProjectionMatrix& projection, DatasetLayout* layout) {
   layout->camera_model = "PINHOLE";
   layout->camera_params =
@@ -72,7 +73,7 @@ ProjectionMatrix ToProjection(const std::vector<double>& numbers) {
   return Eigen::Map<const ProjectionMatrix>(numbers.data());
 }
 
-// "2011-09-26 13:02:25.964389445", counted from 1970 as the IMU's times are.
+// "2011-09-26 13:02:25.964389445"; counted from 1970, as the IMU's times.
 timestamp_t ParseTime(const std::string& line, const std::string& path) {
   struct tm date = {};
   int64_t nanoseconds = 0;
@@ -111,8 +112,8 @@ double ImuRateHz(const std::string& times_path) {
   return (times.size() - 1) / duration_s;
 }
 
-// "ns,name" lines; the k-th line of the timestamps belongs to the k-th photo of
-// the complete drive, whose name is its number.
+// "ns,name" lines. A photo's name is its number in the complete drive; its time
+// is in the line of this number.
 std::string BuildImageTimes(const std::string& times_path,
                             const std::string& image_path) {
   const std::vector<timestamp_t> times = ReadTimes(times_path);
@@ -130,8 +131,8 @@ std::string BuildImageTimes(const std::string& times_path,
   return text.str();
 }
 
-// x_rect = R_rect x_cam0 shifted by the camera's baseline, which the last
-// column of its projection matrix holds in pixels.
+// x_rect = R_rect x_cam0, shifted by the camera's baseline, which the last
+// column of its projection matrix gives in pixels.
 Rigid3d RectifiedFromCam0(const KeyedNumbers& values, const std::string& camera,
                           const std::string& path,
                           const ProjectionMatrix& projection) {
@@ -155,7 +156,7 @@ StatusOr<DatasetLayout> FindKittiRawLayout(const std::string& root) {
   layout.imu_path = root + "/oxts";
   layout.image_times_text =
       BuildImageTimes(folder + "/timestamps.txt", layout.image_path);
-  // The calibration belongs to the day, whose folder holds the drives.
+  // The calibration belongs to the day, whose folder contains the drives.
   const std::string day =
       PathExists(root + "/calib_cam_to_cam.txt") ? root : root + "/..";
   const std::string camera_path = day + "/calib_cam_to_cam.txt";
@@ -183,7 +184,7 @@ StatusOr<DatasetLayout> FindKittiOdometryLayout(const std::string& root) {
   SetCamera(
       ToProjection(FindNumbers(values, "P" + camera, 12, calibration_path)),
       &layout);
-  // times.txt has one line a photo, in seconds.
+  // times.txt has one line per photo, in seconds.
   const std::string times_path = root + "/times.txt";
   const std::vector<double> times =
       NumbersFromText(ReadText(times_path), times_path);

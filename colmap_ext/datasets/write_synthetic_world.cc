@@ -69,7 +69,7 @@ size_t NumCameras(const SyntheticWorld& world) {
   return 1 + world.images.back().camera_index;
 }
 
-// COLMAP's class prints that a write has failed and goes on.
+// COLMAP's class prints a message about a failed write and continues.
 bool HasAllRows(const SyntheticWorld& world, const std::string& path) {
   const std::pair<const char*, size_t> tables[] = {
       {"cameras", NumCameras(world)},
@@ -77,7 +77,8 @@ bool HasAllRows(const SyntheticWorld& world, const std::string& path) {
       {"keypoints", world.images.size()},
       {"matches", world.pairs.size()},
       {"two_view_geometries", world.pairs.size()}};
-  // What COLMAP's class could not move from there on closing would be lost.
+  // Rows that COLMAP's class could not move from the -wal file on closing would
+  // be lost.
   if (fs::exists(path + "-wal")) return false;
   try {
     SqliteConnection database(path, SqliteConnection::Mode::kRead);
@@ -172,7 +173,7 @@ void WriteCamera(const SyntheticWorld& world, int index,
   const SyntheticCamera& camera = world.camera;
   const bool is_fisheye = camera.model == SyntheticCameraModel::kFisheye;
   const Eigen::Vector4d& k = camera.fisheye_coeffs;
-  // Calibration tools put pixel centres at whole numbers, COLMAP at .5.
+  // Calibration tools have pixel centres at whole numbers, COLMAP at .5.
   *file << "cam" << index << ":\n  camera_model: pinhole\n"
         << "  intrinsics: [" << camera.focal_px << ", " << camera.focal_px
         << ", " << camera.principal_x_px - 0.5 << ", "
@@ -200,7 +201,7 @@ void WriteSensors(const SyntheticWorld& world, std::ostream* file) {
         << noise.accelerometer_noise_density
         << "\n  accelerometer_random_walk: " << noise.accelerometer_random_walk
         << "\nwheel0:\n  type: differential\n  update_rate: "
-        << options.wheel_rate_hz << "\n  track_width: " << world.track_width_m
+        << kSyntheticWheelRateHz << "\n  track_width: " << world.track_width_m
         << "\n  speed_noise: " << options.wheel_speed_noise << "\n";
   WriteTransform("T_imu_wheel", world.imu_from_wheel, file);
   if (world.gnss_fixes.empty()) return;
@@ -214,7 +215,7 @@ void WriteGnss(const SyntheticWorld& world, std::ostream* file) {
            "sigma_horizontal [m],sigma_vertical [m]\n"
         << std::setprecision(17);
   const EnuFrame frame(kSyntheticWorldOrigin);
-  // A receiver never states an error of nothing.
+  // No receiver states an error of zero.
   const double sigma_m = std::max(0.01, world.options.gnss_noise_m);
   for (const SyntheticFix& fix : world.gnss_fixes) {
     const GeodeticPosition position =
@@ -238,7 +239,8 @@ void WriteSummary(const SyntheticWorld& world, std::ostream* file) {
 
 Status WriteSyntheticDatabase(const SyntheticWorld& world,
                               const std::string& path) {
-  // COLMAP ends the process when it cannot open a file: try first.
+  // COLMAP ends the process when it cannot open a file, so this is tested
+  // first.
   const std::string temporary = path + ".tmp";
   RemoveDatabase(temporary);
   Status status = WriteTextFile(temporary, "");
@@ -268,8 +270,8 @@ Status WriteSyntheticDatabase(const SyntheticWorld& world,
 Status WriteSyntheticLogs(const SyntheticWorld& world,
                           const std::string& folder) {
   using Writer = void (*)(const SyntheticWorld&, std::ostream*);
-  // landmarks.txt first: it tells a world of ours, which may be replaced when
-  // this run is interrupted.
+  // landmarks.txt comes first: it marks a world of ours, so that a later run
+  // may replace it when this run is interrupted.
   std::vector<std::pair<const char*, Writer>> files = {
       {"landmarks.txt", WriteLandmarks}, {"imu.csv", WriteImu},
       {"wheel.csv", WriteWheels},        {"times.csv", WriteTimes},

@@ -16,7 +16,7 @@ namespace {
 
 using PairPoses = std::map<ImagePair, Rigid3d>;
 
-// Relative poses as the global stage starts from them: stored, or decomposed.
+// Relative poses from which the global stage starts.
 PairPoses FindPairPoses(const SceneData& scene) {
   std::map<image_t, std::vector<Bearing>> bearings;
   for (const auto& [image_id, image] : scene.images) {
@@ -32,7 +32,7 @@ PairPoses FindPairPoses(const SceneData& scene) {
   return poses;
 }
 
-// Looks up what is true of a pair.
+// Looks up the truth of a pair.
 class PairTruth {
  public:
   PairTruth(const SceneData& scene, const NamedPoses& poses,
@@ -73,7 +73,7 @@ class PairTruth {
   std::map<image_t, const std::vector<int>*> landmarks_;
 };
 
-// Sums up one set of two-view geometries.
+// Accumulates the figures of one set of two-view geometries.
 class PairSetCounter {
  public:
   explicit PairSetCounter(const PairTruth& truth) : truth_(truth) {}

@@ -14,8 +14,8 @@
 namespace adasfm {
 namespace {
 
-// All pairs up to here (2,000 images); beyond, as many at random, which settles
-// a percentage to 0.1.
+// All pairs up to this number (2,000 images); with more images, this number of
+// random pairs, which gives a percentage to within 0.1.
 constexpr size_t kMaxNumAucPairs = 2000000;
 
 constexpr int kNumTrimmedRefits = 5;
@@ -47,7 +47,7 @@ std::vector<double> ComputeDistances(const std::vector<PosePair>& poses,
   return distances;
 }
 
-// Least squares over the poses nearer than the threshold.
+// Least squares over the poses whose distance is below the threshold.
 bool Align(const std::vector<PosePair>& poses,
            const std::vector<double>& distances, double threshold,
            const AlignmentOptions& options, Sim3d* true_from_model) {
@@ -61,8 +61,8 @@ bool Align(const std::vector<PosePair>& poses,
   return EstimateSim3d(centers, true_centers, options, true_from_model);
 }
 
-// The rotation of the world that suits the orientations nearer than the
-// threshold best (chordal mean).
+// The rotation of the world that best fits the orientations with angles below
+// the threshold (chordal mean).
 Eigen::Quaterniond AlignOrientations(const std::vector<PosePair>& poses,
                                      const std::vector<double>& angles_deg,
                                      double threshold_deg) {
@@ -109,8 +109,8 @@ AlignmentErrors ComputeErrors(const std::vector<PosePair>& poses,
   return errors;
 }
 
-// The median angle after the best rotation of the world, refitted to the
-// images within three medians.
+// The median angle after the best rotation of the world, refitted to the images
+// within three medians.
 double ComputeOrientationError(const std::vector<PosePair>& poses) {
   std::vector<double> angles_deg(poses.size(), 0.0);
   double threshold_deg = 1.0;
@@ -211,7 +211,7 @@ NamedPoses PosesOfModel(const colmap::Reconstruction& reconstruction) {
 }
 
 double ComputeReprojectionRmse(const colmap::Reconstruction& reconstruction) {
-  // In order of ids: a sum depends on its order.
+  // Sums in order of ids, since rounding depends on the order.
   std::map<colmap::point3D_t, const colmap::Point3D*> points;
   for (const auto& [point3D_id, point] : reconstruction.Points3D()) {
     points[point3D_id] = &point;

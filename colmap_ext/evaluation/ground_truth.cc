@@ -24,8 +24,8 @@ bool IsNumber(const std::string& word) {
   return !word.empty() && *end == '\0';
 }
 
-// Whether the first line that is not a comment begins with a number: a time,
-// not an image name.
+// Whether the first line that is not a comment begins with a number, which is a
+// time and not an image name.
 bool IsTrajectory(const std::string& path) {
   std::ifstream file(path);
   ThrowOnFailure(&file);

@@ -17,13 +17,13 @@ struct RelativePoseAuc {
   double translation_percent = 0.0;  // of the direction
 };
 
-// Sums over pairs, at the paper's thresholds.
+// Accumulates errors of pairs at the paper's thresholds.
 class RelativePoseAucCounter {
  public:
-  // Only the translations' directions count; without a true baseline there is
-  // none to be right or wrong.
+  // Only the directions of translations are compared; pairs without a true
+  // baseline have no direction error.
   void Add(const Rigid3d& cam2_from_cam1, const Rigid3d& true_cam2_from_cam1);
-  // One for each threshold, ascending; zeros without pairs.
+  // One entry per threshold, ascending; zeros without pairs.
   std::vector<RelativePoseAuc> Result() const;
 
  private:

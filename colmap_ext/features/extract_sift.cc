@@ -15,7 +15,7 @@
 namespace adasfm {
 namespace {
 
-// Images of one transaction, for each thread: what a kill loses.
+// Images per transaction and thread; a kill loses one transaction.
 constexpr size_t kNumImagesPerThread = 4;
 
 struct ImageToExtract {
@@ -57,7 +57,7 @@ void WriteFeatures(image_t image_id, const SiftFeatures& features,
                             "(image_id, rows, cols, data) VALUES(?, ?, ?, ?)");
   BindRows(image_id, features.keypoints, &keypoints);
   keypoints.Step();
-  // COLMAP 4 tells kinds of descriptors apart; SIFT is its 0.
+  // COLMAP 4 distinguishes types of descriptors; SIFT is type 0.
   const bool has_type = HasColumn(database, "descriptors", "type");
   SqliteStatement descriptors(
       database,
@@ -71,7 +71,7 @@ void WriteFeatures(image_t image_id, const SiftFeatures& features,
 
 SiftFeatures ExtractFromFile(const SiftFeatureOptions& options,
                              const std::string& path) {
-  // As it is stored: COLMAP does not turn photos either.
+  // Ignores the orientation of EXIF, as COLMAP does.
   const cv::Mat image =
       cv::imread(path, cv::IMREAD_GRAYSCALE | cv::IMREAD_IGNORE_ORIENTATION);
   if (image.empty()) {
@@ -109,7 +109,7 @@ void ExtractAll(const SiftFeatureOptions& options, int num_threads,
   }
 }
 
-// Every image has its own thread, so OpenCV needs none.
+// Every image has its own thread, so OpenCV uses one.
 class SingleThreadedOpenCv {
  public:
   SingleThreadedOpenCv() : num_threads_(cv::getNumThreads()) {

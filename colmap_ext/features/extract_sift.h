@@ -9,10 +9,10 @@
 
 namespace adasfm {
 
-// Writes the SIFT features of all images of the database that have none yet,
-// so that an interrupted call continues; a few images are in memory at a time.
-// An interruption by `progress` leaves the database whole. image_path: the
-// folder that the images' names begin in. num_threads: -1 for all. An error
+// Writes the SIFT features of all images of the database that have none yet, so
+// that an interrupted call continues; a few images are in memory at a time. An
+// interruption by `progress` leaves the database consistent. image_path: the
+// folder that image names are relative to. num_threads: -1 for all. The error
 // names an image that OpenCV cannot read, or the database's fault. Throws
 // std::invalid_argument for invalid options.
 Status ExtractSiftOfDatabase(const SiftFeatureOptions& options, int num_threads,

@@ -13,23 +13,23 @@
 namespace adasfm {
 namespace {
 
-// COLMAP's defaults (SiftExtractionOptions); its peak threshold is this one
-// divided by the number of scales, as OpenCV does itself.
+// COLMAP's defaults (SiftExtractionOptions). OpenCV divides the contrast
+// threshold by the number of scales, which gives COLMAP's peak threshold.
 constexpr int kScalesPerOctave = 3;
 constexpr double kContrastThreshold = 0.02;
 constexpr double kEdgeThreshold = 10.0;
 constexpr double kFirstSigma = 1.6;
-// OpenCV counts from the centre of the first pixel, COLMAP from its corner.
-// OpenCV's doubled image lies a quarter of a pixel beside: pixel x of the image
-// is at 2 x + 0.5, and the keypoint's place there is only halved.
+// OpenCV's coordinates start at the centre of the first pixel, COLMAP's at its
+// corner. OpenCV's doubled image is shifted by a quarter of a pixel: pixel x of
+// the image is at 2 x + 0.5, but OpenCV only halves keypoint positions.
 constexpr float kCenterFromCorner = 0.5F;
 constexpr float kDoublingShift = -0.25F;
 // OpenCV gives the diameter at one sigma.
 constexpr float kScaleFromSize = 0.5F;
 constexpr float kDescriptorFactor = 512.0F;
 
-// Scales the image down to options.max_image_size. Returns the factor from its
-// pixels to those of the image as it was, for x and for y.
+// Scales the image down to max_image_size. Returns the factors, for x and y,
+// from its pixels to those of the original image.
 Eigen::Vector2f LimitSize(int max_image_size, cv::Mat* image) {
   const int larger = std::max(image->cols, image->rows);
   if (larger <= max_image_size) return Eigen::Vector2f::Ones();
@@ -44,7 +44,7 @@ Eigen::Vector2f LimitSize(int max_image_size, cv::Mat* image) {
   return scale;
 }
 
-// Indices of the largest ones, the largest first; equal sizes in an order that
+// Indices of the largest keypoints, the largest first; the order of equal sizes
 // does not depend on the detector's threads.
 std::vector<size_t> FindLargest(const std::vector<cv::KeyPoint>& keypoints,
                                 size_t max_count) {

@@ -9,9 +9,9 @@
 
 namespace adasfm {
 
-// Reads numbers from one of COLMAP's binary files without believing its counts.
-// A read beyond the end gives zero and makes the reader fail for good, so that
-// a caller checks once at the end.
+// Reads numbers from one of COLMAP's binary files without trusting its counts.
+// A read beyond the end returns zero, and the reader then fails for good, so
+// that a caller needs to check only once at the end.
 class BinaryFileReader {
  public:
   explicit BinaryFileReader(const std::string& path)
@@ -22,10 +22,10 @@ class BinaryFileReader {
   }
 
   bool ok() const { return ok_; }
-  // All was read, and nothing beyond.
+  // The whole file was read, and no read went beyond its end.
   bool AtEnd() const { return ok_ && num_bytes_left_ == 0; }
 
-  // As if the file ended here.
+  // Makes the reader fail, as a read beyond the end does.
   void Fail() { ok_ = false; }
 
   template <typename T>
@@ -46,7 +46,7 @@ class BinaryFileReader {
     if (ok_) Skip(count * element_num_bytes);
   }
 
-  // A text with a zero behind it.
+  // A zero-terminated text.
   void SkipName() {
     while (Read<char>() != '\0') {
     }

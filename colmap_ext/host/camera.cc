@@ -8,12 +8,12 @@
 namespace adasfm {
 namespace {
 
-// COLMAP inverts distortions by iteration; a pixel is taken back to itself to
-// within this, or it has no ray.
+// COLMAP inverts distortions by iteration. A pixel has a ray only when
+// projecting the ray returns the pixel within this distance.
 constexpr double kMaxRoundTripError_px = 0.05;
 
-// Central differences of COLMAP's analytic projection: step^2 is far below, and
-// epsilon / step well below, what a pixel means.
+// Step of central differences of COLMAP's analytic projection: the errors of
+// order step^2 and epsilon / step are both far below the accuracy of a pixel.
 constexpr double kStep = 1e-5;
 
 // d pixel / d (x/z, y/z).
@@ -50,7 +50,7 @@ std::optional<Bearing> ComputeBearing(const colmap::Camera& camera,
   }
   const Eigen::Matrix2d projection =
       ComputeProjectionJacobian(camera, normalized);
-  // Where the distortion folds back, the image turns inside out.
+  // Where the distortion is not monotonic, the projection reverses orientation.
   if (!(projection.determinant() > 0.0)) return std::nullopt;
   Bearing bearing;
   const double norm = normalized.homogeneous().norm();

@@ -15,11 +15,11 @@ bool HasUsableParams(const colmap::Camera& camera);
 
 // The ray of a pixel and its derivative, for every camera model of COLMAP. None
 // where the model cannot be inverted: beyond 90 degrees from the axis, or where
-// a polynomial distortion folds back.
+// a polynomial distortion is not monotonic.
 std::optional<Bearing> ComputeBearing(const colmap::Camera& camera,
                                       const Eigen::Vector2d& pixel);
 
-// One ray a keypoint; direction and Jacobian are zero where there is none.
+// One ray per keypoint; direction and Jacobian are zero where there is no ray.
 std::vector<Bearing> ComputeBearings(
     const colmap::Camera& camera, const std::vector<Eigen::Vector2d>& pixels);
 

@@ -10,8 +10,8 @@
 
 namespace adasfm {
 
-// Camera models by their numbers, which are the same in all versions, and those
-// that newer COLMAPs have and the linked library has not.
+// Camera models by their numbers, which are the same in all versions of COLMAP,
+// including models that newer versions have and the linked library lacks.
 
 bool IsNewerCameraModel(int model_id);
 
@@ -28,7 +28,8 @@ std::optional<int> CameraModelId(const std::string& name);
 // The names of a model's parameters, comma-separated, in their order.
 std::string CameraModelParamsInfo(int model_id);
 
-// Of a lens without distortion, the principal point in the middle; px.
+// Parameters of a lens without distortion, with the principal point in the
+// image centre [px].
 std::vector<double> InitialCameraParams(int model_id, double focal_length_px,
                                         size_t width_px, size_t height_px);
 
@@ -37,7 +38,7 @@ std::vector<double> InitialCameraParams(int model_id, double focal_length_px,
 // OPENCV_FISHEYE without distortion. Others stay as they are.
 void ConvertCameraModel(int* model_id, std::vector<double>* params);
 
-// An error, naming the model, when a camera's model is a newer COLMAP's and
+// An error, naming the model, when a camera has a model of a newer COLMAP that
 // cannot be converted.
 Status CheckCameraModels(const std::string& path, SqliteConnection* database);
 

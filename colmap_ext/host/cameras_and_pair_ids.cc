@@ -7,7 +7,7 @@
 
 namespace adasfm {
 
-// Of COLMAP's pair ids, in all its versions.
+// Factor in COLMAP's pair ids, the same in all versions.
 static constexpr int64_t kPairIdFactor = 2147483647;
 
 [[noreturn]] static void ThrowRowError(int64_t row, const std::string& what) {

@@ -23,7 +23,8 @@ std::vector<FeatureMatch> MatchesFromRow(const SqliteStatement& statement,
   static_assert(sizeof(FeatureMatch) == 2 * sizeof(point2D_t), "blob layout");
   const int64_t num_rows = statement.Int(first_column);
   const int64_t num_bytes = statement.NumBytes(first_column + 2);
-  // A row has bytes: first of all, so that the product cannot overflow.
+  // A row has at least one byte; this check comes first, so that the product
+  // cannot overflow.
   if (num_rows < 0 || num_rows > num_bytes ||
       (num_rows > 0 && statement.Int(first_column + 1) != 2) ||
       num_bytes != num_rows * static_cast<int64_t>(sizeof(FeatureMatch))) {
@@ -41,7 +42,7 @@ std::vector<Eigen::Vector2d> KeypointsFromRow(
   const int64_t num_rows = statement.Int(1);
   const int64_t num_cols = statement.Int(2);
   const int64_t num_bytes = statement.NumBytes(3);
-  // As above; SQLite's blobs have less than 2^31 bytes.
+  // The same checks; SQLite's blobs have less than 2^31 bytes.
   if (num_rows < 0 || num_rows > num_bytes ||
       (num_rows > 0 && (num_cols < 2 || num_cols > num_bytes)) ||
       (num_rows > 0 && num_bytes != num_rows * num_cols *

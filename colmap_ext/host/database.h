@@ -17,15 +17,15 @@
 
 namespace adasfm {
 
-// The database of any COLMAP since 3.6, read over a connection of our own:
+// The database of any COLMAP since 3.6, read through our own SQLite connection:
 // COLMAP's class converts a file when it opens it, and ends the process on bad
 // rows and on files of a newer COLMAP.
 
-// An error for a missing file, one that is no SQLite database, and one that is
-// not COLMAP's. Changes nothing.
+// An error for a missing file, a file that is no SQLite database, and a
+// database that is not COLMAP's. Changes nothing.
 Status CheckDatabase(const std::string& database_path);
 
-// The key of a pair in the host's tables, and back.
+// The key of a pair in the host's tables, and the inverse.
 int64_t PairIdFromImagePair(const ImagePair& pair);
 ImagePair ImagePairFromPairId(int64_t pair_id);
 
@@ -66,9 +66,9 @@ void ReadMatches(
     const std::function<void(const ImagePair&, std::vector<FeatureMatch>)>&
         function);
 
-// Calls function(pair, number of matches) for every pair of `table` (matches,
-// two_view_geometries or one like it) that has at least min_num_matches, in
-// order of the pairs, without reading the matches.
+// Calls function(pair, number of matches), in order of the pairs, for every
+// pair of `table` that has at least min_num_matches, without reading the
+// matches. `table`: matches, two_view_geometries or one with the same columns.
 void CountMatches(
     SqliteConnection* database, const std::string& table, int min_num_matches,
     const std::function<void(const ImagePair&, int64_t)>& function);
@@ -83,8 +83,8 @@ std::vector<FeatureMatch> ReadMatchesOfPair(SqliteConnection* database,
 std::vector<DatabaseTwoViewGeometry> ReadTwoViewGeometries(
     SqliteConnection* database, const std::string& table, int min_num_matches);
 
-// A new row for two_view_geometries: configuration CALIBRATED, E of the pose
-// with a translation of unit length, F of E and the calibration matrices, and
+// A new row for two_view_geometries: configuration CALIBRATED, E from the pose
+// with a translation of unit length, F from E and the calibration matrices, and
 // no H.
 struct NewTwoViewGeometry {
   ImagePair pair;

@@ -8,7 +8,7 @@
 namespace adasfm {
 namespace {
 
-// What COLMAP 3.6 and all later versions have.
+// Columns that COLMAP 3.6 and all later versions have.
 const std::map<std::string, std::vector<std::string>>& RequiredColumns() {
   static const std::map<std::string, std::vector<std::string>> columns = {
       {"cameras", {"camera_id", "model", "width", "height", "params"}},

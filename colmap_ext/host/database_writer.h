@@ -14,10 +14,10 @@
 
 namespace adasfm {
 
-// Writes new rows into a database of the linked library's own kind, by its own
-// class, which creates the file and its tables where there is none, and ends
-// the process when it cannot open the file. A failed write is not reported:
-// count the rows in the end.
+// Writes new rows into a database of the linked library's version, through
+// COLMAP's own class. That class creates a missing file and its tables, and
+// ends the process when it cannot open the file. A failed write is not
+// reported: count the rows in the end.
 class DatabaseWriter {
  public:
   explicit DatabaseWriter(const std::string& path);
@@ -26,11 +26,11 @@ class DatabaseWriter {
   // Ends the transaction of what was written so far; the destructor does, too.
   void Commit();
 
-  // With the camera's id, or with one that COLMAP chooses and that is returned.
-  // Where the tables have rigs, a camera is one of its own.
+  // With the camera's id, or with an id that COLMAP chooses and that is
+  // returned. Where the tables have rigs, each camera gets its own rig.
   void WriteCamera(const colmap::Camera& camera);
   camera_t WriteNewCamera(const colmap::Camera& camera);
-  // The same; an image is a frame of its own. position: latitude and longitude
+  // The same; each image gets its own frame. position: latitude and longitude
   // in degrees, altitude in m.
   void WriteImage(const DatabaseImage& image);
   void WriteNewImage(const std::string& name, camera_t camera_id,
@@ -39,7 +39,7 @@ class DatabaseWriter {
                       const std::vector<Eigen::Vector2d>& keypoints);
   void WriteMatches(const ImagePair& pair,
                     const std::vector<FeatureMatch>& matches);
-  // CALIBRATED, with the essential matrix of the pose.
+  // Configuration CALIBRATED, with the essential matrix of the pose.
   void WriteTwoViewGeometry(const ImagePair& pair,
                             const std::vector<FeatureMatch>& inlier_matches,
                             const Rigid3d& cam2_from_cam1);

@@ -9,8 +9,8 @@
 namespace adasfm {
 namespace {
 
-// COLMAP 4's descriptors.type: SIFT has one byte a number; ALIKED's two kinds
-// have floats in the same table of bytes.
+// Values of descriptors.type in COLMAP 4: SIFT has one byte per number; the two
+// kinds of ALIKED store floats in the same table of bytes.
 constexpr int64_t kSift = 0;
 constexpr int64_t kLastAliked = 2;
 
@@ -33,7 +33,7 @@ DescriptorMatrix DescriptorsFromRow(const SqliteStatement& statement) {
   }
   const int64_t value_size = type == kSift ? 1 : sizeof(float);
   const int64_t num_bytes = statement.NumBytes(3);
-  // The bounds so that the product cannot overflow.
+  // The bounds ensure that the product cannot overflow.
   if (num_rows < 1 || num_rows > num_bytes || num_bytes_per_row < 1 ||
       num_bytes_per_row > num_bytes || num_bytes_per_row % value_size != 0 ||
       num_bytes != num_rows * num_bytes_per_row) {

@@ -9,7 +9,7 @@
 
 namespace adasfm {
 
-// One local descriptor a row: the 128 bytes of SIFT as numbers, or the floats
+// One local descriptor per row: the 128 bytes of SIFT as numbers, or the floats
 // of a learned descriptor.
 using DescriptorMatrix =
     Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;

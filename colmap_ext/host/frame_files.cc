@@ -17,7 +17,7 @@ class FrameFileReader : public BinaryFileReader {
                    pose.tail<3>());
   }
 
-  // Of a sensor; COLMAP numbers cameras 0.
+  // Reads the type of a sensor; COLMAP numbers cameras 0.
   void ReadType() { only_cameras_ &= Read<int32_t>() == 0; }
 
   bool only_cameras() const { return only_cameras_; }
@@ -26,7 +26,7 @@ class FrameFileReader : public BinaryFileReader {
   bool only_cameras_ = true;
 };
 
-// The cameras of the rigs that have several.
+// Reads the cameras of rigs that have several cameras.
 void ReadRigCameras(FrameFileReader* file, CameraRigs* rigs) {
   const auto num_rigs = file->Read<uint64_t>();
   for (uint64_t i = 0; i < num_rigs && file->ok(); ++i) {

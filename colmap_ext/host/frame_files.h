@@ -8,10 +8,10 @@
 
 namespace adasfm {
 
-// What rigs.bin and frames.bin in a model's folder say (frames.h), to write the
-// model elsewhere; `frames` is empty where the folder has not both, or other
-// sensors than cameras. Of the rigs the cameras, not their images. An error for
-// a file that is cut short.
+// Reads rigs.bin and frames.bin in a model's folder (frames.h), so that the
+// model can be written elsewhere. `frames` is empty where one of the files is
+// missing or lists sensors other than cameras. `rigs` gets cameras only, no
+// images. An error for a file that is cut short.
 StatusOr<ModelFrames> ReadFrameFiles(const std::string& folder);
 
 }  // namespace adasfm

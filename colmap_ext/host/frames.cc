@@ -28,7 +28,7 @@ void WritePose(const Rigid3d& pose, std::ostream* file) {
   for (int i = 0; i < 3; ++i) Write<double>(pose.translation(i), file);
 }
 
-// Of the rigs that have more than a reference camera, and their cameras.
+// The cameras of the rigs that have more than a reference camera.
 CameraRigs ReadRigs(SqliteConnection* database) {
   CameraRigs rigs;
   SqliteStatement others(
@@ -64,7 +64,7 @@ bool IsReference(const CameraRigs& rigs, camera_t camera_id) {
   return camera == rigs.cameras.end() || camera->second.is_reference;
 }
 
-// Replaces cam_from_rig by what the model has.
+// Replaces cam_from_rig by the poses in the model.
 void TakePosesOfModel(const colmap::Reconstruction& model,
                       const ImagesOfFrame& images_of_frame, CameraRigs* rigs) {
   std::set<camera_t> done;
@@ -168,8 +168,8 @@ bool WriteFrameFiles(const colmap::Reconstruction& model,
     cameras_of_rig[frame->second.rig_id].insert(
         model.Image(image_id).CameraId());
   }
-  // All cameras of a rig, with or without images in this model; those without
-  // are no cameras of the model.
+  // All cameras of a rig that are cameras of the model, with or without
+  // registered images.
   for (const auto& [camera_id, camera] : rigs.cameras) {
     if (model.ExistsCamera(camera_id) && cameras_of_rig.count(camera.rig_id)) {
       cameras_of_rig[camera.rig_id].insert(camera_id);

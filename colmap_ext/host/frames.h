@@ -13,17 +13,18 @@
 
 namespace adasfm {
 
-// COLMAP 3.12 and later put images into frames of rigs. A model without
-// rigs.bin and frames.bin has a rig for every camera and a frame for every
-// image, with the same ids; where the database has others, these programs end
-// when they use both together, unless the two files say the database's ids.
+// COLMAP 3.12 and later put images into frames of rigs. For a model without
+// rigs.bin and frames.bin, these programs assume one rig per camera and one
+// frame per image, with the same ids. Where the database has other rigs or
+// frames, they abort when they use the model with the database, unless the two
+// files contain the database's ids.
 
 struct FrameOfImage {
   uint32_t frame_id = 0;
   uint32_t rig_id = 0;
 };
 
-// What a model's two files say; no files where `frames` is empty.
+// Content of a model's two files; without files `frames` is empty.
 struct ModelFrames {
   // Of every image.
   std::map<image_t, FrameOfImage> frames;
@@ -39,10 +40,11 @@ struct DatabaseFrames : ModelFrames {
 DatabaseFrames ReadDatabaseFrames(SqliteConnection* database);
 
 // Writes rigs.bin and frames.bin for the registered images into a model's
-// folder. The pose of a frame is that of its reference camera or, where that is
-// missing, of another one through cam_from_rig; cameras whose cam_from_rig no
-// frame of the model shows have that of the rigs. False when an image has no
-// frame or the files cannot be written.
+// folder. The pose of a frame is that of its reference camera or, where that
+// image is missing, of another camera through cam_from_rig. Cameras without a
+// frame in the model from which cam_from_rig follows keep that of
+// `frames.rigs`. False when an image has no frame or the files cannot be
+// written.
 bool WriteFrameFiles(const colmap::Reconstruction& model,
                      const ModelFrames& frames, const std::string& folder);
 

@@ -14,8 +14,8 @@
 namespace adasfm {
 namespace {
 
-// Pairs that one run of the program matches: between the runs there is
-// progress to show, and starting it takes a second.
+// Pairs that one run of the program matches: progress can be shown only between
+// runs, and each start of the program takes a second.
 constexpr size_t kNumPairsPerRun = 500;
 
 // A file of lines for the program, removed in the end.
@@ -56,8 +56,8 @@ int CountLines(const std::string& path, std::streamoff begin,
   return count;
 }
 
-// The options that both commands have: since COLMAP 3.13 in the group
-// new_group, before in old_group.
+// The options that both commands have, in the group new_group since COLMAP 3.13
+// and in old_group before.
 std::vector<std::string> CommonArguments(const FeatureOptions& options,
                                          const std::string& help,
                                          const std::string& old_group,

@@ -9,24 +9,25 @@
 
 namespace adasfm {
 
-// Features and matches by the program of the user's own COLMAP instead of the
-// linked library's classes: what ExtractFeatures and MatchPairs (features.h) do
-// when the environment variable ADASFM_HOST_COLMAP names it. A newer COLMAP
-// turns the database into its own form; what it finds done, it leaves out.
+// Extracts features and matches them by the user's own COLMAP program instead
+// of the linked library's classes: ExtractFeatures and MatchPairs (features.h)
+// do so when the environment variable ADASFM_HOST_COLMAP names it. A newer
+// COLMAP converts the database to its own form. Finished work is skipped.
 
 // Whether the environment names a program.
 bool UsesHostProgram();
 
-// Of a database that a newer COLMAP has converted since the images were
-// registered: its images and cameras, and those of `names` that are no images.
+// For a database that a newer COLMAP has converted since the images were
+// registered: counts its images and cameras, and lists those of `names` that
+// are no images.
 StatusOr<ImageRegistration> ReadRegistration(
     const std::vector<std::string>& names, const std::string& database_path);
 
-// Their names, in order: images without keypoints or descriptors. Throws
+// Names, in order, of the images without keypoints or descriptors. Throws
 // SqliteError.
 std::vector<std::string> ImagesWithoutFeatures(SqliteConnection* database);
 
-// Of those images.
+// Extracts the features of those images.
 Status ExtractFeaturesByHost(const FeatureOptions& options,
                              const std::string& image_path,
                              const std::string& database_path,

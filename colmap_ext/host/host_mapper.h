@@ -13,70 +13,71 @@
 
 namespace adasfm {
 
-// A keypoint that another one is matched with.
+// A keypoint that is matched with a given keypoint.
 struct MatchedKeypoint {
   image_t image_id = kInvalidImageId;
   point2D_t point2D_idx = 0;
 };
 
-// COLMAP's mapper on a part of a scene that is in memory already, instead of on
-// a database: its registration by P3P, its triangulation and its filters.
+// COLMAP's mapper on a part of a scene in memory, instead of a database: its
+// registration by P3P, its triangulation and its filters.
 //
-// COLMAP counts, for every image, the points that it could see. So between
-// Begin and End all images and points are registered, added and removed here,
-// and not at the reconstruction itself.
+// COLMAP counts, for every image, the points that the image could see. So
+// between Begin and End, all images and points must be registered, added and
+// removed through this class, not directly in the reconstruction.
 //
-// RegisterNextImage prints a report on std::cout. Different objects may be used
-// by different threads. Results do not depend on threads: COLMAP seeds each
-// RANSAC anew.
+// RegisterNextImage prints a report on std::cout. Different threads may use
+// different objects. Results do not depend on threads: COLMAP seeds each RANSAC
+// anew.
 class HostMapper {
  public:
-  // The reconstruction is empty and must outlive the mapper.
+  // The reconstruction must be empty and must outlive the mapper.
   explicit HostMapper(colmap::Reconstruction* reconstruction);
   ~HostMapper();
 
-  // The part. An image's camera comes before it, a pair's images before the
-  // pair.
+  // Define the part. Add an image's camera before the image, and the images of
+  // a pair before the pair.
   void AddCamera(const colmap::Camera& camera);
   void AddImage(image_t image_id, const std::string& name, camera_t camera_id,
                 const std::vector<Eigen::Vector2d>& keypoints);
   void AddMatches(image_t image_id1, image_t image_id2,
                   const std::vector<FeatureMatch>& matches);
 
-  // Puts the part's cameras and images into the reconstruction. From here on
-  // the functions below may be called, and those above no more.
+  // Puts the part's cameras and images into the reconstruction. After this call
+  // only the functions below may be called.
   void Begin();
   // Leaves the reconstruction with its registered images only.
   void End();
   // Frees the matches, which only registration by P3P and triangulation need.
-  // From here on images and points may be registered, removed and filtered.
+  // After this call images and points may still be registered, removed and
+  // filtered.
   void ReleaseMatches();
 
   void FindMatches(image_t image_id, point2D_t point2D_idx,
                    std::vector<MatchedKeypoint>* matches) const;
-  // Of the keypoints, those matched with one that sees a point.
+  // Number of keypoints that are matched with a keypoint that sees a point.
   size_t NumVisiblePoints(image_t image_id) const;
 
-  // Registers an image with this pose; one that is registered moves there.
+  // Registers an image with this pose; a registered image gets this pose.
   void Register(image_t image_id, const Rigid3d& cam_from_world);
-  // Takes away a registered image's observations, and with it the points that
-  // fewer than two images see then.
+  // Removes a registered image's observations, and the points that fewer than
+  // two images see afterwards.
   void Deregister(image_t image_id);
   colmap::point3D_t AddPoint(const Eigen::Vector3d& xyz_in_world,
                              const colmap::Track& track,
                              const Eigen::Matrix<uint8_t, 3, 1>& color =
                                  Eigen::Matrix<uint8_t, 3, 1>::Zero());
 
-  // The unregistered images that see this many points, most points first; those
-  // that failed to register before come after the others.
+  // The unregistered images that see at least this many points, most points
+  // first; images whose registration failed before come last.
   std::vector<image_t> FindNextImages(int min_num_visible_points);
-  // P3P with RANSAC; on success, with that many inliers, the image is
-  // registered and continues its inliers' tracks.
+  // P3P with RANSAC. On success, with at least min_num_inliers inliers,
+  // registers the image and adds it to the tracks of its inliers.
   bool RegisterNextImage(image_t image_id, double max_reproj_error_px,
                          int min_num_inliers);
-  // Continues and creates the tracks of a registered image.
+  // Continues tracks into a registered image and creates new tracks.
   void TriangulateImage(image_t image_id, double min_angle_deg);
-  // Adds the observations that tracks miss, then joins tracks that matches
+  // Adds observations missing from tracks, then merges tracks that matches
   // connect, both within max_reproj_error_px.
   void CompleteAndMergeTracks(double max_reproj_error_px);
   // Removes observations beyond the error, then points below the angle.
@@ -91,7 +92,8 @@ class HostMapper {
   std::unique_ptr<Host> host_;
 };
 
-// Keypoints of one image (pixels) and the points that they see (world).
+// Keypoints of one image (pixels) and the points that they observe (world
+// frame).
 struct PointsInImage {
   std::vector<Eigen::Vector2d> pixels;
   std::vector<Eigen::Vector3d> points_in_world;

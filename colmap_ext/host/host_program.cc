@@ -19,8 +19,8 @@
 namespace adasfm {
 namespace {
 
-// Volatile: the path stands in the program in one piece, where a packager can
-// find and replace it.
+// Volatile, so that the path stays in the program's binary in one piece, where
+// a packager can find and replace it.
 const char* volatile kBuiltInHost = ADASFM_HOST_COLMAP;
 
 namespace fs = std::filesystem;
@@ -40,8 +40,8 @@ std::string FindOnPath() {
   return "";
 }
 
-// The first version that opens a file of this form. The columns that COLMAP 3.8
-// needs may be there beside newer tables.
+// The first version that opens a file of this form. A file with newer tables
+// may also have the columns that COLMAP 3.8 needs.
 Version NeededVersion(SqliteConnection* database) {
   if (HasColumn(database, "images", "prior_qw")) return {3, 6};
   if (HasColumn(database, "pose_priors", "corr_data_id")) return {4, 0};
@@ -133,7 +133,7 @@ Status RunHost(const std::string& path,
   if (WIFEXITED(status) && WEXITSTATUS(status) == EXIT_SUCCESS) {
     return Status::Ok();
   }
-  // Ctrl-C on a terminal reaches the program too.
+  // Ctrl-C on a terminal ends the program, too; report() then throws.
   report();
   return Status::Error("the host's colmap, " + path + ", failed in " +
                        arguments.front() + "; see " + log_path);
@@ -175,7 +175,7 @@ std::string FindHostConflict(const std::string& host_path,
              " 'ALTER TABLE pose_priors ADD COLUMN position_covariance BLOB'";
     }
   } catch (const SqliteError&) {
-    // Not ours to judge.
+    // Other code reports an unreadable database.
   }
   return "";
 }

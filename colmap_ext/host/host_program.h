@@ -11,45 +11,47 @@
 
 namespace adasfm {
 
-// The user's own colmap, which gets all commands but ours.
+// The user's own colmap program, which runs all commands except ours.
 
-// The one that the environment variable ADASFM_HOST_COLMAP names, else the one
-// that we were built with, else the first other colmap on the PATH: a package
-// does not know where it will be. May be no program.
+// The program that the environment variable ADASFM_HOST_COLMAP names, else the
+// one given at build time, else the first other colmap on the PATH: a package
+// cannot know its install location. The result may be no program.
 std::string FindHostProgram();
 
-// An executable file.
+// Whether the path is an executable file.
 bool IsProgram(const std::string& path);
 
-// The running program: handing over to ourselves would never end.
+// Whether the path is the running program, which would otherwise call itself
+// forever.
 bool IsThisProgram(const std::string& path);
 
-// What `path arguments` prints on both streams; empty for what is no program.
+// What `path arguments` prints on both streams; empty when path is no program.
 std::string ReadHostHelp(const std::string& path, const std::string& arguments);
 
-// Runs the program to its end; what it prints goes to the end of log_path.
-// `report` is called ten times a second; when it throws, the program is stopped
-// first. An error, which names the log, when the program cannot be started or
-// fails.
+// Runs the program to its end and appends its output to log_path. Calls
+// `report` ten times a second; when it throws, the program is stopped before
+// the exception continues. An error, which names the log, when the program
+// cannot be started or fails.
 Status RunHost(const std::string& path,
                const std::vector<std::string>& arguments,
                const std::string& log_path,
                const std::function<void()>& report);
 
-// The version that the first line of its help says; empty when it says none.
+// The version in the first line of the program's help; empty when there is
+// none.
 std::string ReadHostVersion(const std::string& path);
 
 // Major and minor number of a version such as "4.2.1" or "3.10-dev".
 std::optional<std::pair<int, int>> ParseColmapVersion(
     const std::string& version);
 
-// The version of the library that we are linked with.
+// The version of the linked library.
 std::string LinkedColmapVersion();
 
-// One line why the host must not open this database, as its COLMAP is too old
-// for the file, or cannot convert it; empty when it may, and for what is no
-// database. The host is asked for its version only when the answer depends on
-// it.
+// One line that explains why the host must not open this database, because its
+// COLMAP is too old for the file or cannot convert it; empty when it may, and
+// when the file is no database. The host is asked for its version only when the
+// answer depends on it.
 std::string FindHostConflict(const std::string& host_path,
                              const std::string& database_path);
 

@@ -16,7 +16,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// Whether the file has as many records as it says, and nothing else.
+// Whether the file has exactly the declared number of records, and nothing
+// else.
 bool WalkRecords(const std::string& path,
                  const std::function<void(BinaryFileReader*)>& read_record) {
   BinaryFileReader file(path);
@@ -25,8 +26,8 @@ bool WalkRecords(const std::string& path,
   return file.AtEnd();
 }
 
-// newer_model becomes the name of the first camera model that the linked
-// library lacks and a newer COLMAP has.
+// newer_model becomes the name of a camera model that the linked library lacks
+// and a newer COLMAP has.
 bool WalkCameras(const std::string& path, std::string* newer_model) {
   return WalkRecords(path, [newer_model](BinaryFileReader* file) {
     file->Skip(4);  // Id.

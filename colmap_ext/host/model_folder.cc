@@ -30,7 +30,7 @@ bool IsNumber(const std::string& name) {
   });
 }
 
-// At the head of each file.
+// Compares with the count at the beginning of each file.
 bool HasRecords(const fs::path& path, uint64_t num_records) {
   std::ifstream file(path, std::ios::binary);
   uint64_t num_written = 0;
@@ -49,7 +49,7 @@ Status WriteModels(const std::vector<const colmap::Reconstruction*>& models,
   return Status::Ok();
 }
 
-// Puts the models in the place of those of an earlier run.
+// Replaces the models of an earlier run.
 Status ReplaceModels(const fs::path& temporary, const fs::path& folder,
                      size_t num_models) {
   Status status;
@@ -73,7 +73,7 @@ Status WriteBinaryModel(const colmap::Reconstruction& model,
   const std::vector<std::string> frame_files = {path + "/rigs.bin",
                                                 path + "/frames.bin"};
   std::error_code none;
-  // Those of a model that was here before would say other images.
+  // Files of a model that was here before would list other images.
   for (const std::string& file : frame_files) fs::remove(file, none);
   model.WriteBinary(path);
   const std::pair<const char*, uint64_t> files[] = {
@@ -190,7 +190,8 @@ Status RemoveModelFolder(const std::string& path,
   for (const fs::directory_entry& entry : fs::directory_iterator(path, error)) {
     files.push_back(entry.path());
   }
-  // Never a folder with content: what appears meanwhile stays.
+  // Removes only the listed files: a file that appears meanwhile stays, and the
+  // folder with it.
   for (const fs::path& file : files) fs::remove(file, error);
   fs::remove(path, error);
   if (!error) return Status::Ok();

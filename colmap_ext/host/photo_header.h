@@ -16,8 +16,8 @@ struct PhotoHeader {
   std::optional<Eigen::Vector3d> position;
 };
 
-// By COLMAP's own reader, which reads the whole photo. None for a file that it
-// cannot read as an image.
+// Uses COLMAP's own reader, which reads the whole photo. None for a file that
+// this reader cannot read as an image.
 std::optional<PhotoHeader> ReadPhotoHeader(const std::string& path);
 
 }  // namespace adasfm

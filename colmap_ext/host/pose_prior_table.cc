@@ -16,7 +16,7 @@ constexpr int64_t kWgs84 = 0;
 constexpr int64_t kCartesian = 1;
 constexpr int64_t kCameraSensor = 0;
 
-// COLMAP writes NaN where it knows no covariance.
+// COLMAP writes NaN for an unknown covariance.
 std::optional<Eigen::Matrix3d> ReadCovariance(const SqliteStatement& statement,
                                               int column,
                                               const std::string& row) {
@@ -115,7 +115,7 @@ void WritePosePriors(const std::vector<NewPosePrior>& priors,
     insert.BindInt(3, kCameraSensor);
     BindDoubles(&insert, 4, prior.position.data(), 3);
     BindDoubles(&insert, 5, prior.covariance.data(), 9);
-    // As COLMAP writes an unknown one.
+    // COLMAP writes NaN for an unknown gravity.
     const Eigen::Vector3d gravity = prior.gravity_in_cam.value_or(
         Eigen::Vector3d::Constant(std::numeric_limits<double>::quiet_NaN()));
     BindDoubles(&insert, 6, gravity.data(), 3);

@@ -10,22 +10,22 @@
 
 namespace adasfm {
 
-// Positions of cameras that COLMAP itself keeps in a database: in pose_priors
-// since 3.10 (columns differ up to 4.0), before that in the columns prior_tx,
-// prior_ty, prior_tz of images, which hold EXIF's latitude, longitude and
+// Camera positions that COLMAP itself stores in a database: since 3.10 in
+// pose_priors (whose columns differ up to 4.0), before that in the columns
+// prior_tx, prior_ty, prior_tz of images, as EXIF's latitude, longitude and
 // altitude.
 struct HostPosition {
   image_t image_id = kInvalidImageId;
   // Latitude and longitude in degrees and altitude in m, or m along three axes.
   Eigen::Vector3d position = Eigen::Vector3d::Zero();
   bool is_geodetic = false;
-  // None when the host does not say.
+  // None when the host stores none.
   std::optional<Eigen::Matrix3d> covariance;
 };
 
-// In order of the images; rows without a finite position, or of a coordinate
-// system that is not stated, are passed over. Throws SqliteError for rows that
-// COLMAP could not have written.
+// In order of the images. Skips rows without a finite position or without a
+// stated coordinate system. Throws SqliteError for rows that COLMAP could not
+// have written.
 std::vector<HostPosition> ReadHostPositions(SqliteConnection* database);
 
 // A row of 4.x's pose_priors, in a cartesian frame.
@@ -38,7 +38,7 @@ struct NewPosePrior {
   std::optional<Eigen::Vector3d> gravity_in_cam;
 };
 
-// Whether pose_priors has 4.x's columns.
+// Whether pose_priors has the columns of COLMAP 4.x.
 bool HasPosePriorTable(SqliteConnection* database);
 
 // Replaces the rows of these images. Needs HasPosePriorTable.

@@ -22,7 +22,7 @@
 namespace adasfm {
 namespace {
 
-// Photos that are read at a time, on all threads; only their sizes are kept.
+// Photos that all threads read at a time; only their headers stay in memory.
 constexpr size_t kReadBlockSize = 16;
 // COLMAP's guess for photos without EXIF.
 constexpr double kDefaultFocalLengthFactor = 1.2;
@@ -115,10 +115,10 @@ class ImageWriter {
     return Status::Ok();
   }
 
-  // What is written from now on is one transaction, what was before another.
+  // Ends the transaction of what was written so far and begins another.
   void Commit() { writer_->Commit(); }
 
-  // COLMAP reports no failed write. The last thing to ask.
+  // COLMAP reports no failed write. Call Write and Commit only before.
   bool IsComplete() {
     writer_.reset();
     SqliteConnection database(path_, SqliteConnection::Mode::kRead);
@@ -128,12 +128,13 @@ class ImageWriter {
   ImageRegistration& Result() { return result_; }
 
  private:
-  // What photos of one camera have in common; the last one is the folder.
+  // What photos of one camera have in common; the last entry is the folder.
   using CameraKey =
       std::tuple<double, double, std::vector<double>, bool, std::string>;
 
   CameraKey Key(const colmap::Camera& camera, const std::string& name) const {
-    // EXIF may differ in its last digits.
+    // Ignores the parameters: focal lengths of EXIF may differ in their last
+    // digits.
     if (options_.single_camera == 1) {
       return {WidthOf(camera), HeightOf(camera), {}, false, ""};
     }

@@ -5,7 +5,7 @@
 
 namespace adasfm {
 
-// The host's error of a point, px: the mean over its observations.
+// The host's error of a point [px]: the mean over its observations.
 double ComputeReprojectionError(const colmap::Reconstruction& reconstruction,
                                 const colmap::Point3D& point);
 

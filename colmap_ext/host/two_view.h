@@ -10,20 +10,20 @@
 
 namespace adasfm {
 
-// Two views by the host's estimators, whose signatures differ between its
-// versions.
+// Two-view geometry by the host's estimators, whose signatures differ between
+// its versions.
 
 // COLMAP's number of a verified pair of calibrated cameras.
 inline constexpr int kCalibratedConfiguration = 2;
 
-// Whether a row of this configuration (TwoViewGeometry::ConfigurationType) is a
+// Whether this configuration (TwoViewGeometry::ConfigurationType) means a
 // verified pair.
 bool IsVerifiedConfiguration(int config);
 
-// What: cam2_from_cam1 with a unit translation from points on the normalised
-// image planes, by the five-point algorithm and RANSAC with this seed.
-// max_error: largest distance of an inlier, in the same unit.
-// On failure: none, also for a pose that is not finite.
+// Estimates cam2_from_cam1, with a unit translation, from points on the
+// normalised image planes, by the five-point algorithm and RANSAC with this
+// seed. max_error: largest distance of an inlier on those planes. None on
+// failure, and for a pose that is not finite.
 std::optional<Rigid3d> EstimateRelativePose(
     const std::vector<Eigen::Vector2d>& points1,
     const std::vector<Eigen::Vector2d>& points2, double max_error,

@@ -10,11 +10,11 @@
 
 namespace adasfm {
 
-// While it lives, what is printed on std::cout and std::cerr, by whatever
-// thread, goes to the end of a file instead. The host's classes print what they
-// do; lines that begin with `counted` are counted. Streams made from
-// std::cout.rdbuf() before are not affected. While one lives, others, of work
-// beside it, capture nothing.
+// During its lifetime, appends what any thread prints on std::cout and
+// std::cerr to a file instead, for example the messages of the host's classes.
+// Counts lines that begin with `counted`. Streams made from std::cout.rdbuf()
+// before are not affected. While one object captures, others, of concurrent
+// work, capture nothing.
 class CaptureOutput : private std::streambuf {
  public:
   CaptureOutput(const std::string& path, const std::string& counted)

@@ -12,7 +12,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// Whether the entry is a link to a folder that holds it.
+// Whether the entry is a link to a folder that contains it.
 bool IsCircle(const fs::path& path) {
   std::error_code none;
   if (!fs::is_symlink(path, none)) return false;
@@ -89,7 +89,7 @@ StatusOr<std::vector<std::string>> ListFilesRecursively(
   for (; !error && entry != fs::recursive_directory_iterator();
        entry.increment(error)) {
     const bool is_hidden = entry->path().filename().string()[0] == '.';
-    // A link that leads nowhere, or to itself, is no file.
+    // A link to nothing, or to itself, is no file.
     std::error_code none;
     if (entry->is_directory(none)) {
       if (is_hidden || IsCircle(entry->path()) ||

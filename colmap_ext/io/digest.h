@@ -9,13 +9,13 @@
 
 namespace adasfm {
 
-// Short texts that change when files do, to tell whether a result is outdated.
+// Short texts that change when files do, to detect outdated results.
 
 // Of a text.
 std::string DigestText(const std::string& text);
 
 // Of a file's bytes or, for a folder, of its files' names and sizes. "none" for
-// an empty path. An error when there is no such file.
+// an empty path. An error when nothing exists at the path.
 StatusOr<std::string> DigestPath(const std::string& path);
 
 // The digests of several paths, each with its name.
@@ -26,9 +26,9 @@ StatusOr<std::map<std::string, std::string>> DigestPaths(
 std::string DigestFiles(const std::string& folder,
                         const std::vector<std::string>& names);
 
-// The regular files below a folder, hidden ones left out, as paths relative to
-// it, sorted; without those in `excluded`, a folder that may lie in it. Links
-// are followed, but none to a folder that holds the link.
+// The regular files below a folder, as sorted paths relative to it. Leaves out
+// hidden files and folders, and the folder `excluded`, which may lie in
+// `folder`. Follows links, except links to a folder that contains the link.
 StatusOr<std::vector<std::string>> ListFilesRecursively(
     const std::string& folder, const std::string& excluded = "");
 

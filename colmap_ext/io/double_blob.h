@@ -8,7 +8,7 @@
 
 namespace adasfm {
 
-// Arrays of doubles as little-endian blobs of fixed size, whatever the machine.
+// Arrays of doubles as little-endian blobs of fixed size on every machine.
 
 void BindDoubles(SqliteStatement* statement, int parameter,
                  const double* values, size_t size);

@@ -14,7 +14,7 @@ namespace adasfm {
 namespace {
 
 std::string ProgramName() {
-  // NUL between the arguments: the command is the second of the launcher's.
+  // NUL separates the arguments; the command is the launcher's second argument.
   std::ifstream file("/proc/self/cmdline", std::ios::binary);
   std::string program, command;
   std::getline(file, program, '\0');
@@ -55,7 +55,7 @@ StatusOr<std::shared_ptr<FolderLock>> FolderLock::Acquire(
                          ReadHolder(path) +
                          "; wait for its end, or choose another folder");
   }
-  // Only a name for others to show: nothing depends on it.
+  // Only for the messages of other runs; errors do not matter.
   const std::string holder = DescribeThisRun();
   if (ftruncate(file, 0) != 0 ||
       pwrite(file, holder.data(), holder.size(), 0) < 0) {

@@ -12,9 +12,9 @@ inline constexpr char kFolderLockName[] = ".adasfm.lock";
 
 // Keeps a second run out of a folder while this one writes to it.
 //
-// Method: flock on a hidden file in the folder, which the system gives up when
-// the process ends, however it ends; the file itself stays. It names its
-// holder. On a file system without locks nothing is locked.
+// Method: flock on a hidden file in the folder. The system releases the lock
+// when the process ends, however it ends; the file, which names the holder,
+// stays. On a file system without locks nothing is locked.
 class FolderLock {
  public:
   enum class Mode {
@@ -22,8 +22,8 @@ class FolderLock {
     kShared,  // beside others of this mode
   };
 
-  // The folder must exist. `name` distinguishes locks of one folder. An error,
-  // at once, when another run has the lock; it says which.
+  // The folder must exist. `name` distinguishes locks of one folder. Does not
+  // wait: an error that names the holder when another run has the lock.
   static StatusOr<std::shared_ptr<FolderLock>> Acquire(
       const std::string& folder, Mode mode,
       const std::string& name = kFolderLockName);

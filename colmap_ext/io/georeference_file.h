@@ -9,19 +9,19 @@
 
 namespace adasfm {
 
-// georeference.json beside a folder's models: where on the Earth their frame
-// is (docs/reference/formats.md).
+// georeference.json beside a folder's models: the position of their frame on
+// the Earth (docs/reference/formats.md).
 inline constexpr char kGeoreferenceName[] = "georeference.json";
 
 // The models are in the ENU frame of this origin.
 Status WriteGeoreference(const GeodeticPosition& origin,
                          const std::string& folder);
 
-// An error for a missing file and one that is not such a file.
+// An error for a missing file, and for a file that is no georeference.
 StatusOr<GeodeticPosition> ReadGeoreference(const std::string& path);
 
-// Writes the origin of models that are somewhere on the Earth; of others, it
-// removes the file of an earlier run.
+// Writes the origin of georeferenced models; for other models, removes the file
+// that an earlier run wrote.
 Status UpdateGeoreference(bool is_georeferenced,
                           const std::optional<GeodeticPosition>& origin,
                           const std::string& folder);

@@ -15,7 +15,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// More than the largest buffer of a file system and of a library.
+// More than the largest buffer of a file system or a library.
 constexpr size_t kProbeBytes = 1 << 20;
 
 std::string AdviceFor(int error) {
@@ -49,16 +49,16 @@ int WriteAll(int file, const char* data, size_t num_bytes) {
   return 0;
 }
 
-// Whether the name is still that of the open file.
+// Whether the path still refers to the open file.
 bool HasName(int file, const std::string& path) {
   struct stat opened, named;
   return fstat(file, &opened) == 0 && stat(path.c_str(), &named) == 0 &&
          opened.st_dev == named.st_dev && opened.st_ino == named.st_ino;
 }
 
-// Opens or creates a file for this writer alone until it is closed; -1: errno
-// says why not. File systems that know no locks, or whose files have another
-// identity each time, are trusted to have one writer.
+// Opens or creates a file exclusively for this writer until it is closed; on
+// failure -1, with the reason in errno. File systems without locks, or whose
+// files change their identity, are assumed to have one writer.
 int OpenAlone(const std::string& path) {
   constexpr int kMaxNumWritersBefore = 1000;
   for (int num_before = 0;; ++num_before) {
@@ -67,11 +67,11 @@ int OpenAlone(const std::string& path) {
     while (flock(file, LOCK_EX) != 0 && errno == EINTR) {
     }
     if (HasName(file, path) || num_before == kMaxNumWritersBefore) return file;
-    close(file);  // The writer before has given it its final name.
+    close(file);  // The writer before has renamed it.
   }
 }
 
-// Replaces what the file holds, syncs it and renames it.
+// Replaces the file's content, syncs the file and renames it.
 int WriteAndRename(int file, const std::string& text,
                    const std::string& temporary, const std::string& path) {
   if (ftruncate(file, 0) != 0) return errno;
@@ -81,7 +81,7 @@ int WriteAndRename(int file, const std::string& text,
   return rename(temporary.c_str(), path.c_str()) == 0 ? 0 : errno;
 }
 
-// Some file systems cannot sync folders, or nothing at all.
+// Some file systems cannot sync folders, or cannot sync at all.
 bool IsUnsupported(int error) { return error == EINVAL || error == ENOTSUP; }
 
 }  // namespace
@@ -107,7 +107,7 @@ Status WriteTextFile(const std::string& path, const std::string& text) {
   const int file = OpenAlone(temporary);
   int error = file < 0 ? errno : WriteAndRename(file, text, temporary, path);
   if (file >= 0) {
-    // Before others may open it.
+    // Before others may open the file.
     if (error != 0) unlink(temporary.c_str());
     close(file);
   }

@@ -11,7 +11,7 @@
 namespace adasfm {
 namespace {
 
-constexpr int kNotFound = 127;  // of the shell
+constexpr int kNotFound = 127;  // exit code of the shell
 
 std::string LastLine(const std::string& path) {
   std::ifstream file(path);

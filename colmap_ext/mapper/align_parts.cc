@@ -10,8 +10,8 @@ namespace adasfm {
 namespace {
 
 constexpr int kNumRelaxationRounds = 20;
-// A shared image counts as often as this many coarse poses: neighbours know the
-// separators better than the coarse model does.
+// A shared image counts as often as this many coarse poses, since neighbours
+// determine the separators better than the coarse model does.
 constexpr int kSeparatorWeight = 5;
 
 std::map<image_t, Rigid3d> FindWellConstrainedPoses(const PartModel& part) {
@@ -105,7 +105,8 @@ class Relaxation {
       pairs.insert(pairs.end(), kSeparatorWeight, pair);
     }
     Sim3d world_from_part;
-    // Orientations are known to about 0.01 rad when centres are to 0.1 m.
+    // An orientation error of 0.1 rad counts as much as a centre error of one
+    // threshold.
     if (EstimatePoseSimilarity(pairs, std::vector<char>(pairs.size(), 1),
                                10.0 * result_.alignments[k].threshold,
                                &world_from_part)) {

@@ -23,20 +23,21 @@ struct PartModel {
 struct AlignPartsResult {
   // For each part; `success` is false for a part that does not fit.
   std::vector<AlignSimilarityResult> alignments;
-  // Where the fitting parts go: the alignments, relaxed against each other.
+  // Similarities of the fitting parts: the alignments, relaxed against each
+  // other.
   std::vector<Sim3d> world_from_parts;
-  // How far parts disagree about the images that they share (RMSE of centres):
-  // after the alignment to the coarse frame, and after the relaxation.
+  // RMSE between the centres of images that parts share, after the alignment to
+  // the coarse frame and after the relaxation.
   double separator_rmse_before = 0.0;
   double separator_rmse_after = 0.0;
   int num_separators = 0;
 };
 
-// Aligns each part to the coarse frame (Alg. 2), then moves the fitting parts,
-// as rigid pieces, so that they agree about shared images: the coarse frame
-// holds the whole, the separators hold neighbours together. Block by block,
-// each part's similarity is estimated against the coarse poses and its
-// neighbours' current ones.
+// Aligns each part to the coarse frame (Alg. 2), then moves the fitting parts
+// as rigid pieces with a scale, so that they agree about shared images. Coarse
+// poses constrain the whole, separators constrain neighbouring parts. In each
+// round the similarity of one part after another is estimated against the
+// coarse poses and the present poses of its neighbours.
 AlignPartsResult AlignParts(const AlignSimilarityOptions& options,
                             const CoarsePoseMap& coarse,
                             const std::vector<PartModel>& parts);

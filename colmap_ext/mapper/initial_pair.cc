@@ -12,9 +12,9 @@
 namespace adasfm {
 namespace {
 
-// Parallaxes to ask for; the first one that any pair reaches is taken. The
-// coarse poses tell the parallax of every match, so a drive straight ahead,
-// with little of it, begins with the best pair there is.
+// Required parallaxes; the first one that any pair reaches is used. The coarse
+// poses give the parallax of every match, so a drive straight ahead, with
+// little parallax, begins with its best pair.
 constexpr double kMinParallaxesDeg[] = {6.0, 3.0, 1.5, 0.75};
 
 using Directions = std::vector<Eigen::Vector3d>;

@@ -22,7 +22,7 @@ struct InitialPair {
 struct InitialPairOptions {
   // A pair needs this many matches with the parallax asked for.
   static constexpr int kMinNumPoints = 30;
-  // Of a match to its epipolar line under the poses.
+  // Largest distance of a match to its epipolar line under the poses.
   double max_epipolar_error_px = 4.0;
 };
 

@@ -18,7 +18,7 @@ constexpr double kMedianOfNormal = 0.6745;
 // Variance of a median over that of a mean.
 constexpr double kMedianVariance = M_PI / 2.0;
 
-// Of a keypoint, in its camera's image.
+// Residual of a keypoint, in its camera's image.
 struct Residual {
   double radius_px = 0.0;
   double radial_px = 0.0;  // outwards

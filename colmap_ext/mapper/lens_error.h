@@ -8,24 +8,24 @@
 
 namespace adasfm {
 
-// What keypoints of a camera have in common along the radius.
+// The radial error that the keypoints of a camera share.
 struct LensError {
   // Root mean square, over equal shares of the keypoints from the principal
   // point to the rim, of their median radial residual [px].
   double rms_px = 0.0;
-  // That over 1 sigma of a keypoint; what chance gives is taken off.
+  // rms_px over 1 sigma of a keypoint, without the part expected by chance.
   double ratio = 0.0;
 };
 
-// How far the lens models of an adjusted model bend images otherwise than the
-// lenses did. Where cameras turn, poses and points cannot take up a wrong
-// camera model or distortion as a whole (straight along the view they can, and
-// it does not show): what is left moves keypoints towards the principal
-// point or away from it, by an amount that depends on the distance. Right
-// models leave a ratio below 0.05, calibrations of real cameras 0.02 to 0.2,
-// pinhole and fisheye exchanged 0.15 to 0.7. A focal length that is wrong by
-// itself does not show. The sigma is that of the residuals across the radius,
-// which no lens changes.
+// Measures how far the lens models of an adjusted model deviate from the
+// lenses. Where cameras turn, poses and points cannot compensate a wrong camera
+// model or distortion completely (straight along the view they can, and the
+// error does not show). The remaining error moves keypoints towards the
+// principal point or away from it, by an amount that depends on the distance.
+// Correct models have a ratio below 0.05, calibrations of real cameras 0.02 to
+// 0.2, pinhole and fisheye exchanged 0.15 to 0.7. A wrong focal length alone
+// does not show. The sigma is that of the residuals across the radius, which no
+// lens changes.
 //
 // Input: points that three images or more see. Cameras with fewer than 800
 // observations of such points are left out.

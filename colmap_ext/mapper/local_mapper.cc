@@ -15,10 +15,10 @@
 namespace adasfm {
 namespace {
 
-// A first pair that triangulates fewer points is given up for the next one.
+// An initial pair with fewer triangulated points is rejected for the next one.
 constexpr size_t kMinNumInitialPoints = 15;
 constexpr size_t kMaxNumInitialTrials = 5;
-// A batch larger than this share of the model would stand on points that no
+// A batch larger than this share of the model would rest on points that no
 // adjustment has seen.
 constexpr double kMaxBatchRatio = 0.5;
 constexpr size_t kMinBatchSize = 8;
@@ -80,8 +80,8 @@ class LocalMapper {
     return false;
   }
 
-  // Where the coarse frame has drifted to near an image that begins a new
-  // piece: from the registered image that the coarse poses put nearest to it.
+  // Local frame from coarse frame near an image that begins a new piece: at the
+  // registered image with the nearest coarse position; identity without any.
   Rigid3d FindLocalFromCoarse(image_t image_id) const {
     const Eigen::Vector3d center =
         scene_->coarse->at(image_id).TargetOriginInSource();
@@ -102,9 +102,9 @@ class LocalMapper {
            scene_->coarse->at(nearest);
   }
 
-  // Of the images that see v_p points, most points first. An image that failed
-  // is tried again only when it sees more than it did. False when no image
-  // could be registered.
+  // Registers images that see v_p points, most points first. An image that
+  // failed is tried again only when it sees 1.2 times as many points. False
+  // when no image could be registered.
   bool RegisterBatch() {
     const size_t max_size = std::max(
         kMinBatchSize,
@@ -192,7 +192,7 @@ class LocalMapper {
     adjuster_.AdjustAll(15);
     for (auto it = result_.prior_only_images.begin();
          it != result_.prior_only_images.end();) {
-      // Points reached it after all.
+      // The image has enough points by now.
       const int num_points = reconstruction_.Image(*it).NumPoints3D();
       const bool has_points =
           num_points >= options_.registration.min_num_visible_points;

@@ -16,16 +16,16 @@ namespace adasfm {
 struct LocalMapperOptions {
   RegisterImageOptions registration;
   InitialPairOptions initial_pair;
-  // Terms of the sensor priors in the adjustments.
+  // Whether sensor priors take part in the adjustments.
   bool use_priors_in_adjustment = true;
   // The coarse motion of every pair of the augmented view graph as a term of a
   // part's adjustments (paper, eq. 8). Off: the coarse model came from the same
   // matches, which would count twice (docs/reference/mapper.md has figures).
   bool use_coarse_motions_in_parts = false;
-  // Tracks are completed and joined within this error. After an adjustment
-  // observations beyond it are removed, or beyond what their noise asks for
-  // where that is more (MaxReprojErrorPx), and points below this angle. Joining
-  // does not follow the noise: it would join neighbouring points.
+  // Tracks are completed and joined within this error. After an adjustment,
+  // observations beyond it (or beyond MaxReprojErrorPx, where the noise asks
+  // for more) and points below min_triangulation_angle_deg are removed. Joining
+  // does not adapt to the noise, as it would join neighbouring points.
   double filter_max_reproj_error_px = 4.0;
   double min_triangulation_angle_deg = 1.5;
   // The whole part is adjusted when it has grown by this factor since the last
@@ -49,7 +49,7 @@ struct LocalMapResult {
   int num_registered_by_global_pose = 0;
   int num_global_adjustments = 0;
   double mean_reproj_error_px = 0.0;
-  // By which keypoint_sigma_px was raised in balance with the priors.
+  // Factor of keypoint_sigma_px in balance with the priors.
   double keypoint_sigma_factor = 1.0;
 };
 
@@ -60,12 +60,12 @@ struct LocalMapResult {
 //      better one of its two candidate poses
 //   3. bundle adjustment with priors: the batch after each batch, the part when
 //      it has grown
-//   4. again from 1 for what the matches did not reach: the coarse frame joins
-//      the pieces
+//   4. again from 1 for images that the matches did not reach: coarse poses
+//      connect the pieces
 //   5. images that no points reach take the coarse pose where priors confirm it
 //   6. retriangulation and a final adjustment.
-// Images that nothing supports stay out. Throws std::runtime_error when not
-// even an initial pair is found.
+// Images without any support stay unregistered. Throws std::runtime_error when
+// no initial pair is found.
 LocalMapResult ReconstructLocally(const LocalMapperOptions& options,
                                   const SceneData& data,
                                   const CoarsePoseMap& coarse,

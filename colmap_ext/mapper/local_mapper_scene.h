@@ -17,9 +17,10 @@ namespace adasfm {
 // The coarse model's poses, cam_from_world.
 using CoarsePoseMap = std::map<image_t, Rigid3d>;
 
-// What one part's mapper works on: COLMAP's mapper with the part's images and
-// the matches among them, and the reconstruction that it changes, which holds
-// those images and their cameras and begins without registered ones.
+// The data of one part's mapper: COLMAP's mapper with the part's images and the
+// matches among them, and the reconstruction that it changes. The
+// reconstruction contains those images and their cameras; none is registered at
+// first.
 struct MapperScene {
   const SceneData* data = nullptr;
   const CoarsePoseMap* coarse = nullptr;
@@ -29,15 +30,15 @@ struct MapperScene {
   // Matched images and the number of their matches, strongest first, ties by
   // id.
   std::map<image_t, std::vector<std::pair<image_t, int>>> neighbors;
-  // Of data->priors and frame_priors, those within the part; and for each image
-  // their indices.
+  // The members of data->priors and frame_priors within the part; and for each
+  // image their indices.
   std::vector<RelativePosePrior> priors;
   std::map<image_t, std::vector<size_t>> priors_of_image;
 };
 
 // `data` and `coarse` must outlive the scene. Images unknown to `data` are left
-// out. Without matches, which take the most memory, the mapper can do what it
-// can after HostMapper::ReleaseMatches.
+// out. Without matches, which take the most memory, the mapper is as after
+// HostMapper::ReleaseMatches.
 std::unique_ptr<MapperScene> BuildMapperScene(const SceneData& data,
                                               const CoarsePoseMap& coarse,
                                               const std::set<image_t>& images,

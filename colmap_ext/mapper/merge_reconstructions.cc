@@ -13,7 +13,7 @@
 namespace adasfm {
 namespace {
 
-// An observation may start this far off; the refinement filters.
+// Largest error of an observation at the start; the refinement filters.
 constexpr double kMaxInitialErrorPx = 30.0;
 
 using Observation = std::pair<image_t, point2D_t>;
@@ -147,7 +147,7 @@ class Merger {
     }
   }
 
-  // One keypoint for each image: the one that most of the points name.
+  // One keypoint for each image, by majority of the points.
   std::vector<Observation> Vote(const std::vector<PartPoint>& points,
                                 const std::vector<size_t>& group) const {
     std::map<Observation, int> votes;

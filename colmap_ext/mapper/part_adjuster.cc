@@ -14,10 +14,9 @@ namespace {
 
 // Registered images that see the batch's points, held fixed in its adjustment.
 constexpr size_t kMaxNumConstantImages = 30;
-// What the next images, or the refinement of the whole, bring moves the part by
-// more.
+// The next images, or the refinement of the whole, change the part by more.
 constexpr double kFunctionTolerance = 1e-3;
-// What a coarse motion is believed to.
+// 1 sigma of a coarse motion.
 constexpr double kCoarseRotationSigmaRad = 0.02;
 constexpr double kCoarseDirectionSigmaRad = 0.1;
 // Below this length in units of the model a motion has no direction.
@@ -143,7 +142,7 @@ void PartAdjuster::AdjustImages(const std::set<image_t>& images,
   options.num_threads = options_.num_threads;
   options.shared_errors.length_drift_ratio = scene_.data->length_drift_ratio;
   if (!constant_images.empty()) {
-    // Neighbours that stand fixed say nothing about the balance.
+    // With fixed neighbours the residuals do not show the balance.
     options.keypoint_sigma_px *= keypoint_sigma_factor_;
     AdjustBundle(options, problem, &reconstruction_);
     return;

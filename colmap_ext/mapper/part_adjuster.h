@@ -17,20 +17,20 @@ std::vector<PosePriorEdge> FindPriorEdges(
     const std::vector<RelativePosePrior>& priors,
     const std::set<image_t>& images);
 
-// The motion from the first to the second image in the coarse model, as loose
+// The motion from the first to the second image in the coarse model, as weak
 // terms of rotation and, unless it is too short, direction. None where the
-// coarse model lacks one of them.
+// coarse model lacks one of the images.
 std::optional<PosePriorEdge> CoarseEdge(const MapperScene& scene,
                                         image_t image_id1, image_t image_id2);
 
-// Those of all pairs of the augmented view graph among the images: pairs with
-// matches or with a prior.
+// The coarse edges of all pairs of the augmented view graph among the images:
+// pairs with matches or with a prior.
 std::vector<PosePriorEdge> FindCoarseEdges(const MapperScene& scene,
                                            const std::set<image_t>& images);
 
-// The bundle adjustments of a part that grows, with priors, each followed by
-// the filters of points. Vision's weight against the priors is kept from one to
-// the next. The arguments must outlive it.
+// The bundle adjustments of a growing part, with priors, each followed by a
+// filter of points. The weight of vision against the priors is kept from one to
+// the next. The arguments must outlive the adjuster.
 class PartAdjuster {
  public:
   PartAdjuster(const LocalMapperOptions& options, MapperScene* scene);
@@ -58,7 +58,7 @@ class PartAdjuster {
   MapperScene& scene_;
   colmap::Reconstruction& reconstruction_;
   double keypoint_sigma_factor_ = 1.0;
-  // As the last adjustment of all images asks for.
+  // Set by the last adjustment of all images.
   double max_reproj_error_px_ = 0.0;
   int num_global_adjustments_ = 0;
 };

@@ -48,13 +48,14 @@ bool IsSupportedByPrior(const PriorSupportOptions& options,
              .norm() <= tolerance_m;
 }
 
-std::optional<bool> IsTorn(const RelativePosePrior& prior,
-                           const colmap::Reconstruction& model) {
+std::optional<bool> IsViolated(const RelativePosePrior& prior,
+                               const colmap::Reconstruction& model) {
   const auto has = [&model](image_t image_id) {
     return model.ExistsImage(image_id) && IsRegistered(model, image_id);
   };
-  if (prior.flags & kPriorWheelSlip || !has(prior.image_id1) ||
-      !has(prior.image_id2)) {
+  constexpr uint32_t kTested = kPriorRotation | kPriorLength;
+  if (prior.flags & kPriorWheelSlip || !(prior.flags & kTested) ||
+      !has(prior.image_id1) || !has(prior.image_id2)) {
     return std::nullopt;
   }
   PriorSupportOptions options;

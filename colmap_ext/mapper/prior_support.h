@@ -10,11 +10,11 @@
 namespace adasfm {
 
 // Whether a motion agrees with what a prior's sensors observed: within four
-// sigmas and the given tolerances, which stand for what the covariance does not
-// know (calibration, the coarse model's own noise).
+// sigmas and the given tolerances, which cover errors that the covariance does
+// not include (calibration, the coarse model's own noise).
 struct PriorSupportOptions {
   double rotation_tolerance_rad = 0.05;
-  // Of the prior's length, and at least this many metres.
+  // Over the prior's length; the tolerance is at least translation_tolerance_m.
   double translation_tolerance_ratio = 0.2;
   double translation_tolerance_m = 0.1;
 };
@@ -22,11 +22,11 @@ bool IsSupportedByPrior(const PriorSupportOptions& options,
                         const RelativePosePrior& prior,
                         const Rigid3d& cam2_from_cam1);
 
-// Whether the model contradicts the prior by what no error of vision or of the
-// calibration explains: two look-alike places that are folded together, or an
-// image at a wrong place, tear the priors there. None where wheels slipped or
-// the model lacks an image.
-std::optional<bool> IsTorn(const RelativePosePrior& prior,
-                           const colmap::Reconstruction& model);
+// Whether the model violates the prior by more than any error of vision or of
+// the calibration explains, as where perceptual aliasing folds two places
+// together or an image has a wrong pose. None where wheels slipped, the model
+// lacks an image, or the prior has neither a rotation nor a length.
+std::optional<bool> IsViolated(const RelativePosePrior& prior,
+                               const colmap::Reconstruction& model);
 
 }  // namespace adasfm

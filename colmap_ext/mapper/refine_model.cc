@@ -25,9 +25,9 @@
 namespace adasfm {
 namespace {
 
-// Fewer points than this do not hold an image by themselves.
+// Fewer points than this do not constrain an image by themselves.
 constexpr size_t kMinNumPointsToHold = 20;
-// How weak the ties of such images to the coarse motion's length are.
+// Relative 1 sigma of the coarse motion's length for such images.
 constexpr double kCoarseLengthSigmaRatio = 0.2;
 constexpr size_t kMaxNumCoarseEdges = 4;
 
@@ -55,7 +55,7 @@ class ModelRefiner {
     ReleaseMatches();
     AdjustTentatively();
     Filter(local_.filter_max_reproj_error_px);
-    if (PutBackContradictedImages()) AdjustTentatively();
+    if (ResetContradictedImages()) AdjustTentatively();
   }
 
   void AdjustFinely() {
@@ -75,7 +75,7 @@ class ModelRefiner {
     ReleaseFreedMemory();
   }
 
-  // Until tracks of different parts are joined.
+  // Threshold until tracks of different parts are joined.
   double LoosePx() const { return 3.0 * local_.filter_max_reproj_error_px; }
 
   void Filter(double max_reproj_error_px) {
@@ -96,7 +96,8 @@ class ModelRefiner {
     }
   }
 
-  // Whether sensors know its whole motion to another image of the model.
+  // Whether sensors measured the image's whole motion to another image of the
+  // model.
   bool HasMotionPrior(image_t image_id) const {
     const auto indices = scene_.priors_of_image.find(image_id);
     if (indices == scene_.priors_of_image.end()) return false;
@@ -109,7 +110,7 @@ class ModelRefiner {
         });
   }
 
-  // For images on few points, the coarse motion to registered neighbours.
+  // Adds the coarse motions of images on few points to registered neighbours.
   void AddCoarseEdges(std::vector<PosePriorEdge>* edges) const {
     for (const image_t image_id : RegisteredImages(reconstruction_)) {
       if (reconstruction_.Image(image_id).NumPoints3D() >=
@@ -154,7 +155,7 @@ class ModelRefiner {
                           images);
   }
 
-  // In a model without metres the accelerometer says nothing.
+  // None in a model without metres, where the accelerometer does not help.
   std::vector<InertialMotion> FindInertialMotions() const {
     if (!local_.use_priors_in_adjustment || !HasLengths(scene_.priors)) {
       return {};
@@ -162,9 +163,9 @@ class ModelRefiner {
     return scene_.data->inertial_motions;
   }
 
-  // Until parts and gaps are in place, priors are off for other reasons than
-  // keypoints or shared errors; the balance found then serves this adjustment
-  // only, and what all priors share is left to the last round.
+  // Until parts and gaps are in place, priors have residuals for other reasons
+  // than keypoints or shared errors. The balance found then serves this
+  // adjustment only, and shared errors are estimated in the last round.
   void AdjustTentatively() {
     std::vector<PosePriorEdge> priors = FindPriors();
     MarkPriorsInGaps(&priors);
@@ -173,8 +174,8 @@ class ModelRefiner {
            /*is_tentative=*/true);
   }
 
-  // To its tolerance: an adjustment cut short leaves priors off that it would
-  // have met, which the balance would take for keypoints that weigh too much.
+  // Adjusts to its tolerance: an adjustment cut short leaves residuals of
+  // priors that the balance would attribute to keypoints of too much weight.
   void Adjust(double function_tolerance, std::vector<PosePriorEdge> priors,
               double* keypoint_sigma_factor, bool is_tentative = false) {
     PriorBundleAdjustmentProblem problem;
@@ -225,17 +226,17 @@ class ModelRefiner {
     problem->gravity_sigma_rad = verticals.sigma_rad;
   }
 
-  // The images all of whose usable priors are contradicted.
+  // The images whose usable priors are all violated.
   std::set<image_t> FindContradictedImages() const {
     std::set<image_t> contradicted;
     for (const auto& [image_id, indices] : scene_.priors_of_image) {
       int num_usable = 0;
       int num_contradicted = 0;
       for (const size_t i : indices) {
-        const std::optional<bool> is_torn =
-            IsTorn(scene_.priors[i], reconstruction_);
-        num_usable += is_torn.has_value();
-        num_contradicted += is_torn.value_or(false);
+        const std::optional<bool> is_violated =
+            IsViolated(scene_.priors[i], reconstruction_);
+        num_usable += is_violated.has_value();
+        num_contradicted += is_violated.value_or(false);
       }
       if (num_contradicted > 0 && num_contradicted == num_usable &&
           scene_.coarse->count(image_id)) {
@@ -245,7 +246,7 @@ class ModelRefiner {
     return contradicted;
   }
 
-  bool PutBackContradictedImages() {
+  bool ResetContradictedImages() {
     if (!local_.use_priors_in_adjustment) return false;
     const std::set<image_t> images = FindContradictedImages();
     for (const image_t image_id : images) {
@@ -256,7 +257,7 @@ class ModelRefiner {
       scene_.mapper.Register(image_id,
                              pose ? *pose : scene_.coarse->at(image_id));
     }
-    summary_.num_images_put_back = static_cast<int>(images.size());
+    summary_.num_images_reset = static_cast<int>(images.size());
     return !images.empty();
   }
 
@@ -276,7 +277,7 @@ class ModelRefiner {
     for (const RelativePosePrior& prior : scene_.priors) {
       if (prior.HasMotion()) join(prior.image_id1, prior.image_id2);
     }
-    // The factors over three images hold those in between.
+    // Inertial factors over three images constrain those in between.
     for (const InertialMotion& motion : FindInertialMotions()) {
       join(motion.image_id1, motion.image_id2);
     }
@@ -292,18 +293,18 @@ class ModelRefiner {
         continue;
       }
       scene_.mapper.Deregister(image_id);
-      ++summary_.num_images_left_out;
+      ++summary_.num_images_deregistered;
     }
   }
 
-  // Their poses are right among themselves only.
+  // The poses of an untied part are correct only relative to each other.
   void LeaveOutUntiedParts() {
     if (!scene_.data->positions.empty()) return;
     for (const std::set<image_t>& part :
          FindUntiedParts(scene_.priors, reconstruction_)) {
       for (const image_t image_id : part) {
         scene_.mapper.Deregister(image_id);
-        ++summary_.num_images_left_out;
+        ++summary_.num_images_deregistered;
       }
     }
   }

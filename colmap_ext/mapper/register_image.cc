@@ -12,12 +12,12 @@
 namespace adasfm {
 namespace {
 
-// More co-visible images hardly move a median.
+// More co-visible images hardly change a median.
 constexpr size_t kMaxNumNeighbors = 15;
-// P3P needs more points than v_p to be believed: no other pose confirms it.
+// P3P needs more inliers than v_p: no other pose confirms it.
 constexpr int kMinNumP3pInliers = 15;
-// Of the visible points: a coarse candidate that explains as much is refined on
-// the points that P3P would be refined on, too.
+// Inliers over visible points from which on P3P is not tried: the coarse
+// candidate is refined on the points that P3P would be refined on, too.
 constexpr double kEnoughInlierRatio = 0.9;
 
 // The registered images, with coarse poses, that image_id is matched or tied
@@ -48,8 +48,8 @@ std::vector<image_t> FindRegisteredNeighbors(const MapperScene& scene,
   return neighbors;
 }
 
-// Local lengths over coarse lengths between the neighbours, 1 when they stand
-// still.
+// Local lengths over coarse lengths between the neighbours (median); 1 when
+// they are stationary.
 double ComputeLocalScale(const MapperScene& scene,
                          const std::vector<image_t>& neighbors) {
   std::vector<double> ratios;

@@ -13,9 +13,9 @@ namespace adasfm {
 struct RegisterImageOptions {
   // v_p: an image that sees fewer points is not tried.
   int min_num_visible_points = 10;
-  // A point within this distance of its keypoint speaks for a pose.
+  // A point within this distance of its keypoint is an inlier of a pose.
   double max_reproj_error_px = 8.0;
-  // Of the visible points; below it wrong matches explain as much.
+  // Inliers over visible points; wrong matches can reach smaller ratios.
   double min_inlier_ratio = 0.25;
   // Whether the coarse poses give a second candidate.
   bool use_global_candidate = true;
@@ -33,8 +33,8 @@ RegisteredBy RegisterImage(const RegisterImageOptions& options,
 // those that priors tie to the image. Rotation: the L1 mean (Weiszfeld; Hartley
 // et al. 2013) of R^_ki R_k. Position: the per-axis median of
 //   C_k + s R_k^T R^_k (C^_i - C^_k),
-// where s is the length of the local model over that of the coarse one nearby.
-// The paper takes the median of translations instead; centres do not depend on
+// where s is the ratio of local to coarse lengths between these images. The
+// paper takes the median of translations instead; centres do not depend on
 // where the origin lies. None when no such image is registered.
 std::optional<Rigid3d> ComputeGlobalCandidate(const MapperScene& scene,
                                               image_t image_id);

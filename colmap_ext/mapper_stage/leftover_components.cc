@@ -11,10 +11,10 @@
 namespace adasfm {
 namespace {
 
-// Fewer images are what a model loses at its ends, not a stretch of the drive.
+// Fewer images are a loss at the ends of a model, not a trajectory segment.
 constexpr size_t kMinNumImages = 10;
 
-// The coarse poses of the images that are not in the model, by stretch.
+// The coarse poses of the images that are not in the model, by component.
 std::vector<CoarsePoseMap> FindStretches(const ComponentToMap& component,
                                          const colmap::Reconstruction& model) {
   const CoarsePoseMap& coarse = component.coarse;
@@ -44,7 +44,7 @@ std::vector<CoarsePoseMap> FindStretches(const ComponentToMap& component,
   return stretches;
 }
 
-// What SplitScene leaves to its callers.
+// Copies the frame priors, which SplitScene leaves to its callers.
 void AddFramePriors(const std::vector<RelativePosePrior>& frame_priors,
                     SceneData* data) {
   for (const RelativePosePrior& prior : frame_priors) {

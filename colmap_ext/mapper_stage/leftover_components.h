@@ -7,13 +7,13 @@
 
 namespace adasfm {
 
-// What finished models have left out of their coarse models, to be mapped by
-// itself: a coarse model may join stretches of a drive by a guess that neither
-// points nor sensors confirm in the end, and the largest stretch is the model
-// then. Images that verified matches tie to each other make a component, where
-// there are enough of them; it begins at their coarse poses, with the cameras
-// that the finished model has found. Those components are added, and the ones
-// that they come from are without them.
+// Adds components of the images that finished models have left out of their
+// coarse models, to be mapped by themselves. A coarse model may join trajectory
+// segments by a guess that neither points nor sensors confirm in the end; the
+// finished model is then the largest segment. Images that verified matches tie
+// to each other make a component, where there are enough of them. It begins at
+// their coarse poses, with the cameras of the finished model. Their images are
+// removed from the components that they come from.
 void TakeLeftovers(const std::vector<MappedComponent>& mapped,
                    std::vector<ComponentToMap>* components);
 

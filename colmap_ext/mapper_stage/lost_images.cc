@@ -10,7 +10,7 @@
 namespace adasfm {
 namespace {
 
-// A line for the screen holds no more; the summary has them all.
+// Names per reason in a line for the screen; the summary has them all.
 constexpr size_t kMaxNumNames = 3;
 
 void AppendLost(const SceneData& data, const std::set<image_t>& mapped_images,

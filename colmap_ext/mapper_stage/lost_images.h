@@ -27,10 +27,10 @@ struct LostImage {
   LostReason reason = LostReason::kNoMatches;
 };
 
-// Inputs: the components that were mapped and the rest of the scene, the images
-// of coarse models that were too small, the images that have matches in the
-// database as it was matched (before adasfm_global removed some), and the
-// images that models have. Sorted by name.
+// Inputs: the mapped components and the rest of the scene, the images of coarse
+// models that were too small, the images with matches in the database before
+// adasfm_global removed some, and the images of the finished models. Sorted by
+// name.
 std::vector<LostImage> FindLostImages(
     const std::vector<ComponentToMap>& components, const SceneData& rest,
     const std::set<image_t>& images_of_small_components,
@@ -40,7 +40,7 @@ std::vector<LostImage> FindLostImages(
 // "without verified matches" and the like, to follow a number of images.
 const char* DescribeLostReason(LostReason reason);
 
-// How many by reason, with the first names of each; empty without lost images.
+// Numbers by reason, with the first names of each; empty without lost images.
 std::string DescribeLostImages(const std::vector<LostImage>& images);
 
 // [{"name", "reason"}].

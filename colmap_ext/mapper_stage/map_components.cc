@@ -34,7 +34,7 @@ std::vector<size_t> FindComponentFolders(const std::string& output_path) {
   return numbers;
 }
 
-// The share of the run that each component is, by its images.
+// Beginning and share of each component in the progress, by its images.
 std::vector<std::pair<double, double>> FindProgressRanges(
     const std::vector<ComponentToMap>& components, size_t first) {
   double num_images = 0.0;
@@ -103,7 +103,7 @@ Status RunComponent(MapperSteps steps, size_t component, MapperStage* stage,
   Status status;
   if (steps != MapperSteps::kMerge) status = stage->Plan();
   if (status.ok() && steps == MapperSteps::kAll) status = stage->RunAllParts();
-  // Says what memory the parts may need.
+  // Reports the memory that the parts may need.
   if (status.ok() && steps == MapperSteps::kPlan) stage->FindNumParallelParts();
   if (!status.ok() || steps == MapperSteps::kPlan) return status;
   StatusOr<colmap::Reconstruction> model =

@@ -13,37 +13,37 @@ namespace adasfm {
 
 // A component of the scene, with the coarse model that it is mapped from.
 struct ComponentToMap {
-  // In adasfm_global's folder.
+  // Number of the model in adasfm_global's folder.
   int coarse_index = 0;
   // In the frame of the data's positions, if there are any.
   CoarsePoseMap coarse;
   SceneData data;
-  // Of RefineModelOptions: how far the coarse model is bent.
+  // For RefineModelOptions; larger where the coarse model is deformed.
   std::optional<double> initial_position_loss_scale = std::nullopt;
 };
 
 struct MappedComponent {
-  // Among those to map.
+  // Index among the components to map.
   size_t component = 0;
   MapperStageSummary summary;
   // Empty when no image could be reconstructed.
   colmap::Reconstruction model;
 };
 
-// One component's checkpoints lie in output_path, those of the k-th in
+// Where the checkpoints of the k-th component are: output_path for k = 0, else
 // output_path/component_<k>.
 std::string ComponentOutputPath(const std::string& output_path, size_t k);
 
-// Runs the mapper stage's steps on all components from the first on, one after
-// another. The steps plan and part give no models; the parts of the components
-// are numbered one after another.
+// Runs the mapper stage's steps on all components from index `first` on, one
+// after another. The steps plan and part return no models; parts are numbered
+// through all these components.
 StatusOr<std::vector<MappedComponent>> MapComponents(
     const MapperStageOptions& options,
     const std::vector<ComponentToMap>& components, size_t first,
     const std::string& output_path, MapperSteps steps, int part_index,
     const MapperProgress& progress);
 
-// Before any work: an error when another's files lie where checkpoints go.
+// Before any work: an error when foreign files are where checkpoints go.
 Status CheckComponentCheckpoints(const std::string& output_path);
 
 // Removes the checkpoints of components beyond the first num_components.

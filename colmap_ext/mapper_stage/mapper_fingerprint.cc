@@ -13,23 +13,83 @@ class Hash : public Fnv1aHash {
     Add(text.size());
     AddBytes(text.data(), text.size());
   }
+  template <typename Derived>
+  void AddMatrix(const Eigen::DenseBase<Derived>& matrix) {
+    for (const double value : matrix.reshaped()) Add(value);
+  }
   void Add(const Rigid3d& pose) {
-    for (int i = 0; i < 4; ++i) Add(pose.rotation.coeffs()(i));
-    for (int i = 0; i < 3; ++i) Add(pose.translation(i));
+    AddMatrix(pose.rotation.coeffs());
+    AddMatrix(pose.translation);
   }
 };
+
+void AddRigs(const CameraRigs& rigs, Hash* hash) {
+  for (const auto& [camera_id, camera] : rigs.cameras) {
+    hash->Add(camera_id);
+    hash->Add(camera.rig_id);
+    hash->Add(camera.is_reference);
+    if (camera.cam_from_rig) hash->Add(*camera.cam_from_rig);
+    hash->Add(camera.rotation_sigma_rad);
+    hash->Add(camera.translation_sigma_m);
+  }
+  for (const auto& [image_id, image] : rigs.images) {
+    hash->Add(image_id);
+    hash->Add(image.camera_id);
+    hash->Add(image.frame_id);
+  }
+}
+
+void AddMotions(const SceneData& data, Hash* hash) {
+  for (const auto* priors : {&data.priors, &data.frame_priors}) {
+    for (const RelativePosePrior& prior : *priors) {
+      hash->Add(prior.image_id1);
+      hash->Add(prior.image_id2);
+      hash->Add(prior.dt_ns);
+      hash->Add(prior.cam2_from_cam1);
+      hash->AddMatrix(prior.covariance);
+      hash->Add(prior.flags);
+    }
+  }
+  for (const InertialMotion& motion : data.inertial_motions) {
+    hash->Add(motion.image_id1);
+    hash->Add(motion.image_id2);
+    hash->Add(motion.dt_s);
+    hash->AddMatrix(motion.delta_velocity);
+    hash->AddMatrix(motion.delta_position);
+    hash->AddMatrix(motion.velocity_by_bias);
+    hash->AddMatrix(motion.position_by_bias);
+    hash->AddMatrix(motion.camera_from_imu_origin);
+    if (!motion.by_wheels) continue;
+    hash->AddMatrix(motion.by_wheels->translation);
+    hash->AddMatrix(motion.by_wheels->covariance);
+  }
+  hash->Add(data.length_drift_ratio);
+  hash->Add(data.inertial_scale_sigma);
+  if (data.wheel_scale) {
+    hash->Add(data.wheel_scale->scale);
+    hash->Add(data.wheel_scale->sigma);
+    hash->Add(data.wheel_scale->stated_sigma);
+  }
+}
+
+void AddPositions(const std::vector<PositionPrior>& positions, Hash* hash) {
+  for (const PositionPrior& prior : positions) {
+    hash->Add(prior.image_id1);
+    hash->Add(prior.image_id2);
+    hash->Add(prior.share);
+    hash->AddMatrix(prior.position);
+    hash->AddMatrix(prior.covariance);
+    hash->AddMatrix(prior.antenna_in_cam);
+  }
+}
 
 void AddScene(const SceneData& data, Hash* hash) {
   for (const auto& [image_id, image] : data.images) {
     hash->Add(image_id);
     hash->Add(image.name);
-    for (const Eigen::Vector2d& keypoint : image.keypoints) {
-      hash->Add(keypoint.x());
-      hash->Add(keypoint.y());
-    }
-    if (image.gravity_in_cam) {
-      for (int i = 0; i < 3; ++i) hash->Add((*image.gravity_in_cam)(i));
-    }
+    for (const Eigen::Vector2d& keypoint : image.keypoints)
+      hash->AddMatrix(keypoint);
+    if (image.gravity_in_cam) hash->AddMatrix(*image.gravity_in_cam);
   }
   for (const auto& [camera_id, camera] : data.cameras) {
     hash->Add(camera_id);
@@ -44,36 +104,9 @@ void AddScene(const SceneData& data, Hash* hash) {
       hash->Add(match.point2D_idx2);
     }
   }
-  for (const auto* priors : {&data.priors, &data.frame_priors}) {
-    for (const RelativePosePrior& prior : *priors) {
-      hash->Add(prior.image_id1);
-      hash->Add(prior.image_id2);
-      hash->Add(prior.cam2_from_cam1);
-      for (int i = 0; i < 36; ++i) hash->Add(prior.covariance(i));
-      hash->Add(prior.flags);
-    }
-  }
-  for (const InertialMotion& motion : data.inertial_motions) {
-    hash->Add(motion.image_id1);
-    hash->Add(motion.image_id2);
-    hash->Add(motion.dt_s);
-    for (int i = 0; i < 3; ++i) {
-      hash->Add(motion.delta_velocity(i));
-      hash->Add(motion.delta_position(i));
-      hash->Add(motion.camera_from_imu_origin(i));
-    }
-    if (!motion.by_wheels) continue;
-    for (int i = 0; i < 3; ++i) hash->Add(motion.by_wheels->translation(i));
-    for (int i = 0; i < 9; ++i) hash->Add(motion.by_wheels->covariance(i));
-  }
-  for (const PositionPrior& prior : data.positions) {
-    hash->Add(prior.image_id1);
-    hash->Add(prior.image_id2);
-    hash->Add(prior.share);
-    for (int i = 0; i < 3; ++i) hash->Add(prior.position(i));
-    for (int i = 0; i < 9; ++i) hash->Add(prior.covariance(i));
-    for (int i = 0; i < 3; ++i) hash->Add(prior.antenna_in_cam(i));
-  }
+  AddMotions(data, hash);
+  AddPositions(data.positions, hash);
+  AddRigs(data.rigs, hash);
 }
 
 void AddVarianceComponents(const VarianceComponentOptions& balance,

@@ -13,18 +13,18 @@
 
 namespace adasfm {
 
-// Hashes of everything that a checkpoint's content depends on, so that results
+// Hashes of the options and data that a checkpoint depends on, so that results
 // of other options or another database are noticed and not mixed. The number of
-// threads is not part of them.
+// threads is not included.
 
-// Of plan and parts.
+// Fingerprint of plan and parts.
 std::string ComputePartsFingerprint(const PartitionPlanOptions& partition,
                                     const LocalMapperOptions& local,
                                     const SceneData& data,
                                     const CoarsePoseMap& coarse);
 
-// Of the merged model and its refinement: also of the parts that are there and
-// their figures.
+// Fingerprint of the merged model and its refinement: includes which parts
+// there are, and their figures.
 std::string ComputeMergeFingerprint(const std::string& parts_fingerprint,
                                     const AlignSimilarityOptions& align,
                                     const RefineModelOptions& refine,

@@ -26,12 +26,12 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// The rest is for the scene itself, the system and what else runs.
+// The remainder is for the scene itself, the system and other programs.
 constexpr double kShareOfAvailableMemory = 0.7;
 // COLMAP reports on std::cout every image that it registers (host_mapper.h).
 constexpr char kNowhere[] = "/dev/null";
 
-// For a part that threw: fewer wrong poses and points to stumble over.
+// For a part that threw: lets fewer wrong poses and points in.
 LocalMapperOptions StricterOptions(LocalMapperOptions options) {
   options.registration.min_num_visible_points *= 2;
   options.registration.min_inlier_ratio =
@@ -105,8 +105,8 @@ Status MapperStage::Plan() {
     return Status::Ok();
   }
   Status status = CheckCheckpointFolder(checkpoint_path_);
-  // The parts of a plan that is lost are still those of the new one: both
-  // follow from what the fingerprint is of.
+  // Parts stay valid when a damaged plan is made again: both plans follow from
+  // the data of the fingerprint.
   if (condition == CheckpointCondition::kDamaged) {
     Report(path + " is damaged: making it again", 0.0);
   } else if (condition == CheckpointCondition::kOutdated) {
@@ -196,7 +196,7 @@ Status MapperStage::RunPartWithThreads(int part_index, int num_threads) {
   const std::string path = PartCheckpointPath(checkpoint_path_, part_index);
   const StatusOr<PartReport> found =
       ReadPartReport(path, fingerprint_, part_index);
-  // What made a part fail, such as too little memory, may have gone.
+  // What made a part fail, such as too little memory, may be gone.
   if (found.ok() && found->failure.empty()) return Status::Ok();
   if (!found.ok() && fs::exists(path)) {
     Report(found.status().message() + ": making part " +

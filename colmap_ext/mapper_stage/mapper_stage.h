@@ -32,9 +32,10 @@ struct MapperStageOptions {
   // Bound of the parts that run at the same time; -1: as many as there are
   // threads and as fit into the memory.
   int max_num_parallel_parts = -1;
-  // For the parts that run at the same time, in GB (1e9 bytes); -1: 70 % of
-  // what the machine has available when they begin. One part always runs;
-  // MapParts does not begin a model whose refinement is estimated to take more.
+  // Memory for the parts that run at the same time, in GB (1e9 bytes); -1: 70 %
+  // of what the machine has available when they begin. One part always runs;
+  // MapParts returns an error where the estimate of the refinement exceeds
+  // this.
   double max_memory_gb = -1.0;
 
   bool IsValid(std::string* error) const;
@@ -50,22 +51,22 @@ struct MapperStageSummary {
   AlignPartsResult aligned;
   MergeSummary merge;
   RefineModelSummary refine;
-  // The merged parts contradicted the priors far more than the coarse model
-  // does; the model was refined from the coarse poses instead.
+  // The merged parts contradicted more priors than the coarse model does; the
+  // model was refined from the coarse poses instead.
   bool started_from_coarse_poses = false;
   bool is_metric = false;
-  // Where metres come from: wheels or other odometry, and positions, whose
-  // frame the model then has.
+  // Sources of metres: wheels or other odometry, and positions, whose frame is
+  // then that of the model.
   bool has_metric_sensors = false;
   bool is_georeferenced = false;
-  // 1 sigma of the metres, as a ratio; 0 where nobody says.
+  // Relative 1 sigma of the metres; 0 where it is unknown.
   double scale_sigma = 0.0;
-  // The lengths of the priors became so much longer when the accelerometer
-  // measured the finished model.
+  // Factor by which the accelerometer enlarged the finished model over the
+  // lengths of the priors.
   double size_over_priors = 1.0;
   bool is_level = false;
   int num_parallel_parts = 0;
-  // Of the biggest part, estimated before it runs.
+  // Memory of the biggest part, estimated before it runs.
   double max_part_memory_bytes = 0.0;
   double plan_seconds = 0.0;
   double parts_seconds = 0.0;
@@ -76,7 +77,7 @@ struct MapperStageSummary {
 // One line of text and the share of the stage that is done, from any thread.
 using MapperProgress = std::function<void(const std::string&, double)>;
 
-// How a part is reconstructed: ReconstructLocally, or what a test puts there.
+// Reconstructs a part: ReconstructLocally, or a substitute in a test.
 using PartMapper = std::function<LocalMapResult(
     const LocalMapperOptions&, const SceneData&, const CoarsePoseMap&,
     const std::set<image_t>&)>;
@@ -101,9 +102,9 @@ class MapperStage {
               MapperProgress progress = {},
               PartMapper part_mapper = ReconstructLocally);
 
-  // Makes the plan, or takes the one that is there.
+  // Makes the plan, or reads the existing one.
   Status Plan();
-  // The parts of the plan that is there.
+  // The number of parts of the existing plan.
   StatusOr<int> ReadNumParts();
   // Reconstructs one part of the plan. A part that throws is tried once more
   // with stricter settings; its report then says why.
@@ -131,10 +132,11 @@ class MapperStage {
   Status ReadPartReports(bool require_all_parts);
   Status MergePartModels(const std::string& fingerprint);
   std::unique_ptr<MapperScene> BuildWholeScene(bool with_matches) const;
-  // Takes the merged model through the rounds that are left.
+  // Refines the merged model in the remaining rounds.
   Status RefineMerged(const std::string& fingerprint, MergeCheckpoint* merged);
   void SetMetres(colmap::Reconstruction* model);
-  // So that the result is never worse than the prior trajectory.
+  // Refines the coarse poses instead where the merged parts violate more
+  // priors, so that the result is never worse than the prior trajectory.
   void FallBackToCoarsePoses(std::unique_ptr<MapperScene>* scene);
 
   const MapperStageOptions options_;

@@ -23,13 +23,13 @@
 namespace adasfm {
 namespace {
 
-// The importer has every reading of the log, and its size is the better one
-// where both are about as certain. Of slow machines it is much less so.
+// The importer uses every reading of the log, and its size is better where both
+// are about equally certain. On slow machines it is much less certain.
 constexpr double kMaxSigmaOverImporter = 0.6;
 
-// The size of a model in the wheels' metres by what is stated of the wheels and
-// by the accelerometer. What the importer found of both stays out: it counts
-// the accelerometer already.
+// Combines the size of a model in the wheels' metres by the stated wheel scale
+// with that by the accelerometer. The importer's estimate is not used, as it
+// includes the accelerometer already.
 InertialScale CombineWithWheels(const WheelScale& wheels,
                                 const InertialScale& inertial) {
   const double weight = 1.0 / (wheels.stated_sigma * wheels.stated_sigma);
@@ -69,8 +69,8 @@ double ComputeNeighborDistance(const SceneData& data,
   return median > 0.0 ? median : 1.0;
 }
 
-// Of the merged parts: where the balance of the whole begins, since it is only
-// raised.
+// The smallest factor of the merged parts: the balance of the whole begins
+// there, since it only raises the factor.
 double FindSmallestSigmaFactor(const std::vector<PartReport>& parts,
                                const AlignPartsResult& aligned) {
   std::optional<double> smallest;
@@ -82,18 +82,18 @@ double FindSmallestSigmaFactor(const std::vector<PartReport>& parts,
   return smallest.value_or(1.0);
 }
 
-int CountTornPriors(const MapperScene& scene) {
+int CountViolatedPriors(const MapperScene& scene) {
   return std::count_if(
       scene.priors.begin(), scene.priors.end(),
       [&scene](const RelativePosePrior& prior) {
-        return IsTorn(prior, scene.reconstruction).value_or(false);
+        return IsViolated(prior, scene.reconstruction).value_or(false);
       });
 }
 
-// An image that is put back holds on the priors alone and tears none of them.
+// A reset image rests on the priors alone and violates none; it counts as well.
 int CountContradictions(const MapperScene& scene,
                         const RefineModelSummary& refined) {
-  return CountTornPriors(scene) + refined.num_images_put_back;
+  return CountViolatedPriors(scene) + refined.num_images_reset;
 }
 
 }  // namespace
@@ -144,7 +144,7 @@ Status MapperStage::MergePartModels(const std::string& fingerprint) {
     parts.push_back(std::move(part));
   }
   AlignSimilarityOptions align = options_.align;
-  // Metres by the accelerometer may be of any size of scene, and err alike.
+  // Scenes in metres by the accelerometer have any size; errors scale with it.
   if (!summary_.is_metric || data_.inertial_scale_sigma > 0.0) {
     align.unit = ComputeNeighborDistance(data_, coarse_);
   }
@@ -164,8 +164,8 @@ void MapperStage::FallBackToCoarsePoses(std::unique_ptr<MapperScene>* scene) {
   if (num_contradictions == 0) return;
   auto coarse_scene = BuildMapperScene(data_, coarse_, (*scene)->images);
   RegisterAtCoarsePoses(coarse_scene.get());
-  // Priors that tear in the coarse model too are wrong themselves.
-  if (num_contradictions <= CountTornPriors(*coarse_scene)) return;
+  // Priors that the coarse model violates, too, are wrong themselves.
+  if (num_contradictions <= CountViolatedPriors(*coarse_scene)) return;
   Report("the parts contradict the priors; refining the coarse poses", 0.9);
   RefineModelOptions options = options_.refine;
   options.join_parts = false;
@@ -204,8 +204,8 @@ Status MapperStage::RefineMerged(const std::string& fingerprint,
     const Status status = WriteMergeCheckpoint(checkpoint_path_, fingerprint,
                                                round, summary_, *scene);
     if (!status.ok()) return status;
-    // From the file, as a run that was killed here would: its points have other
-    // ids, and so another order.
+    // Reads the file, as a resumed run would: its points have other ids, and so
+    // another order.
     scene.reset();
     ReleaseFreedMemory();
     StatusOr<MergeCheckpoint> read =
@@ -216,12 +216,13 @@ Status MapperStage::RefineMerged(const std::string& fingerprint,
   return Status::Ok();
 }
 
-// The accelerometer tells the size of the final shape, in which it has part,
-// better than that of the coarse model, and of slow machines better than the
-// importer. What the shape and the accelerometer differ by does not tell how
-// well: the adjustment does. The metres that the model has stay where this is
-// less certain. A model that measured lengths hold has theirs, whatever the
-// coarse one had.
+// Scales the model by the accelerometer where that is more certain than the
+// model's metres. The accelerometer determines the size of the final shape,
+// which it helped to estimate, better than that of the coarse model, and on
+// slow machines better than the importer. How well cannot be seen from the
+// residuals of shape and accelerometer alone: the adjustment gives the sigma. A
+// model that measured lengths constrain has their metres, whatever the coarse
+// one had.
 void MapperStage::SetMetres(colmap::Reconstruction* model) {
   const bool is_by_wheels = HasMeasuredLengths(data_.priors);
   if (is_by_wheels) {

@@ -51,8 +51,8 @@ nlohmann::json MapperSummaryToJson(const MapperStageSummary& summary) {
       {"coarse_images", summary.merge.coarse_images},
       {"started_from_coarse_poses", summary.started_from_coarse_poses},
       {"num_merged_points", summary.merge.num_merged_points},
-      {"num_images_put_back", summary.refine.num_images_put_back},
-      {"num_images_left_out", summary.refine.num_images_left_out},
+      {"num_images_reset", summary.refine.num_images_reset},
+      {"num_images_deregistered", summary.refine.num_images_deregistered},
       {"num_refinement_iterations", summary.refine.num_iterations},
       {"min_num_shared_points", summary.refine.min_num_shared_points},
       {"keypoint_sigma_px", summary.refine.keypoint_sigma_px},
@@ -107,9 +107,9 @@ std::string FormatMapperSummaryText(const MapperStageSummary& summary) {
        << " points, " << std::setprecision(2) << summary.mean_reproj_error_px
        << " px; " << summary.merge.coarse_images.size()
        << " images started from coarse poses, "
-       << summary.refine.num_images_put_back
-       << " contradicted the priors and were put back, "
-       << summary.refine.num_images_left_out
+       << summary.refine.num_images_reset
+       << " contradicted the priors and were reset to their coarse poses, "
+       << summary.refine.num_images_deregistered
        << " without points and priors were left out\n";
   if (summary.started_from_coarse_poses) {
     text << "the merged parts contradicted the priors: the model was refined "

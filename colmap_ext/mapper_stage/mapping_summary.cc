@@ -19,7 +19,7 @@ nlohmann::json ModelAsJson(const ModelSummary& model) {
           {"verdict", VerdictToJson(model.verdict)}};
 }
 
-// What the first model's summary does not hold already.
+// Adds the times of a further model to those of the first.
 void AddTimes(const MapperStageSummary& stage, nlohmann::json* json) {
   const std::pair<const char*, double> times[] = {
       {"plan_seconds", stage.plan_seconds},

@@ -10,12 +10,12 @@
 
 namespace adasfm {
 
-// What is said about one of the models of a run.
+// Summary of one of the models of a run.
 struct ModelSummary {
-  // Of the coarse model that it was made from, in adasfm_global's folder.
+  // Number of its coarse model in adasfm_global's folder.
   int coarse_index = 0;
   MapperStageSummary stage;
-  // Of this model by itself.
+  // Verdict on this model alone.
   Verdict verdict;
 };
 
@@ -24,8 +24,8 @@ nlohmann::json MapperSummaryToJson(const MapperStageSummary& summary);
 std::string FormatMapperSummaryText(const MapperStageSummary& summary);
 
 // The run's summary.json (docs/reference/formats.md): the first model's
-// figures, the parts of all, a short entry for each model, the images of none,
-// and the verdict on all together.
+// figures, the parts of all models, a short entry for each model, the images in
+// no model, and the verdict on all models.
 std::string FormatMappingJson(const std::vector<ModelSummary>& models,
                               const Verdict& verdict);
 

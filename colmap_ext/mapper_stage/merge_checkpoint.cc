@@ -16,7 +16,7 @@ std::string RoundPath(const std::string& checkpoint_path, int num_rounds) {
   return checkpoint_path + "/refine_" + std::to_string(num_rounds);
 }
 
-// What the summary tells: visit(name, value) of each.
+// Calls visit(name, value) for each stored figure of the summary.
 template <typename Alignment, typename Visit>
 void VisitAlignment(Alignment& alignment, const Visit& visit) {
   visit("success", alignment.success);
@@ -42,8 +42,8 @@ void VisitSummary(Summary& summary, const Visit& visit) {
   visit("keypoint_sigma_ratios", summary.refine.keypoint_sigma_ratios);
   visit("prior_chi2_per_dof", summary.refine.prior_chi2_per_dof);
   visit("unit_sigma", summary.refine.unit_sigma);
-  visit("num_images_put_back", summary.refine.num_images_put_back);
-  visit("num_images_left_out", summary.refine.num_images_left_out);
+  visit("num_images_reset", summary.refine.num_images_reset);
+  visit("num_images_deregistered", summary.refine.num_images_deregistered);
   visit("started_from_coarse_poses", summary.started_from_coarse_poses);
 }
 
@@ -126,7 +126,7 @@ StatusOr<MergeCheckpoint> ReadMergeCheckpoint(
     StatusOr<MergeCheckpoint> read =
         ReadRound(path, fingerprint, num_rounds, summary);
     if (read.ok()) {
-      // A kill may have left half of them.
+      // A kill may have left remnants of them.
       RemoveEarlierRounds(checkpoint_path, num_rounds);
       return read;
     }

@@ -9,9 +9,9 @@
 
 namespace adasfm {
 
-// The merged model after a number of rounds of refinement, 0 for none, with
-// what the summary says about alignment, merge and refinement: the folder
-// refine_<rounds> in checkpoint_path. Those of fewer rounds are removed.
+// Writes the merged model after a number of refinement rounds (0: none), with
+// the summary's figures of alignment, merge and refinement, to the folder
+// refine_<rounds> in checkpoint_path. Removes the folders of fewer rounds.
 Status WriteMergeCheckpoint(const std::string& checkpoint_path,
                             const std::string& fingerprint, int num_rounds,
                             const MapperStageSummary& summary,
@@ -22,9 +22,9 @@ struct MergeCheckpoint {
   colmap::Reconstruction model;
 };
 
-// Reads the checkpoint of most rounds, with the summary, and removes what is
-// left of those of fewer. An error when there is none of this fingerprint that
-// is sound; it says what is wrong with those that are there.
+// Reads the checkpoint of most rounds, with the summary, and removes remnants
+// of those of fewer rounds. An error without a sound one of this fingerprint;
+// it names the problems of those that exist.
 StatusOr<MergeCheckpoint> ReadMergeCheckpoint(
     const std::string& checkpoint_path, const std::string& fingerprint,
     MapperStageSummary* summary);

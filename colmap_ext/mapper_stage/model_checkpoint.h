@@ -9,10 +9,10 @@
 
 namespace adasfm {
 
-// A checkpoint is a folder: state.json, which says what it was made from, and
-// the three files of a COLMAP model with their sizes and digests. It appears
-// under its name when all of it is on the disk and has been read back, so that
-// neither a kill, nor a power cut, nor a full disk leaves half of one.
+// A checkpoint is a folder: state.json, with the fingerprint of its inputs, and
+// the three files of a COLMAP model with their sizes and digests. It gets its
+// name when all of it is on the disk and has been read back, so that neither a
+// kill, nor a power cut, nor a full disk leaves half of one.
 
 // Replaces the checkpoint at `path`. Without a model only the state is written.
 // The error names the cause, such as a full disk.
@@ -36,7 +36,7 @@ StatusOr<colmap::Reconstruction> ReadCheckpointModel(const std::string& path);
 // An error when the folder, which need not exist, holds anything else.
 Status CheckCheckpointFolder(const std::string& path);
 
-// Removes what CheckCheckpointFolder allows; where there is more, nothing.
+// Removes all checkpoints; nothing where CheckCheckpointFolder fails.
 Status RemoveCheckpoints(const std::string& path);
 
 }  // namespace adasfm

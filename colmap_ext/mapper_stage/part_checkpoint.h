@@ -10,7 +10,7 @@
 
 namespace adasfm {
 
-// What is said about one part.
+// Report on one part.
 struct PartReport {
   int part_index = 0;
   // Empty for a part that was reconstructed; otherwise why it was not.

@@ -52,7 +52,7 @@ double EstimatePartMemoryBytes(const SceneData& data,
 double MemoryLeftInGroup(const std::string& folder) {
   double limit = std::numeric_limits<double>::infinity();
   double used = 0.0;
-  // Of version 2 and of version 1; "max" is no number.
+  // Files of version 2 and of version 1; "max" is no number.
   for (const char* name : {"/memory.max", "/memory.limit_in_bytes"}) {
     std::ifstream(folder + name) >> limit;
     if (limit == 0.0) limit = std::numeric_limits<double>::infinity();

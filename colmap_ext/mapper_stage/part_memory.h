@@ -9,18 +9,18 @@
 
 namespace adasfm {
 
-// What a part at work needs beside the scene: matches in the correspondence
-// graph, tracks, and the adjustment's observations and equations. An upper
-// estimate in bytes from its keypoints and matches.
+// Upper estimate, in bytes, of the memory that a part needs beside the scene:
+// matches in the correspondence graph, tracks, and the adjustment's
+// observations and equations. Made from the numbers of keypoints and matches.
 double EstimatePartMemoryBytes(const SceneData& data,
                                const std::vector<image_t>& part);
 
-// What the system can give without swapping, and limits (those of the control
-// group as it stands below /sys/fs/cgroup, and of the address space) allow.
+// The memory that is available without swapping and within the limits (of the
+// control group as it stands below /sys/fs/cgroup, and of the address space).
 double AvailableMemoryBytes();
 
-// What the limit of the control group of that folder leaves, without the cache
-// of files; infinite without a limit.
+// The memory that the limit of that folder's control group leaves, with the
+// file cache counted as free; infinite without a limit.
 double MemoryLeftInGroup(const std::string& folder);
 
 // How many of the parts may run at the same time so that the biggest ones fit

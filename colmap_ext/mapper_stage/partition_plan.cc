@@ -8,7 +8,7 @@
 namespace adasfm {
 namespace {
 
-// A prior holds two images together about as well as a weak pair; parts are cut
+// A prior connects two images about as well as a weak pair; parts are cut
 // through vision rather than through the priors of a tunnel.
 constexpr double kPriorWeight = 30.0;
 

@@ -32,15 +32,15 @@ struct PartitionPlan {
   std::vector<double> overlap_ratios;
 };
 
-// The graph of matches (weight: inliers) and sensor priors over all images that
-// the coarse model or a match knows.
+// The graph of matches (weight: inliers) and sensor priors over all images with
+// a coarse pose or a match.
 ImageGraph BuildImageGraph(const SceneData& data, const CoarsePoseMap& coarse);
 
 PartitionPlan BuildPartitionPlan(const PartitionPlanOptions& options,
                                  const SceneData& data,
                                  const CoarsePoseMap& coarse);
 
-// As JSON, with the fingerprint of what the plan was made from.
+// Writes JSON, with the fingerprint of what the plan was made from.
 Status WritePartitionPlan(const std::string& path,
                           const std::string& fingerprint,
                           const PartitionPlan& plan);

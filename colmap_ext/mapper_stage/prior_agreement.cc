@@ -12,17 +12,17 @@
 namespace adasfm {
 namespace {
 
-// Fewer do not fix six degrees of freedom against a few wrong ones.
+// Fewer points do not fix six degrees of freedom if a few are wrong.
 constexpr int kMinPointsOfImage = 15;
 // Quantiles of chi-square with three degrees of freedom: 50 % and 99.9 %.
 constexpr double kMedianChi2 = 2.366;
 constexpr double kLargeChi2 = 16.27;
-// Of the search for the rotation that translations share: an error of more
-// sigmas is not believed.
+// Search for the rotation that translations share: a rotation of more sigmas is
+// rejected.
 constexpr double kMaxNumSharedSigmas = 3.0;
 constexpr int kNumSharedSteps = 5;
 
-// Of the residual by its covariance; negative when that is not one.
+// Chi-square of the residual; negative when the covariance is not definite.
 double Chi2(const Eigen::Vector3d& residual,
             const Eigen::Matrix3d& covariance) {
   const Eigen::LLT<Eigen::Matrix3d> llt(covariance);
@@ -30,9 +30,9 @@ double Chi2(const Eigen::Vector3d& residual,
   return residual.dot(llt.solve(residual));
 }
 
-// Of one prior's translation, in the frame of the later camera: what is left
-// of it [m], and how a rotation of the direction of driving (shared_errors.h)
-// moves that [m/rad].
+// Residual of a prior's translation in the frame of the later camera [m], and
+// its derivative by a rotation of the direction of driving (shared_errors.h)
+// [m/rad].
 struct TranslationResidual {
   Eigen::Vector3d residual;
   Eigen::Matrix3d by_rotation;
@@ -51,8 +51,8 @@ TranslationResidual ComputeTranslationResidual(const RelativePosePrior& prior,
   return result;
 }
 
-// The rotation that all translations share, robust (Cauchy); zero beyond what
-// an adjustment believes, whose unknown it is.
+// Robust estimate (Cauchy) of the rotation that all translations share, an
+// unknown of the adjustment; zero where the adjustment's prior excludes it.
 Eigen::Vector3d FindSharedRotation(
     const std::vector<TranslationResidual>& translations) {
   const double sigma = SharedErrorOptions().driving_direction_sigma_rad;

@@ -13,16 +13,16 @@ namespace adasfm {
 // its own.
 bool IsHeldByPoints(const colmap::Reconstruction& model, image_t image_id);
 
-// How far vision and one kind of prior agree: priors between images that points
-// hold too, after the adjustment.
+// Agreement of vision with one kind of prior after the adjustment, over priors
+// between images that points constrain, too.
 struct PriorAgreement {
   std::string kind;  // "rotation" or "translation"
   int num_priors = 0;
-  // Median over the priors of the squared whitened residual, divided by that of
-  // honest ones: 1 or less when the covariances are right, since the adjustment
-  // has drawn the poses to the priors.
+  // Median over the priors of the squared whitened residual, divided by its
+  // expected median. 1 or less for correct covariances, since the adjustment
+  // has fitted the poses to the priors.
   double chi2_ratio = 0.0;
-  // The share of priors beyond what one honest prior in 1,000 has.
+  // Share of priors with residuals that one correct prior in 1,000 exceeds.
   double share_contradicting = 0.0;
 };
 
@@ -32,11 +32,12 @@ struct PriorResiduals {
   std::vector<double> translations;
 };
 
-// Adds those of the scene's priors between images of the model that points
-// hold; translations are of priors with direction and length [m], without the
-// rotation of the direction of driving that all of them share. That is an
-// unknown of the adjustment and no contradiction (shared_errors.h), and no more
-// is size_over_priors, by which the finished model was made larger.
+// Adds the residuals of the scene's priors between images of the model that
+// points constrain. Translations are those of priors with direction and length
+// [m]. Two corrections are no contradictions and are taken out: the shared
+// rotation of the direction of driving, an unknown of the adjustment
+// (shared_errors.h), and size_over_priors, by which the finished model was
+// enlarged.
 void AddPriorResiduals(const SceneData& data,
                        const colmap::Reconstruction& model,
                        double size_over_priors, PriorResiduals* residuals);

@@ -11,8 +11,8 @@ namespace {
 
 constexpr int kNoComponent = -1;
 
-// One image waits to join a component: most inliers first, then the smallest
-// ids.
+// An image that may join a component. Most inliers come first, then the
+// smallest ids.
 struct Candidate {
   size_t num_inliers = 0;
   image_t image_id = kInvalidImageId;

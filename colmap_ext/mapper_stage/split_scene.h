@@ -8,21 +8,20 @@
 
 namespace adasfm {
 
-// A scene that falls apart into components, each with a coarse model of its
-// own.
+// A scene split into components, each with its own coarse model.
 struct SplitSceneData {
   // One per coarse model, in their order.
   std::vector<SceneData> components;
-  // The images that belong to none, and what lies between them.
+  // The images of no component, and the pairs and priors among them.
   SceneData rest;
 };
 
-// Gives each image to the component that can use it, so that every component
-// can be mapped by itself and no image is mapped twice. Images with a coarse
-// pose are of that model; the others follow their matches: of all images that
-// are matched to a component, the one with most inliers joins it next. Pairs
-// and priors between two components are dropped. The scene is moved, not
-// copied; cameras are in all.
+// Assigns each image to at most one component, so that every component can be
+// mapped by itself and no image is mapped twice. Images with a coarse pose
+// belong to that model. The others follow their matches: of all images matched
+// to a component, the one with most inliers joins it next. Pairs and priors
+// between two components are removed. The scene is moved, not copied; all
+// components have all cameras.
 SplitSceneData SplitScene(const std::vector<CoarsePoseMap>& coarse_models,
                           SceneData scene);
 

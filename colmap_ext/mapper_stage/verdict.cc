@@ -14,28 +14,27 @@
 namespace adasfm {
 namespace {
 
-// Half the images lost is no model of the scene any more.
+// With half of the images lost it is no model of the scene any more.
 constexpr double kMinShareOfImages = 0.5;
 constexpr double kGoodShareOfImages = 0.95;
-// Images between points, as in a tunnel, hang on the priors alone.
+// Images without points, as in a tunnel, rest on the priors alone.
 constexpr double kMinShareHeld = 0.25;
 constexpr double kGoodShareHeld = 0.85;
-// Verified matches and poses that most of them contradict: one is wrong.
+// Where most verified matches contradict the poses, one of both is wrong.
 constexpr double kMinShareOfMatchedHeld = 0.5;
 constexpr double kGoodShareOfMatchedHeld = 0.9;
-// An honest prior has 1 or less; twice the sigma gives 4.
+// Correct priors have 1 or less; twice the sigma gives 4.
 constexpr double kGoodChi2Ratio = 2.0;
 constexpr double kGoodShareContradicting = 0.05;
 constexpr double kMaxShareContradicting = 0.5;
-// Of what keypoints share along the radius, over their sigma: wrong camera
-// models gave 0.3 to 0.6 on drives with turns, calibrations of real cameras at
-// most 0.2.
+// Radial error that keypoints share, over their sigma: wrong camera models gave
+// 0.3 to 0.6 on drives with turns, calibrations of real cameras at most 0.2.
 constexpr double kGoodLensErrorRatio = 0.25;
-// Of the keypoint sigma that fits the priors, over that of the residuals.
+// Keypoint sigma that agrees with the priors over that of the residuals.
 constexpr double kGoodSigmaFactor = 4.0;
-// Of the registered images.
-constexpr double kGoodSharePutBack = 0.02;
-// Below it a mean tells little.
+// Share of the registered images.
+constexpr double kGoodShareReset = 0.02;
+// Fewer priors are no statistic.
 constexpr int kMinPriors = 10;
 
 std::string Number(double value, int digits) {
@@ -99,8 +98,8 @@ std::set<image_t> FindMatchedImages(const SceneData& data) {
   return matched;
 }
 
-// Images that have verified matches must have points too, unlike those in the
-// dark. The reason names how many have not.
+// Images with verified matches must also see points, unlike those in the dark.
+// The reason states how many do not.
 void JudgeMatchedImages(const std::vector<AssessedModel>& models,
                         const SceneData& rest, Judge* judge) {
   int num_matched = static_cast<int>(FindMatchedImages(rest).size());
@@ -171,8 +170,9 @@ void JudgePriors(const Verdict& verdict, Judge* judge) {
         FormatShare(priors.share_contradicting) + " of " +
         std::to_string(priors.num_priors) + ", typical squared error " +
         Number(priors.chi2_ratio, 1) + " times what their noise allows)";
-    // Wrong lengths alone, as of wheels that slip all the time, leave the shape
-    // that vision sees, unless keypoints were let go for them.
+    // Wrong lengths alone, as of wheels that slip all the time, do not change
+    // the shape that vision gives, unless the keypoint sigma was raised for
+    // them.
     const bool bends_model = priors.kind == "rotation" ||
                              verdict.keypoint_sigma_factor >= kGoodSigmaFactor;
     if (bends_model && priors.share_contradicting > kMaxShareContradicting) {
@@ -190,15 +190,16 @@ void JudgePriors(const Verdict& verdict, Judge* judge) {
   }
 }
 
-// `name` tells the model from others; empty for the only one.
+// `name` identifies the model among several; empty for a single one.
 void JudgeStage(const std::string& name, const MapperStageSummary& summary,
                 int num_images, Judge* judge) {
   if (summary.started_from_coarse_poses) {
-    judge->Doubt(name + "the parts contradicted the sensors and were given up");
+    judge->Doubt(name + "the parts contradicted the sensors and were rejected");
   }
-  if (summary.refine.num_images_put_back > kGoodSharePutBack * num_images) {
-    judge->Doubt(name + std::to_string(summary.refine.num_images_put_back) +
-                 " images contradicted the sensors and were put back");
+  if (summary.refine.num_images_reset > kGoodShareReset * num_images) {
+    judge->Doubt(name + std::to_string(summary.refine.num_images_reset) +
+                 " images contradicted the sensors and were reset to their "
+                 "coarse poses");
   }
   int num_lost_parts = 0;
   for (size_t k = 0; k < summary.parts.size(); ++k) {
@@ -213,7 +214,7 @@ void JudgeStage(const std::string& name, const MapperStageSummary& summary,
   }
 }
 
-// Each by itself: a wrong one must not hide behind a large sound one.
+// Judges each model by itself: a large sound one must not hide a wrong one.
 void JudgeEachModel(const std::vector<AssessedModel>& models, int num_images,
                     Judge* judge) {
   int num_sound_images = num_images;
@@ -323,7 +324,7 @@ Verdict AssessModels(const std::vector<AssessedModel>& models,
   for (const std::string& warning : warnings) {
     judge.Doubt("an earlier step warned: " + warning);
   }
-  // An IMU alone knows none: that is no reason to doubt the rest.
+  // An IMU alone measures none: that is no reason for doubt.
   if (!verdict.is_metric && know_lengths) {
     judge.Doubt("lengths " +
                 FormatOfModels(verdict.num_models - verdict.num_metric_models,

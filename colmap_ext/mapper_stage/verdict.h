@@ -14,12 +14,13 @@
 
 namespace adasfm {
 
-// What the models of a database are worth, for somebody who does not know the
-// field and for programs.
+// A verdict on the models of a database, for users who do not know the field
+// and for programs.
 //
-// Inputs: the finished models, the scenes that they were made from, and what
-// the stages said. Method: figures that need no ground truth, each against a
-// limit (docs/reference/mapper.md tells what they catch on worlds with truth).
+// Inputs: the finished models, the scenes that they were made from, and the
+// summaries and warnings of the stages. Method: figures that need no ground
+// truth, each compared with a limit (docs/reference/mapper.md has what they
+// detect on worlds with ground truth).
 
 enum class VerdictResult { kGood, kDoubtful, kFailed };
 
@@ -32,23 +33,23 @@ struct Verdict {
   // Images that see enough points for a pose of their own.
   int num_images_held_by_points = 0;
   int num_points = 0;
-  // Of the registered images.
+  // Over the registered images.
   double median_points_per_image = 0.0;
   bool is_metric = false;  // all models are
-  // Where metres come from; empty without.
+  // Source of the metres; empty without metres.
   std::string metric_source;
-  // Relative 1 sigma of the metres, where wheels alone tell them; filled by the
-  // caller, from what the import says.
+  // Largest relative 1 sigma of a model's metres
+  // (MapperStageSummary::scale_sigma), where known.
   std::optional<double> metric_sigma;
   std::vector<PriorAgreement> priors;
-  // Of each camera, in the model where it is largest.
+  // Lens error of each camera, in the model where it is largest.
   std::map<camera_t, LensError> lens_errors;
   double keypoint_sigma_px = 0.0;
   double keypoint_sigma_factor = 1.0;
   double mean_reproj_error_px = 0.0;
   int num_models = 1;
   int num_metric_models = 0;
-  // The images of no model; filled by the caller, for the line and the lists.
+  // The images in no model; set by the caller, for the line and the lists.
   std::vector<LostImage> lost_images;
 };
 
@@ -60,15 +61,14 @@ struct AssessedModel {
   const colmap::Reconstruction* model = nullptr;
 };
 
-// Of all models together, the largest first; counts are sums and figures those
-// of all images. `rest` holds the images that belong to no model's scene.
-// `warnings` are those of the stages before: of the import and of the coarse
-// model.
+// Assesses all models together, the largest first; counts are sums, figures are
+// over all images. `rest`: the images that belong to no model's scene.
+// `warnings`: those of the import and of the coarse stage.
 Verdict AssessModels(const std::vector<AssessedModel>& models,
                      const SceneData& rest,
                      const std::vector<std::string>& warnings);
 
-// Of one model, whose scene is all there is.
+// Assesses one model; its scene counts as the whole database.
 Verdict AssessModel(const SceneData& data, const MapperStageSummary& summary,
                     const std::vector<std::string>& warnings,
                     const colmap::Reconstruction& model);

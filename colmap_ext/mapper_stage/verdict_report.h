@@ -8,7 +8,7 @@
 
 namespace adasfm {
 
-// How a verdict is said: on the screen, in the report and in summary.json
+// A verdict as text and JSON, for the screen, the report and summary.json
 // (docs/reference/formats.md).
 
 // "good", "doubtful" or "failed".

@@ -8,7 +8,7 @@
 namespace adasfm {
 namespace {
 
-// The kernels that CMake had compiled, by ADASFM_X86_KERNELS.
+// ADASFM_X86_KERNELS: CMake compiled these kernels.
 #ifdef ADASFM_X86_KERNELS
 bool HasAvx2() { return __builtin_cpu_supports("avx2"); }
 bool HasAvx512Vnni() {

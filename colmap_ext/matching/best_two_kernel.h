@@ -1,17 +1,17 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// The work of FindBestTwo (best_two.h), written once for all instruction sets.
-// A source file that is compiled for one of them includes this header and no
-// other of ours: inline functions of the standard library, compiled there,
-// could be called on a processor without these instructions.
+// The implementation of FindBestTwo (best_two.h) for all instruction sets. A
+// source file that is compiled for one of them includes none of our other
+// headers: inline functions of the standard library, compiled there, could be
+// called on a processor without these instructions.
 
 #include <cstdint>
 
 namespace adasfm {
 
-// Buffers of the caller. Counts are those of the descriptors; the buffers have
-// room for kMaxNumTogether more.
+// Buffers of the caller. The counts are those of the descriptors; the buffers
+// have room for kMaxNumTogether more.
 struct BestTwoTask {
   const uint8_t* descriptors1 = nullptr;
   int count1 = 0;
@@ -21,14 +21,14 @@ struct BestTwoTask {
   void* packed1 = nullptr;
   void* packed2 = nullptr;
   int32_t* offsets2 = nullptr;
-  // Zeros at first.
+  // Initially zeros.
   int32_t* best1 = nullptr;
   int32_t* second1 = nullptr;
   int32_t* best2 = nullptr;
   int32_t* second2 = nullptr;
 };
 
-// Descriptors are taken in groups of no more than so many.
+// Largest number of descriptors that are processed together.
 constexpr int kMaxNumTogether = 32;
 
 void FindBestTwoPortable(const BestTwoTask& task);
@@ -37,11 +37,11 @@ void FindBestTwoAvx512Vnni(const BestTwoTask& task);
 
 namespace {
 
-// Rows stand for the descriptors of image 1, columns for those of image 2.
-// Simd: a vector of kLanes products, one column each.
+// Rows are the descriptors of image 1, columns those of image 2.
+// Simd: a vector of kLanes products, one per column.
 //   Row, Column    types of the packed numbers
 //   kStep          numbers of a descriptor that one instruction multiplies
-//   kRowShift      is taken off the numbers of the rows, so that Row holds them
+//   kRowShift      subtracted from the numbers of the rows to fit into Row
 //   kNumRows       rows that are multiplied together
 template <typename Simd>
 class BestTwoKernel {
@@ -71,7 +71,7 @@ class BestTwoKernel {
     return (count + unit - 1) / unit * unit;
   }
 
-  // A descriptor of zeros has the product 0 with all others.
+  // Padding rows are descriptors of zeros, whose products are all 0.
   static void PackRows(const BestTwoTask& task) {
     Row* packed = static_cast<Row*>(task.packed1);
     const int num_numbers = task.count1 * kNumNumbers;
@@ -82,8 +82,9 @@ class BestTwoKernel {
     for (int i = num_numbers; i < end; ++i) packed[i] = -Simd::kRowShift;
   }
 
-  // By vectors of columns; in a vector kStep numbers of each column in turn.
-  // offsets2: what the shift of the rows takes off the products.
+  // Packs by vectors of columns; a vector has kStep numbers of each column in
+  // turn. offsets2 restores what the shift of the rows subtracts from the
+  // products.
   static void PackColumns(const BestTwoTask& task) {
     Column* packed = static_cast<Column*>(task.packed2);
     const int end = RoundUp(task.count2, kLanes * kNumVectors);

@@ -6,7 +6,7 @@
 namespace adasfm {
 namespace {
 
-// OpenCV's vectors: SSE2, NEON and their like, else plain C++.
+// OpenCV's vectors: SSE2, NEON and the like, else plain C++.
 struct Portable {
   using Vector = cv::v_int32x4;
   using Row = int16_t;

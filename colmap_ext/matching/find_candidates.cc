@@ -12,11 +12,13 @@
 namespace adasfm {
 namespace {
 
+// Allowed error of the prediction, in sigmas.
+constexpr double kNumSigmas = 3.0;
 constexpr double kMinDepthM = 0.5;
-// Of a ray's z against its length, for it to be in front.
+// Smallest ratio of a ray's z to its length for a point in front of the camera.
 constexpr double kMinForward = 0.05;
 
-// A wedge of the plane z = 1 of camera 2, with a = along . p:
+// A wedge of the plane z = 1 of camera 2: with a = along . p,
 // |across . p - offset| <= half_width + slope * max(0, a - begin),
 // least <= a <= most.
 struct Band {
@@ -37,7 +39,6 @@ class BandFinder {
       : prediction_(prediction),
         rotation_(prediction.cam2_from_cam1.rotation.toRotationMatrix()),
         min_error_(options.max_error_px * pixel_size),
-        num_sigmas_(options.num_sigmas),
         greatest_inverse_depth_(
             1.0 / std::max(kMinDepthM,
                            prediction.cam2_from_cam1.translation.norm())) {}
@@ -59,7 +60,8 @@ class BandFinder {
     const Eigen::Matrix2d covariance = ImageCovariance(ray, 0.0);
     band->half_width = Margin(covariance, band->across);
     band->least = band->begin - Margin(covariance, band->along);
-    // Half way to the nearest point, where that would lie behind the camera.
+    // Uses half the inverse depth where the nearest point would lie behind the
+    // camera.
     const bool has_end =
         (ray + greatest_inverse_depth_ * translation).z() >= kMinForward;
     const double inverse_depth =
@@ -82,15 +84,16 @@ class BandFinder {
   }
 
  private:
-  // How far off the prediction a keypoint may be in that direction.
+  // Largest distance of a keypoint from the prediction in this direction.
   double Margin(const Eigen::Matrix2d& covariance,
                 const Eigen::Vector2d& direction) const {
     return min_error_ +
-           num_sigmas_ *
+           kNumSigmas *
                std::sqrt(std::max(0.0, direction.dot(covariance * direction)));
   }
 
-  // Of the image of the point at that depth, by the prediction's errors.
+  // Covariance of the image of the point at this depth, from the prediction's
+  // errors.
   Eigen::Matrix2d ImageCovariance(const Eigen::Vector3d& ray,
                                   double inverse_depth) const {
     const Eigen::Vector3d point =
@@ -106,12 +109,11 @@ class BandFinder {
   const PredictedMotion& prediction_;
   const Eigen::Matrix3d rotation_;
   const double min_error_;
-  const double num_sigmas_;
   const double greatest_inverse_depth_;
 };
 
-// Keypoints in blocks of neighbours, so that most of them are told from a band
-// together.
+// Keypoints in blocks of neighbours, so that a band can reject most keypoints
+// block by block.
 class KeypointBlocks {
  public:
   explicit KeypointBlocks(const std::vector<Eigen::Vector2d>& points) {
@@ -119,7 +121,7 @@ class KeypointBlocks {
     for (size_t i = 0; i < points.size(); ++i) {
       if (points[i].allFinite()) order.push_back(i);
     }
-    // Strips by x, cut by y: as many strips as blocks in a strip.
+    // Strips by x, cut by y into blocks: as many strips as blocks per strip.
     const auto sort = [&](size_t begin, size_t end, int axis) {
       std::sort(order.begin() + begin, order.begin() + end, [&](int i, int k) {
         return std::make_pair(points[i](axis), i) <

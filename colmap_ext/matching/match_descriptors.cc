@@ -9,7 +9,7 @@
 namespace adasfm {
 namespace {
 
-// In single precision, as COLMAP computes it.
+// Single precision, as in COLMAP.
 float Distance(int32_t product) {
   constexpr float kSquaredLength = 512.0f * 512.0f;
   return std::acos(
@@ -30,8 +30,8 @@ int32_t Product(const uint8_t* a, const uint8_t* b) {
   return product;
 }
 
-// The greatest products of the descriptors whose nearest one is near enough,
-// with their indices; sorted.
+// The greatest products, with the descriptors' indices, of descriptors whose
+// nearest one is near enough; sorted.
 std::vector<std::pair<int32_t, int>> NearOnes(
     const DescriptorMatchingOptions& options, const BestTwo& best_two) {
   std::vector<std::pair<int32_t, int>> near;
@@ -51,8 +51,8 @@ void CheckOptions(const DescriptorMatchingOptions& options) {
 }
 
 // Two descriptors are each other's nearest ones if their product is the
-// greatest of both. As each is strictly nearer than the second one there is
-// but one such partner.
+// greatest of both. Each nearest one is strictly nearer than the second, so
+// there is only one such partner.
 std::vector<FeatureMatch> MatchNearest(const DescriptorMatchingOptions& options,
                                        const BestTwo& of1, const BestTwo& of2,
                                        const uint8_t* descriptors1,
@@ -83,7 +83,7 @@ void Insert(int32_t product, int i, BestTwo* best_two) {
   best = std::max(best, product);
 }
 
-// Products of numbers of this type are one instruction for eight of them.
+// One instruction multiplies eight numbers of this type.
 std::vector<int16_t> Widen(const uint8_t* descriptors, int count) {
   return std::vector<int16_t>(descriptors,
                               descriptors + count * kSiftDimensions);

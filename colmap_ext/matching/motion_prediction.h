@@ -10,15 +10,15 @@
 
 namespace adasfm {
 
-// The motion between two images as it is known before they are matched.
+// The motion between two images, predicted before they are matched.
 struct PredictedMotion {
   Rigid3d cam2_from_cam1;  // metres
-  // As RelativePosePrior::covariance.
+  // Defined as RelativePosePrior::covariance.
   Eigen::Matrix<double, 6, 6> covariance =
       Eigen::Matrix<double, 6, 6>::Identity();
 };
 
-// None for images of which nothing is known. Called from several threads.
+// None for images without a prediction. Called from several threads.
 using MotionPredictor =
     std::function<std::optional<PredictedMotion>(const ImagePair&)>;
 

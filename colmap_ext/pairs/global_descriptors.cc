@@ -13,7 +13,7 @@
 namespace adasfm {
 namespace {
 
-// Images that are described at a time, on all threads.
+// Images per block that all threads process together.
 constexpr size_t kBlockSize = 64;
 
 int CountImages(SqliteConnection* database) {
@@ -23,12 +23,12 @@ int CountImages(SqliteConnection* database) {
   return statement.Step() ? statement.Int(0) : 0;
 }
 
-// Equally many descriptors of every image, drawn at random.
+// Draws equally many descriptors of every image at random.
 RowMatrixXf SampleDescriptors(const GlobalDescriptorOptions& options,
                               int num_images, SqliteConnection* database) {
   const int num_per_image =
       std::max(1, options.max_num_training_descriptors / num_images);
-  // Of more images than that, every k-th one gives one.
+  // With more images than descriptors, every k-th image gives one descriptor.
   const int stride =
       std::max(1, (num_images + options.max_num_training_descriptors - 1) /
                       options.max_num_training_descriptors);

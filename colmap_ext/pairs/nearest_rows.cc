@@ -9,7 +9,7 @@
 namespace adasfm {
 namespace {
 
-// Rows that are searched for between two reports of progress.
+// Number of rows searched between two reports of progress.
 constexpr int kSearchBlockSize = 256;
 
 std::vector<int> FindNearest(

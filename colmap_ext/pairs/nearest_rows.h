@@ -9,10 +9,10 @@
 
 namespace adasfm {
 
-// For every row the rows nearest to it, nearest first (of equally near ones
-// the first), at most num_neighbors, never itself, and only those of which
-// may_be_chosen(row, neighbor) is true; all are when it is empty. It is called
-// from several threads. All distances are computed.
+// For every row, the nearest other rows, nearest first (equally near ones by
+// index): at most num_neighbors rows for which may_be_chosen(row, neighbor) is
+// true; an empty may_be_chosen allows all. may_be_chosen is called from several
+// threads. All distances are computed.
 std::vector<std::vector<int>> FindNearestRows(
     const RowMatrixXf& vectors, int num_neighbors, int num_threads,
     const std::function<bool(int, int)>& may_be_chosen = {},

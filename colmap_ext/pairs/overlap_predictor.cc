@@ -12,13 +12,13 @@ namespace {
 
 constexpr double kNumSigmas = 3.0;
 constexpr double kMaxRotationError = 10.0 / 180.0 * M_PI;
-// Of the grid: pixels across and down, depths as multiples of the scene's.
+// The grid: pixels across and down, depths as multiples of the scene's depth.
 constexpr int kNumColumns = 8;
 constexpr int kNumRows = 6;
 constexpr double kDepths[] = {0.25, 0.5, 1.0, 2.0, 4.0};
-// Apart, as multiples of the scene's depth.
+// Largest distance between images, as a multiple of the scene's depth.
 constexpr double kMaxDistance = 2.5;
-// Up to which SIFT recognises a point.
+// Limits up to which SIFT recognises a point.
 constexpr double kMaxDepthRatio = 2.5;
 constexpr double kMaxRayAngle = 40.0 / 180.0 * M_PI;
 
@@ -27,7 +27,7 @@ double AngleTo(const Eigen::Vector3d& direction, const Eigen::Vector3d& axis) {
       std::clamp(direction.dot(axis) / direction.norm(), -1.0, 1.0));
 }
 
-// Whether the point, seen by camera 1 at point_in_cam1, is one for camera 2.
+// Whether camera 2 shares a point of camera 1.
 bool IsShared(const Eigen::Vector3d& point_in_cam1,
               const Rigid3d& cam2_from_cam1, const colmap::Camera& camera2) {
   const Eigen::Vector3d ray1_in_cam2 = cam2_from_cam1.rotation * point_in_cam1;

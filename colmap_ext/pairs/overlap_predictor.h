@@ -15,22 +15,23 @@
 namespace adasfm {
 
 struct OverlapPredictionOptions {
-  // Otherwise nothing is predicted.
+  // If false, nothing is predicted.
   bool enabled = true;
-  // How far away what the photos show typically is. Overlap is predicted for
-  // points at a quarter of it to four times it. Images further apart than 2.5
-  // times it share nothing that SIFT matches (kitti07-160: 98 % of the pairs
-  // verify 30 to 50 m apart, 2 % beyond).
+  // Typical distance of what the photos show. Overlap is predicted for points
+  // at 0.25 to 4 times this distance. Images further apart than 2.5 times share
+  // nothing that SIFT matches (kitti07-160: 98 % of the pairs verify 30 to 50 m
+  // apart, 2 % beyond).
   double scene_depth_m = 20.0;
-  // Pairs that share less of their views are not worth matching. At 0.15
-  // kitti07-160 keeps all but 0.2 % of the pairs with at least 60 matches, at
-  // 0.2 all but 3 %, at 0.25 all but 9 %.
+  // Pairs with a smaller overlap are not worth matching. On kitti07-160, of the
+  // pairs with at least 60 matches, 0.15 loses 0.2 %, 0.2 loses 3 %, and 0.25
+  // loses 9 %.
   double min_overlap = 0.15;
   OdometryChainOptions chain;
 
-  // What the smoother does not know of the mounting is in the sigmas of its
-  // steps, which persist along the chain: here it does not count once more. The
-  // gate of loops, which must not refuse a true one, is more careful.
+  // The uncertainty of the extrinsics is already in the sigmas of the
+  // smoother's steps, which persist along the chain; here it is not added a
+  // second time. The gate of loops, which must not reject a true loop, is more
+  // conservative.
   OverlapPredictionOptions() {
     chain.extrinsic_rotation_sigma_rad = 0.0;
     chain.driving_direction_sigma_rad = 0.0;
@@ -39,16 +40,16 @@ struct OverlapPredictionOptions {
   bool IsValid(std::string* error) const;
 };
 
-// How much of their views images share, by the priors in the database, before
-// anything is matched.
+// Predicts how much of their views images share, from the priors in the
+// database, before anything is matched.
 // Inputs: relative pose priors with covariance, and the cameras.
 // Method: the chain of priors gives the motion between two images with its
 // covariance. Points on a grid of pixels and depths of one image are projected
-// into the other; a point is shared where it is in view, at 0.4 to 2.5 times
-// the distance, its rays less than 40 degrees apart: what SIFT bears. The
-// overlap is the share of such points, of the two images the smaller one.
-// It is 0 for images that, 3 sigma of the odometry granted, are too far apart
-// or look too far apart.
+// into the other. A point is shared if it is in view, at 0.4 to 2.5 times the
+// distance, with less than 40 degrees between its rays: the limits of SIFT. The
+// overlap is the ratio of shared points, the smaller one of the two images. It
+// is 0 for images that are too far apart, in position or viewing direction,
+// even within 3 sigma of the odometry.
 class OverlapPredictor {
  public:
   // Predicts nothing.
@@ -59,16 +60,16 @@ class OverlapPredictor {
       const OverlapPredictionOptions& options,
       const std::string& database_path);
 
-  // None where the odometry is not sure: no chain of priors with rotation and
-  // length connects the images, or its 3 sigma are more than the nearest points
-  // are away, or than 10 degrees. Safe on several threads.
+  // None where the odometry is uncertain: no chain of priors with rotation and
+  // length connects the images, or its 3 sigma exceed the distance of the
+  // nearest points, or 10 degrees. Thread-safe.
   std::optional<double> Predict(const ImagePair& pair) const;
 
-  // Whether there are priors to predict by.
+  // Whether there are priors for predictions.
   bool HasOdometry() const { return !chain_.empty(); }
 
  private:
-  // What images of one camera see.
+  // View of the images of one camera.
   struct View {
     colmap::Camera camera;
     std::vector<Eigen::Vector3d> points_in_cam;

@@ -74,11 +74,11 @@ StatusOr<GlobalDescriptors> GetDescriptors(const PairSelectionOptions& options,
       });
 }
 
-// What the odometry says of all pairs but the neighbours in time.
+// Predictions of the odometry for all pairs except neighbours in time.
 struct OdometryPairs {
-  // With an overlap worth matching, at most num_similar_images an image.
+  // Pairs with enough overlap, at most num_similar_images per image.
   std::set<ImagePair> chosen;
-  // Whether there are others of which it is not sure.
+  // Whether the prediction is uncertain for other pairs.
   bool has_unsure = false;
 };
 
@@ -115,7 +115,7 @@ OdometryPairs PredictPairs(const PairSelectionOptions& options,
   return pairs;
 }
 
-// Pairs of the most similar images among those that may_be_chosen allows.
+// Adds pairs of the most similar images among those that may_be_chosen allows.
 Status AddSimilarPairs(
     const PairSelectionOptions& options, const std::string& database_path,
     const std::function<bool(const ImagePair&)>& may_be_chosen,
@@ -145,8 +145,8 @@ Status AddSimilarPairs(
   return Status::Ok();
 }
 
-// Beyond the neighbours in time: by the odometry where it is sure, else by
-// similarity.
+// Adds pairs beyond the neighbours in time: by the odometry where it is
+// certain, else by similarity.
 Status AddDistantPairs(const PairSelectionOptions& options,
                        const std::string& database_path,
                        const std::vector<image_t>& image_ids,
@@ -155,8 +155,9 @@ Status AddDistantPairs(const PairSelectionOptions& options,
   const StatusOr<OverlapPredictor> predictor =
       OverlapPredictor::Read(options.odometry, database_path);
   if (!predictor.ok()) return predictor.status();
-  // In a drive the next images are the most similar ones, and are chosen
-  // already: a place seen before must not lose its room to them.
+  // In a sequence the next images are the most similar ones and are already
+  // chosen. They are excluded here, so that they do not displace revisited
+  // places.
   const std::set<ImagePair> neighbors = *pairs;
   if (predictor->HasOdometry()) {
     const OdometryPairs predicted =

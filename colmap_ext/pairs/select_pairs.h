@@ -13,14 +13,14 @@
 namespace adasfm {
 
 struct PairSelectionOptions {
-  // Every image is matched with so many of the next ones in time.
+  // Every image is matched with this many of the next images in time.
   int num_temporal_neighbors = 10;
-  // ... and with so many beyond them (the paper's 30): where the priors in the
-  // database predict what images share, those that share most of their views;
-  // where they cannot tell, the most similar ones.
+  // ... and with this many others (the paper's 30): where the priors in the
+  // database predict the overlap, those with the largest overlap; where the
+  // prediction is uncertain, the most similar ones.
   int num_similar_images = 30;
-  // Without, only the pairs that need no features to be found: a part of those
-  // found with it.
+  // If false, only pairs that can be selected without features: a subset of the
+  // selection with similarity.
   bool use_similarity = true;
   OverlapPredictionOptions odometry;
   // Times of the images (sensors/io/read_image_times.h); empty: those that
@@ -38,29 +38,30 @@ struct PairSelection {
   std::vector<ImagePair> pairs;
   int num_images = 0;
   int num_temporal = 0;
-  // Beyond these, those that the odometry predicts.
+  // Further pairs that the odometry predicts.
   int num_predicted = 0;
-  // Those that only similarity found.
+  // Pairs found by similarity only.
   int num_similar = 0;
-  // Otherwise by name.
+  // If false, images were ordered by name.
   bool ordered_by_time = false;
   std::vector<std::string> warnings;
 };
 
-// Which pairs of the database's images to match. The database is not changed.
+// Selects the pairs of the database's images to match. The database is not
+// changed.
 StatusOr<PairSelection> SelectPairs(const PairSelectionOptions& options,
                                     const std::string& database_path,
                                     const ProgressCallback& progress = {});
 
-// The image ids in the order of time: by the file or adasfm_image_times where
-// every image has a time there, else by name (digits count as numbers: image2
-// comes before image10).
+// The image ids in the order of time: by the file or adasfm_image_times if
+// every image has a time there, else by name (runs of digits are compared as
+// numbers: image2 comes before image10).
 StatusOr<std::vector<image_t>> OrderImages(
     const std::string& database_path, const std::string& image_times_path,
     bool* ordered_by_time, std::vector<std::string>* warnings = nullptr);
 
 // Lines `name1 name2`, for matches_importer --match_type pairs. An error for
-// names with spaces, which that format cannot hold.
+// names with spaces, which this format does not allow.
 StatusOr<std::string> FormatPairList(const std::vector<ImagePair>& pairs,
                                      const std::string& database_path);
 

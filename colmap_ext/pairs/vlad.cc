@@ -10,7 +10,7 @@
 namespace adasfm {
 namespace {
 
-// Zero stays zero.
+// A zero vector stays zero.
 template <typename Vector>
 void ScaleToUnitLength(Vector&& vector) {
   const float norm = vector.norm();
@@ -62,7 +62,8 @@ Eigen::RowVectorXf ComputeVlad(const RowMatrixXf& vocabulary,
         " dimensions, words of " + std::to_string(vocabulary.cols()));
   }
   RowMatrixXf sums = RowMatrixXf::Zero(vocabulary.rows(), vocabulary.cols());
-  // |d - w|^2 = |d|^2 - 2 (d w - |w|^2 / 2): the nearest word is the largest.
+  // |d - w|^2 = |d|^2 - 2 (d w - |w|^2 / 2): the nearest word maximises the
+  // parenthesis.
   const Eigen::RowVectorXf half_norms =
       0.5f * vocabulary.rowwise().squaredNorm().transpose();
   const RowMatrixXf products = descriptors * vocabulary.transpose();
@@ -87,7 +88,7 @@ PcaBasis ComputePca(const RowMatrixXf& rows, int num_components) {
   PcaBasis basis;
   basis.mean = rows.colwise().mean();
   const RowMatrixXf centered = rows.rowwise() - basis.mean;
-  // Rows are few and long: their Gram matrix has the same components.
+  // There are few long rows: their Gram matrix gives the same components.
   const Eigen::MatrixXd gram = (centered * centered.transpose()).cast<double>();
   const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solver(gram);
   const double max_value = solver.eigenvalues().tail(1)(0);

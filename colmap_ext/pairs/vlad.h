@@ -7,34 +7,34 @@
 
 namespace adasfm {
 
-// One vector a row.
+// One vector per row.
 using RowMatrixXf =
     Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
 struct VocabularyOptions {
-  // Cells of the space of local descriptors. More tell places better apart, and
-  // make the vectors longer: 64 x 128 numbers for SIFT.
+  // Number of cells of the descriptor space. More words distinguish places
+  // better but make the vectors longer: 64 x 128 numbers for SIFT.
   int num_words = 64;
-  // k-means has long settled by then.
+  // k-means has long converged by then.
   int max_num_iterations = 30;
   uint64_t seed = 1;
 
   bool IsValid(std::string* error) const;
 };
 
-// Words x dimensions: the centres of k-means (k-means++ start) over the rows.
-// Fewer different rows than words give fewer words. The same rows and seed give
-// the same vocabulary. Throws std::invalid_argument without rows.
+// Words x dimensions: the centres of k-means (with k-means++ start) over the
+// rows. Fewer rows than words give fewer words. The same rows and seed give the
+// same vocabulary. Throws std::invalid_argument without rows.
 RowMatrixXf TrainVocabulary(const VocabularyOptions& options,
                             const RowMatrixXf& descriptors);
 
 // The vector of locally aggregated descriptors of one image (Jegou et al.
-// 2010), words x dimensions numbers in a row: for every word the sum of
-// (descriptor - word) over the descriptors nearest to it, with signed square
-// roots, each word's sum scaled to unit length (Arandjelovic & Zisserman 2013:
-// bursts of one texture count once), and the whole to unit length. Zeros
-// without descriptors. Throws std::invalid_argument when the dimensions of
-// descriptors and words differ.
+// 2010), a row of words x dimensions numbers. For every word, sums (descriptor
+// - word) over the descriptors nearest to the word, takes signed square roots
+// and scales the result to unit length (Arandjelovic & Zisserman 2013: bursts
+// of one texture count once); then scales the whole vector to unit length.
+// Zeros without descriptors. Throws std::invalid_argument when the dimensions
+// of descriptors and words differ.
 Eigen::RowVectorXf ComputeVlad(const RowMatrixXf& vocabulary,
                                const RowMatrixXf& descriptors);
 
@@ -45,7 +45,7 @@ struct PcaBasis {
   RowMatrixXf axes;  // dimensions x reduced dimensions
 };
 
-// Of the rows; at most as many components as there are rows less one.
+// Components of the rows; fewer of them than rows.
 PcaBasis ComputePca(const RowMatrixXf& rows, int num_components);
 Eigen::RowVectorXf ReduceByPca(const PcaBasis& basis,
                                const Eigen::RowVectorXf& vector);

@@ -12,7 +12,7 @@
 namespace adasfm {
 namespace {
 
-// Positions of photos, which COLMAP keeps with them.
+// Positions of photos that COLMAP stores in the database.
 StatusOr<std::vector<HostPosition>> ReadStoredPositions(
     const std::string& database_path) {
   try {
@@ -34,8 +34,8 @@ Eigen::Matrix3d CovarianceOf(const GnssNoise& noise) {
       .asDiagonal();
 }
 
-// Geodetic ones are turned into the ENU frame of the first; a database mixes no
-// systems.
+// Transforms geodetic positions into the ENU frame of the first one. Positions
+// in another coordinate system than the first are skipped.
 Status ImportStoredPositions(const PriorImportPaths& paths,
                              const SensorCalibration& calibration,
                              const SceneData& scene, PriorImport* import) {
@@ -61,9 +61,11 @@ Status ImportStoredPositions(const PriorImportPaths& paths,
         stored.covariance.value_or(CovarianceOf(calibration.gnss_noise));
     if (is_geodetic) {
       if (std::abs(values.x()) > 90.0 || std::abs(values.y()) > 360.0) {
-        return Status::Error(paths.database_path + ": image " +
-                             scene.images.at(stored.image_id).name +
-                             " has a latitude beyond 90 degrees");
+        return Status::Error(
+            paths.database_path + ": image " +
+            scene.images.at(stored.image_id).name +
+            " has a latitude beyond 90 degrees or a longitude beyond "
+            "360");
       }
       const GeodeticPosition position{values.x(), values.y(), values.z()};
       if (!frame.has_value()) {

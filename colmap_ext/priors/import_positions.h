@@ -9,13 +9,13 @@
 
 namespace adasfm {
 
-// As PriorImportPaths::gnss_path: the positions that COLMAP keeps with photos.
+// Value of PriorImportPaths::gnss_path for positions stored in the database.
 inline constexpr char kStoredPositionsPath[] = "database";
 
 // Adds the positions of the log, or of the database, to the import's tables,
-// and what was left out to its figures; nothing without a path. Geodetic ones
-// are turned into the ENU frame of the first. An error for a log that cannot be
-// used and for a database without positions.
+// and counts of skipped positions to its figures; does nothing without a path.
+// Geodetic positions are transformed into the ENU frame of the first one. An
+// error for an unusable log and for a database without positions.
 Status ImportPositions(const PriorImportPaths& paths,
                        const PositionPriorOptions& options,
                        const SensorCalibration& calibration,

@@ -60,10 +60,11 @@ std::string WheelLines(const SensorSummary& summary) {
        << " s), scale " << summary.wheel_scale << " +- "
        << summary.wheel_scale_sigma << ", " << summary.wheel_delay_s << " +- "
        << summary.wheel_delay_sigma_s << " s behind the IMU\n"
-       << "driving direction   " << summary.wheel_mount_deg.x() << " left, "
-       << summary.wheel_mount_deg.y() << " down of T_imu_wheel's, +- "
-       << summary.wheel_mount_sigma_deg.x() << " and "
-       << summary.wheel_mount_sigma_deg.y() << " deg\n"
+       << "driving direction   " << summary.driving_direction_deg.x()
+       << " left, " << summary.driving_direction_deg.y()
+       << " down of T_imu_wheel's, +- "
+       << summary.driving_direction_sigma_deg.x() << " and "
+       << summary.driving_direction_sigma_deg.y() << " deg\n"
        << "distance            " << summary.distance_m << " m, "
        << summary.wheel_slips.size() << " slips\n";
   for (const WheelSlip& slip : summary.wheel_slips) {
@@ -173,8 +174,9 @@ std::string PriorImportToJson(const PriorImport& import) {
       {"length_drift_ratio", summary.length_drift_ratio},
       {"wheel_delay_s", summary.wheel_delay_s},
       {"wheel_delay_sigma_s", summary.wheel_delay_sigma_s},
-      {"wheel_mount_deg", ToList(summary.wheel_mount_deg)},
-      {"wheel_mount_sigma_deg", ToList(summary.wheel_mount_sigma_deg)},
+      {"driving_direction_deg", ToList(summary.driving_direction_deg)},
+      {"driving_direction_sigma_deg",
+       ToList(summary.driving_direction_sigma_deg)},
       {"distance_m", summary.distance_m},
       {"drift_per_100m_m", summary.drift_per_100m_m},
       {"drift_per_100m_deg", summary.drift_per_100m_deg},

@@ -30,7 +30,8 @@
 namespace adasfm {
 namespace {
 
-// The calibration's rig, else the host's, whose reference camera is cam0 then.
+// Adds the cameras of the calibration's rig to the import's tables. Without
+// such a rig the host's rig is used, whose reference camera is then cam0.
 Status FindRig(const RigOptions& options, const SceneData& scene,
                SensorCalibration* calibration, PriorImport* import) {
   StatusOr<std::map<camera_t, RigCamera>> cameras =
@@ -40,8 +41,8 @@ Status FindRig(const RigOptions& options, const SceneData& scene,
   return Status::Ok();
 }
 
-// Gives the images their times. Returns those that the motion between frames
-// belongs to: all but the other cameras of a rig.
+// Assigns times to the images. Returns the stamps between which motion is
+// estimated: all except those of the other cameras of a rig.
 StatusOr<std::vector<ImageStamp>> StampFrames(const PriorImportPaths& paths,
                                               const SceneData& scene,
                                               PriorImport* import) {
@@ -57,8 +58,8 @@ StatusOr<std::vector<ImageStamp>> StampFrames(const PriorImportPaths& paths,
   return frames;
 }
 
-// Gives the logs of the bag as paths with their topics. Wheels only where the
-// calibration has some.
+// Sets the logs of the bag as paths with topics. Wheels are used only if the
+// calibration has wheels.
 Status UseBag(const SensorCalibration& calibration, PriorImportPaths* paths) {
   const std::string& bag_path = paths->bag_path;
   const StatusOr<std::unique_ptr<BagReader>> bag = OpenBag(bag_path);
@@ -108,7 +109,7 @@ void KeepNearPairs(const std::vector<ImageStamp>& stamps, int max_gap,
                pairs->end());
 }
 
-// The median angle between the rays of a pair's matches, rad.
+// The median angle between the rays of a pair's matches [rad].
 double MedianMotion(const GlobalCorrespondences& correspondences,
                     const ImagePair& pair) {
   const std::vector<Bearing>& first =
@@ -138,11 +139,11 @@ std::vector<VisualRotation> ComputeVisualRotations(SceneData scene) {
     correspondences.matches[ImagePair(pair.image_id1, pair.image_id2)] =
         std::move(pair.inlier_matches);
   }
-  // What verification left is fit to few matches: on a straight road its noise
-  // would drown the little that the machine turns. There are few pairs here, so
-  // that each can have more matches than the global stage gives it, and a loss
-  // at the keypoints' noise: what moves in the scene is often hardly further
-  // off. Rotations of three images close four times better for both.
+  // Verification fits a pose to few matches; on a straight road its noise would
+  // hide the small rotations of the machine. There are few pairs here, so each
+  // can use more matches than in the global stage, and a loss at the keypoints'
+  // noise, since moving objects often have hardly larger errors. With both,
+  // rotations around three images close four times better.
   RelativePoseRefinementOptions refinement;
   refinement.max_num_matches = 1000;
   refinement.loss_scale_px = refinement.keypoint_sigma_px;
@@ -161,7 +162,7 @@ std::vector<VisualRotation> ComputeVisualRotations(SceneData scene) {
 StatusOr<SceneData> ReadScene(const std::string& database_path) {
   SceneDataOptions options;
   options.use_original_two_view_geometries = true;
-  // They are about to be replaced, damaged or not.
+  // Priors are about to be replaced, even if they are damaged.
   options.read_priors = false;
   StatusOr<SceneData> scene = ReadSceneData(database_path, options);
   if (!scene.ok()) return scene;
@@ -179,7 +180,7 @@ StatusOr<SceneData> ReadScene(const std::string& database_path) {
   return scene;
 }
 
-// What no later command could use is not written.
+// An error for estimates that no later command could use.
 Status CheckEstimate(const PriorEstimate& estimate,
                      const std::map<image_t, std::string>& names) {
   constexpr char kRemedy[] =
@@ -224,7 +225,7 @@ Status CheckEstimate(const PriorEstimate& estimate,
                        kRemedy);
 }
 
-// None where neither a gyroscope nor wheels tell a turn.
+// None where neither a gyroscope nor wheels measure rotation.
 std::optional<Eigen::Matrix3d> BiasCovarianceInCam(
     const SensorSummary& summary, const SensorCalibration& calibration) {
   if (summary.gyroscope_bias_covariance.isZero(0.0)) return std::nullopt;
@@ -235,7 +236,7 @@ std::optional<Eigen::Matrix3d> BiasCovarianceInCam(
   return 0.5 * (covariance + covariance.transpose());
 }
 
-// The poses of the images by a trajectory's times or a model's names.
+// The poses of the images, by a trajectory's times or by a model's names.
 StatusOr<std::map<image_t, Rigid3d>> ReadTrajectoryPoses(
     const PriorImportPaths& paths, const SensorCalibration& calibration,
     const SceneData& scene, const std::vector<ImageStamp>& stamps,
@@ -274,7 +275,7 @@ StatusOr<SensorCalibration> ReadCalibrationIfGiven(const std::string& path) {
   return ReadSensorCalibration(path);
 }
 
-// Positions or a rig, without logs of motions.
+// Imports positions or a rig, without logs of motion.
 StatusOr<PriorImport> ImportWithoutMotion(const PriorImportPaths& paths,
                                           const PriorImportOptions& options) {
   const Stopwatch watch;
@@ -286,7 +287,7 @@ StatusOr<PriorImport> ImportWithoutMotion(const PriorImportPaths& paths,
   PriorImport import;
   Status status = FindRig(options.rig, *scene, &*calibration, &import);
   if (!status.ok()) return status;
-  // Stored positions need no times.
+  // Positions stored in the database need no times.
   StatusOr<std::vector<ImageStamp>> stamps = std::vector<ImageStamp>();
   if (paths.gnss_path != kStoredPositionsPath ||
       !paths.image_times_path.empty() || !import.tables.rig_cameras.empty()) {
@@ -301,7 +302,7 @@ StatusOr<PriorImport> ImportWithoutMotion(const PriorImportPaths& paths,
   return import;
 }
 
-// Priors of a trajectory, without logs and without a smoother.
+// Computes priors from a trajectory, without logs and without a smoother.
 StatusOr<PriorImport> ImportTrajectory(const PriorImportPaths& paths,
                                        const PriorImportOptions& options) {
   if (HasMotionLogs(paths) || !paths.bag_path.empty()) {

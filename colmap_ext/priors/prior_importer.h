@@ -17,7 +17,7 @@
 
 namespace adasfm {
 
-// Empty paths: the machine has no such log.
+// Empty paths: there is no such log.
 struct PriorImportPaths {
   std::string database_path;
   std::string image_times_path;
@@ -27,11 +27,11 @@ struct PriorImportPaths {
   // stored in the database.
   std::string gnss_path;
   std::string sensors_path;
-  // A bag with the logs that have no path of their own.
+  // A bag that provides the logs that have no path.
   std::string bag_path;
   BagTopicNames bag_topics;
   // A metric trajectory in place of logs: TUM (world_from_body; the body is the
-  // IMU of the calibration or, without one, the camera) or a COLMAP model.
+  // calibration's IMU or, without one, the camera) or a COLMAP model.
   std::string trajectory_path;
 };
 
@@ -41,11 +41,11 @@ struct PriorImportOptions {
   TrajectoryPriorOptions trajectory;
   PositionPriorOptions positions;
   RigOptions rig;
-  // Two-view rotations are taken from images at most this many apart in time:
-  // rotations grow with the gap, but so does the chance of a wrong pair.
+  // Two-view rotations are used between images at most this many images apart:
+  // rotations grow with the gap, but so does the probability of a wrong pair.
   int max_visual_gap = 3;
-  // In GB (1e9 bytes); -1: no bound. ImportPriors does not begin what is
-  // estimated to take more.
+  // In GB (1e9 bytes); -1: no bound. ImportPriors returns an error before work
+  // whose estimated memory exceeds the bound.
   double max_memory_gb = -1.0;
 
   bool IsValid(std::string* error) const;
@@ -56,20 +56,21 @@ struct PriorImport {
   SensorSummary summary;
   int num_images_without_time = 0;
   int num_visual_rotations = 0;
-  // Of the import and of the sensors.
+  // Warnings of the import and of the sensors.
   std::vector<std::string> warnings;
-  // Samples that were left out of the logs.
+  // Samples that were removed from the logs.
   std::vector<LogFault> log_faults;
-  // Of the positions.
+  // Counts of positions.
   int num_fixes = 0;
   int num_fixes_outside = 0;
   std::map<std::string, int> num_fixes_left_out;  // by reason
-  double seconds = 0.0;                           // that it took
+  double seconds = 0.0;                           // duration of the import
 };
 
-// (1) Reads the scene, the calibration and the logs, (2) gives the images their
-// times by name, (3) takes the two-view rotations of near images, (4) estimates
-// the priors. The database is not changed: WritePriorTables does that.
+// (1) Reads the scene, the calibration and the logs, (2) assigns times to
+// images by name, (3) computes two-view rotations of images near in time, (4)
+// estimates the priors. The database is not changed: WritePriorTables does
+// that.
 StatusOr<PriorImport> ComputePriorImport(const PriorImportPaths& paths,
                                          const PriorImportOptions& options);
 

@@ -21,8 +21,8 @@ void TakeCleaned(CleanedLog<Sample> cleaned, std::vector<Sample>* samples,
                           cleaned.warnings.end());
 }
 
-// Units are judged without the bad samples, unless it is the unit that makes
-// them bad.
+// Units are checked on the cleaned samples; if cleaning fails, on all samples,
+// since a wrong unit may be the reason.
 Status ReadImuLog(const std::string& path, SensorLogs* logs,
                   PriorImport* import) {
   LogOrigin origin;

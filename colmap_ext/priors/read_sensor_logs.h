@@ -7,10 +7,10 @@
 
 namespace adasfm {
 
-// What: reads the logs of an import and leaves their bad samples out.
-// Inputs: paths (an empty one is no log) and the calibration, which says what
-// the wheel log is. Warnings and faults are added to import.
-// On failure: one line with file, line, cause and remedy.
+// Reads the logs of an import and removes their bad samples. Inputs: paths (an
+// empty path is no log) and the calibration, which gives the type of the wheel
+// log. Adds warnings and faults to `import`. On failure: one line with file,
+// line, cause and remedy.
 Status ReadSensorLogs(const PriorImportPaths& paths,
                       const SensorCalibration& calibration, SensorLogs* logs,
                       PriorImport* import);

@@ -11,10 +11,10 @@
 namespace adasfm {
 namespace {
 
-// Triggers and clocks of one rig agree better.
+// Triggers and clocks of one rig differ by less.
 constexpr timestamp_t kMaxFrameNs = 1'000'000;
 
-// The number k of a folder camK in the name; -1 without one.
+// The number k of a folder camK in the name; -1 without such a folder.
 int CameraIndexOfName(const std::string& name) {
   size_t begin = 0;
   for (size_t end = name.find('/'); end != std::string::npos;

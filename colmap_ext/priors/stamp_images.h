@@ -12,16 +12,15 @@
 
 namespace adasfm {
 
-// Of all images of the scene.
+// Finds all images of the scene.
 ImageFinder BuildImageFinder(const SceneData& scene);
 
-// By time, then by image.
+// Sorts by time, then by image.
 void SortByTime(std::vector<ImageStamp>* stamps);
 
-// What: the times of the images, sorted: of the list at path or, without one,
-// the nanoseconds that are the images' names. Images without a time are counted
-// in import, and warned of.
-// On failure: an error when no image has a time, or one has two.
+// Returns the times of the images, sorted: from the list at `path` or, without
+// one, from image names that are nanoseconds. Counts images without a time in
+// `import`, with a warning. An error when no image has a time, or one has two.
 StatusOr<std::vector<ImageStamp>> StampImages(const std::string& path,
                                               const SceneData& scene,
                                               PriorImport* import);

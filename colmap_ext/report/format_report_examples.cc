@@ -20,11 +20,14 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr int kGapPx = 6;
+constexpr int kJpegQuality = 70;
+// Lines drawn for each of kept and dropped matches, evenly sampled.
+constexpr size_t kMaxNumLines = 60;
 
 struct Photo {
-  cv::Mat pixels;      // of the shown size
+  cv::Mat pixels;      // at the shown size
   double scale = 1.0;  // shown pixels per pixel of the camera
-  cv::Point corner;    // in the picture of both
+  cv::Point corner;    // position in the joined picture
 };
 
 struct Lines {
@@ -32,9 +35,8 @@ struct Lines {
   std::vector<FeatureMatch> matches;
 };
 
-// OpenCV writes about files that it cannot read to its log and, whatever the
-// log's level, to standard error; the report has its own words for them. For
-// use in one thread.
+// OpenCV reports unreadable files to its log and, at any log level, to standard
+// error; the report has its own message. For use in one thread.
 class SilentOpenCv {
  public:
   SilentOpenCv()
@@ -51,9 +53,9 @@ class SilentOpenCv {
   std::streambuf* buffer_;
 };
 
-// Decoders of JPEG skip most of the work for a smaller picture.
+// JPEG decoders skip most of the work for a smaller picture.
 int ReadFlags(double shrink) {
-  // Keypoints are in the pixels as stored, whatever EXIF says of turning them.
+  // Keypoints refer to the stored pixels, before any rotation by EXIF.
   const int flags = cv::IMREAD_IGNORE_ORIENTATION;
   if (shrink >= 16.0) return flags | cv::IMREAD_REDUCED_COLOR_8;
   if (shrink >= 8.0) return flags | cv::IMREAD_REDUCED_COLOR_4;
@@ -85,8 +87,8 @@ std::optional<Photo> ReadPhoto(const std::string& path,
   return photo;
 }
 
-// Wide photos one above the other, tall ones side by side, so that both fit a
-// phone.
+// Places wide photos one above the other and tall ones side by side, so that
+// both fit a phone.
 cv::Mat Join(Photo* photo1, Photo* photo2) {
   const cv::Size size1 = photo1->pixels.size(), size2 = photo2->pixels.size();
   const bool is_wide = size1.width >= size1.height;
@@ -105,12 +107,12 @@ std::string FormatPoint(const Photo& photo, const Eigen::Vector2d& pixel) {
          FormatNumber("%.0f", photo.corner.y + photo.scale * pixel.y());
 }
 
-// One path of evenly taken matches.
-std::string FormatLines(const Lines& lines, size_t max_num_lines,
-                        const Photo& photo1, const Photo& photo2,
+// One SVG path of evenly sampled matches.
+std::string FormatLines(const Lines& lines, const Photo& photo1,
+                        const Photo& photo2,
                         const std::vector<Eigen::Vector2d>& points1,
                         const std::vector<Eigen::Vector2d>& points2) {
-  const size_t count = std::min(max_num_lines, lines.matches.size());
+  const size_t count = std::min(kMaxNumLines, lines.matches.size());
   std::string path;
   for (size_t i = 0; i < count; ++i) {
     const FeatureMatch& match = lines.matches[i * lines.matches.size() / count];
@@ -125,7 +127,7 @@ std::string FormatLines(const Lines& lines, size_t max_num_lines,
   return "<path class=\"" + lines.css_class + "\" d=\"" + path + "\"/>";
 }
 
-// What is drawn over the photos, and the caption that says so.
+// Lines to draw over the photos, and the caption that explains them.
 std::vector<Lines> ReadLines(const ReportPair& pair, const ImagePair& ids,
                              SqliteConnection* database, std::string* caption) {
   if (pair.num_after == 0) {
@@ -147,10 +149,9 @@ std::vector<Lines> ReadLines(const ReportPair& pair, const ImagePair& ids,
 }
 
 std::string FormatFigure(const cv::Mat& picture, const std::string& title,
-                         const std::string& caption, const std::string& lines,
-                         int jpeg_quality) {
+                         const std::string& caption, const std::string& lines) {
   std::vector<unsigned char> jpeg;
-  cv::imencode(".jpg", picture, jpeg, {cv::IMWRITE_JPEG_QUALITY, jpeg_quality});
+  cv::imencode(".jpg", picture, jpeg, {cv::IMWRITE_JPEG_QUALITY, kJpegQuality});
   const std::string width = std::to_string(picture.cols);
   const std::string height = std::to_string(picture.rows);
   return "<figure class=\"example\"><figcaption><b>" + EscapeHtml(title) +
@@ -162,7 +163,7 @@ std::string FormatFigure(const cv::Mat& picture, const std::string& title,
          "</svg></figure>\n";
 }
 
-// Reads what a figure takes from the database and the photos.
+// Reads the data of a figure from the database and the photos.
 class ExampleReader {
  public:
   ExampleReader(const ReportScene& scene, const PhotoOptions& options,
@@ -180,7 +181,7 @@ class ExampleReader {
   std::optional<std::string> FormatExample(const ReportPair& pair) const {
     const ReportImage* image1 = &scene_.images[pair.index1];
     const ReportImage* image2 = &scene_.images[pair.index2];
-    // Matches hold the keypoint of the image with the lower id first.
+    // In matches, the keypoint of the image with the lower id comes first.
     if (image2->image_id < image1->image_id) std::swap(image1, image2);
     std::optional<Photo> photo1 = ReadPhotoOf(*image1);
     std::optional<Photo> photo2 = ReadPhotoOf(*image2);
@@ -193,11 +194,10 @@ class ExampleReader {
         ReadKeypointsOfImage(database_, ids.image_id2);
     std::string caption, drawn;
     for (const Lines& lines : ReadLines(pair, ids, database_, &caption)) {
-      drawn += FormatLines(lines, options_.max_num_lines, *photo1, *photo2,
-                           points1, points2);
+      drawn += FormatLines(lines, *photo1, *photo2, points1, points2);
     }
     return FormatFigure(picture, image1->name + " – " + image2->name, caption,
-                        drawn, options_.jpeg_quality);
+                        drawn);
   }
 
  private:
@@ -206,7 +206,7 @@ class ExampleReader {
     if (camera_id == camera_ids_.end()) return std::nullopt;
     const auto camera = cameras_.find(camera_id->second);
     if (camera == cameras_.end()) return std::nullopt;
-    // Of tall photos two stand side by side.
+    // Two tall photos share the width.
     const bool is_tall = HeightOf(camera->second) > WidthOf(camera->second);
     return ReadPhoto((fs::path(options_.image_path) / image.name).string(),
                      camera->second,

@@ -14,11 +14,11 @@
 namespace adasfm {
 namespace {
 
-// The matrix of pairs has at most so many cells a side: no screen shows more,
-// and the page stays small whatever the number of pairs.
+// Largest number of cells per side of the matrix of pairs: no screen shows
+// more, and the page stays small for any number of pairs.
 constexpr size_t kMaxMatrixSize = 700;
 
-// Of all observations of the model's points.
+// Reprojection errors of all observations of the model's points.
 Histogram MeasureReprojection(const colmap::Reconstruction& model) {
   Histogram errors(0.1, 41);
   for (const image_t image_id : model.RegImageIds()) {
@@ -184,7 +184,7 @@ std::string FormatNotes(const std::vector<std::string>& notes) {
 }  // namespace
 
 bool ReportOptions::IsValid(std::string* error) const {
-  // More examples would make a page that no phone opens.
+  // With more examples no phone could open the page.
   return OptionChecker(error)
              .AtLeast(0, "max_num_points", max_num_points)
              .Within(0, 50, "max_num_examples", max_num_examples)

@@ -9,28 +9,29 @@
 namespace adasfm {
 
 struct ReportOptions {
-  // The model: a folder with a COLMAP model, or a folder of models, of which
-  // the largest is shown. The mapper's summary.json beside it is read too.
+  // A folder with a COLMAP model, or a folder of models, of which the largest
+  // is shown. The mapper's summary.json in the parent folder is read, too.
   std::string input_path;
-  // What may be empty leaves its sections out, and the report says so.
+  // Optional inputs. Without one, its sections are left out, which the report
+  // states.
   std::string coarse_path;  // as input_path, of adasfm_global
   std::string database_path;
   std::string ground_truth_path;
   GroundTruthOptions ground_truth;
-  // The 3D view holds at most so many points: more make the file large and
-  // turning it slow, without showing more.
+  // Largest number of points in the 3D view: more points make the file large
+  // and the view slow, without showing more.
   int max_num_points = 20000;
-  // Pairs shown with their matches on the photos, of each of removed and kept
-  // ones; each adds about 60 kB. Without image_path there are none.
+  // Number of pairs shown with their matches on the photos, for each of removed
+  // and kept pairs; each adds about 60 kB. Needs image_path.
   std::string image_path;
   int max_num_examples = 4;
 
   bool IsValid(std::string* error) const;
 };
 
-// One HTML page with everything in it, that needs no network
-// (docs/guide/report.md). The same input gives the same page. An error when
-// something that was given cannot be read.
+// Builds one self-contained HTML page, which needs no network
+// (docs/guide/report.md). The same input gives the same page. An error when a
+// given input cannot be read.
 StatusOr<std::string> BuildReport(const ReportOptions& options);
 
 }  // namespace adasfm

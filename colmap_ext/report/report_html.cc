@@ -45,7 +45,7 @@ std::string JsonForScript(const nlohmann::json& json) {
       json.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
   std::string escaped;
   escaped.reserve(text.size());
-  // These characters occur inside JSON's strings only.
+  // These characters occur only inside JSON's strings.
   for (const char c : text) {
     if (c == '<') {
       escaped += "\\u003c";

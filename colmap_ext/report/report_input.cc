@@ -15,7 +15,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// The model of most images, and the folder beside which its summary lies.
+// The largest model, and the parent of its folder, which has the summary.
 StatusOr<colmap::Reconstruction> ReadLargest(const std::string& path,
                                              std::string* parent) {
   const std::vector<std::string> folders = FindModels(path);
@@ -61,7 +61,7 @@ Status ReadPairs(const std::string& path, ReportInput* input) {
   return Status::Ok();
 }
 
-// The pairs that stand for weak places, as far as the database has them.
+// The pairs that represent weak places, as far as the database has them.
 std::vector<ReportPair> FindWeakPairs(const ReportOptions& options,
                                       const ReportInput& input) {
   std::vector<ReportPair> weak;
@@ -215,7 +215,7 @@ StatusOr<ReportInput> ReadReportInput(const ReportOptions& options) {
   input.scene =
       BuildReportScene(input.database_images, input.model,
                        input.coarse ? &*input.coarse : nullptr, input.priors);
-  // Metres cannot be drawn into a world of unknown scale.
+  // Metric lengths cannot be drawn in a world of unknown scale.
   if (is_metric) ChainPriors(input.priors.priors, &input.scene);
   MarkParts(input.summaries.parts, &input.scene);
   if (!options.database_path.empty()) {

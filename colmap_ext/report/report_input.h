@@ -17,7 +17,7 @@
 
 namespace adasfm {
 
-// Everything that the sections of the page are made of.
+// Input of all sections of the page.
 struct ReportInput {
   colmap::Reconstruction model;
   std::optional<colmap::Reconstruction> coarse;
@@ -38,7 +38,7 @@ struct ReportInput {
   std::vector<std::string> notes;
 };
 
-// Reads what was given; the rest stays empty and is noted.
+// Reads the given inputs; the others stay empty and are listed in notes.
 StatusOr<ReportInput> ReadReportInput(const ReportOptions& options);
 
 }  // namespace adasfm

@@ -136,7 +136,7 @@ RemovedPairs ReadRemovedPairs(const std::string& path,
   ThrowOnFailure(&file);
   std::string line;
   while (std::getline(file, line)) {
-    line = line.substr(0, line.find('\t'));  // what follows says why
+    line = line.substr(0, line.find('\t'));  // the reason follows the tab
     bool found = false;
     for (size_t space = line.find(' '); space != std::string::npos && !found;
          space = line.find(' ', space + 1)) {

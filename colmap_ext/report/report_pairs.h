@@ -11,8 +11,8 @@
 
 namespace adasfm {
 
-// Values counted in bins of equal width from 0; the last one takes all that
-// lies beyond. {"width", "counts"}.
+// Counts values in bins of equal width from 0; the last bin also counts all
+// larger values. JSON: {"width", "counts"}.
 class Histogram {
  public:
   Histogram(double bin_width, int num_bins)
@@ -26,8 +26,8 @@ class Histogram {
   std::vector<int64_t> counts_;
 };
 
-// A pair of images by their indices in the scene, index1 < index2, and its
-// number of inlier matches before and after adasfm_global (0: not verified, or
+// A pair of images by their indices in the scene, index1 < index2, with its
+// numbers of inlier matches before and after adasfm_global (0: not verified, or
 // removed) and of raw matches.
 struct ReportPair {
   size_t index1 = 0;
@@ -37,11 +37,11 @@ struct ReportPair {
   int64_t num_raw = 0;
 };
 
-// What a database says of its verified pairs, before and after adasfm_global.
+// The verified pairs of a database, before and after adasfm_global.
 struct ReportPairs {
   std::vector<ReportPair> pairs;
-  // Share of the raw matches that verification kept, per pair; null without
-  // raw matches.
+  // Histogram of the pairs' ratio of inliers to raw matches; null without raw
+  // matches.
   nlohmann::json inlier_ratios_before;
   nlohmann::json inlier_ratios_after;
   int64_t num_before = 0;
@@ -49,20 +49,21 @@ struct ReportPairs {
   bool was_rewritten = false;
 };
 
-// Pairs with fewer inliers than COLMAP's own 15 do not count. Reads no match,
-// so that memory follows the number of pairs alone. Throws SqliteError.
+// Ignores pairs with fewer inliers than COLMAP's minimum of 15. Reads no
+// matches, so that memory depends on the number of pairs only. Throws
+// SqliteError.
 ReportPairs ReadReportPairs(const ReportScene& scene,
                             SqliteConnection* database);
 
-// For the matrix: packed arrays, one entry a pair. The matrix has at most
-// max_size cells a side; with more images, neighbours share a cell, which shows
-// the largest number of its pairs.
+// For the matrix: packed arrays, one entry per cell. The matrix has at most
+// max_size cells per side; with more images, neighbours share a cell, which
+// shows the largest counts of its pairs.
 nlohmann::json PairsToJson(const ReportPairs& pairs, size_t num_images,
                            size_t max_size);
 
-// The pairs of removed_pairs.txt (`name1 name2` a line, names may have spaces,
-// then a tab and the reason) as indices; lines with unknown names are counted
-// only.
+// The pairs of removed_pairs.txt, as indices. Each line is `name1 name2`, where
+// names may have spaces, then a tab and the reason. Lines with unknown names
+// are only counted.
 struct RemovedPairs {
   std::vector<std::pair<size_t, size_t>> pairs;
   int num_unknown = 0;

@@ -15,8 +15,8 @@ namespace {
 using PoseOfImage = std::optional<Rigid3d> ReportImage::*;
 using ErrorOfImage = std::optional<double> ReportImage::*;
 
-// Up in the world: against gravity where it was measured, else where the
-// cameras' upper edges point on average, as photos are mostly taken.
+// The up direction in the world: opposite to measured gravity, else the mean
+// direction of the cameras' upper edges, as photos are usually upright.
 Eigen::Vector3d EstimateUp(const PriorTables& priors,
                            const ReportScene& scene) {
   Eigen::Vector3d up = Eigen::Vector3d::Zero();
@@ -36,14 +36,14 @@ Eigen::Vector3d EstimateUp(const PriorTables& priors,
 }
 
 Eigen::Quaterniond LevelFromWorld(const Eigen::Vector3d& up) {
-  // A levelled model keeps its axes exactly.
+  // An almost levelled model keeps its axes exactly.
   if (AngleBetweenRad(up, Eigen::Vector3d::UnitZ()) < DegToRad(3.0)) {
     return Eigen::Quaterniond::Identity();
   }
   return Eigen::Quaterniond::FromTwoVectors(up, Eigen::Vector3d::UnitZ());
 }
 
-// Sets the errors of one model's poses; the alignment, or none.
+// Sets the errors of one model's poses; returns the alignment, none on failure.
 std::optional<Sim3d> MeasureErrors(
     const std::map<std::string, Rigid3d>& true_cams_from_world, bool is_metric,
     PoseOfImage pose, ErrorOfImage error, ReportScene* scene) {

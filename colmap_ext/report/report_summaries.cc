@@ -21,7 +21,7 @@ Json ReadJson(const std::string& path, Json::value_t type,
   return Json();
 }
 
-// Files of other versions may lack a key or hold another type there.
+// Files of other versions may lack a key or have another type there.
 double NumberAt(const Json& json, const char* key) {
   if (!json.is_object()) return std::numeric_limits<double>::quiet_NaN();
   const auto value = json.find(key);
@@ -70,7 +70,7 @@ std::vector<std::vector<image_t>> PartsOfPlan(const Json& plan) {
   return parts;
 }
 
-// Of all components; their images differ.
+// Parts of all components, whose images are disjoint.
 std::vector<std::vector<image_t>> ReadPlans(const std::string& mapper_folder,
                                             std::vector<std::string>* notes) {
   std::vector<std::vector<image_t>> parts;
@@ -127,7 +127,7 @@ ReportVerdict FindVerdict(const ReportSummaries& summaries) {
   const auto verdict = summaries.mapper.find("verdict");
   if (verdict == summaries.mapper.end()) return {};
   const std::string result = TextAt(*verdict, "result");
-  // It becomes the name of a style.
+  // The result becomes the name of a style.
   if (result != "good" && result != "doubtful" && result != "failed") return {};
   return {result, TextAt(*verdict, "line")};
 }
@@ -151,7 +151,7 @@ std::vector<StageTime> ListStageTimes(const ReportSummaries& summaries) {
                             double seconds) {
     if (std::isfinite(seconds)) times.push_back({stage, step, seconds});
   };
-  // Our own stages say themselves what they took.
+  // Our own stages record their times themselves.
   for (const Json& step : summaries.steps) {
     const std::string name = TextAt(step, "name");
     if (name == "features" || name == "matching") {
@@ -277,7 +277,7 @@ std::vector<ReportPlace> FindWeakPlaces(const ReportSummaries& summaries) {
   }
   const Json models = ListAt(summaries.global, "models");
   for (size_t k = 0; k < models.size(); ++k) {
-    for (const Json& join : ListAt(models[k], "unverified_joins")) {
+    for (const Json& join : ListAt(models[k], "unconfirmed_closures")) {
       places.push_back(
           {TextAt(join, "name1"), TextAt(join, "name2"),
            "in the coarse model " + std::to_string(k) + ": " +

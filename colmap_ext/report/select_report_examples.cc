@@ -8,8 +8,8 @@
 namespace adasfm {
 namespace {
 
-// Pairs whose first and second images lie this near, as a share of all images,
-// show about the same places.
+// Two pairs show about the same places if their first images, and their second
+// images, are at most this far apart, as a share of all images.
 constexpr double kSamePlaceShare = 0.05;
 
 bool IsSame(const ReportPair& a, const ReportPair& b) {
@@ -25,7 +25,7 @@ bool IsNear(const ReportPair& a, const ReportPair& b, size_t num_images) {
          distance(a.index2, b.index2) <= near;
 }
 
-// The first of the ranked pairs that is unlike all that were chosen.
+// Adds the first of the ranked pairs that differs from all chosen ones.
 bool ChooseNext(const std::vector<ReportPair>& ranked, size_t num_images,
                 bool allow_near, std::vector<ReportPair>* chosen) {
   for (const ReportPair& pair : ranked) {
@@ -41,7 +41,7 @@ bool ChooseNext(const std::vector<ReportPair>& ranked, size_t num_images,
   return false;
 }
 
-// Takes from the rankings in turn.
+// Chooses from the rankings in turn.
 std::vector<ReportPair> Choose(
     const std::vector<std::vector<ReportPair>>& rankings, size_t num_images,
     size_t max_num_pairs) {

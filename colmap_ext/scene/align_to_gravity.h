@@ -11,29 +11,32 @@
 
 namespace adasfm {
 
-// The unit vector, in the reconstruction's world, that most of its images call
-// down: the geometric median of their gravity directions, which a minority of
-// wrong ones does not move. None when no registered image knows gravity. The
-// cameras are turned by camera_mount against those that the scene states
-// (CameraMountReport).
+// The unit vector of gravity in the reconstruction's world: the geometric
+// median of the images' gravity directions, which a minority of wrong
+// directions does not change. camera_imu_correction rotates the scene's gravity
+// directions into the true camera frames (CameraImuRotationReport). None when
+// no registered image has a gravity direction.
 std::optional<Eigen::Vector3d> FindGravityInWorld(
     const SceneData& scene, const colmap::Reconstruction& reconstruction,
-    const Eigen::Quaterniond& camera_mount = Eigen::Quaterniond::Identity());
+    const Eigen::Quaterniond& camera_imu_correction =
+        Eigen::Quaterniond::Identity());
 
-// The same of poses.
+// The same for poses.
 std::optional<Eigen::Vector3d> FindGravityInWorld(
     const SceneData& scene, const std::map<image_t, Rigid3d>& cams_from_world,
-    const Eigen::Quaterniond& camera_mount = Eigen::Quaterniond::Identity());
+    const Eigen::Quaterniond& camera_imu_correction =
+        Eigen::Quaterniond::Identity());
 
-// Moves poses and points into another world.
+// Transforms poses and points into another world frame.
 void TransformReconstruction(const Sim3d& new_from_old,
                              colmap::Reconstruction* reconstruction);
 
-// Turns the world, by the smallest turn, so that gravity points along -z, and
-// moves its origin to the registered camera of the lowest id. False, and
-// nothing is changed, when no image knows gravity.
-bool AlignToGravity(
-    const SceneData& scene, colmap::Reconstruction* reconstruction,
-    const Eigen::Quaterniond& camera_mount = Eigen::Quaterniond::Identity());
+// Rotates the world, by the smallest angle, so that gravity points along -z,
+// and moves its origin to the registered camera of the lowest id. False, and
+// nothing is changed, when there is no gravity direction.
+bool AlignToGravity(const SceneData& scene,
+                    colmap::Reconstruction* reconstruction,
+                    const Eigen::Quaterniond& camera_imu_correction =
+                        Eigen::Quaterniond::Identity());
 
 }  // namespace adasfm

@@ -15,19 +15,19 @@ namespace {
 constexpr int kMinNumPositions = 3;
 constexpr int kNumHypotheses = 600;
 constexpr uint64_t kSeed = 17;
-// What a normal error hardly exceeds, in sigmas of a direction.
+// Sigmas of a direction that a normal error hardly exceeds.
 constexpr double kNormalSigmas = 4.0;
-// Thresholds tried, as shares of the extent of the positions: what a coarse
-// model may be bent by.
+// Tried thresholds, as shares of the positions' extent: possible deformations
+// of a coarse model.
 constexpr double kBendRatios[] = {0.0, 0.01, 0.03, 0.1};
 constexpr double kMinInlierRatio = 0.6;
-// The vertical by an IMU, and as photographers hold their cameras.
+// 1 sigma of the vertical from an IMU, and from how photographers hold cameras.
 constexpr double kGravitySigmaRad = DegToRad(1.0);
 constexpr double kUprightSigmaRad = DegToRad(20.0);
 constexpr double kMaxCostRatioOfAny = 0.7;
 constexpr double kMaxHeadingSigmaRad = DegToRad(5.0);
 constexpr double kMaxScaleSigma = 0.1;
-// Where the loss of the refinement ends, in thresholds.
+// Residual at which Tukey's weight becomes 0, in thresholds.
 constexpr double kTukeyRatio = 1.5;
 constexpr int kNumIterations = 20;
 
@@ -130,7 +130,7 @@ class Aligner {
     return Median(std::move(sigmas));
   }
 
-  // Of the middle four fifths of the positions, so that a jump is none of it.
+  // The extent of the middle four fifths of the positions, to exclude jumps.
   double Extent() const {
     Eigen::Vector3d size;
     for (int axis = 0; axis < 3; ++axis) {
@@ -213,7 +213,8 @@ class Aligner {
     std::optional<Sim3d> best;
     double least_cost = static_cast<double>(observations_.size());
     FindBetter(upright_, &least_cost, &best);
-    // On a straight way any roll fits three positions: that fits no better.
+    // On a straight trajectory three positions leave the roll free: a
+    // hypothesis from three positions must fit clearly better.
     least_cost *= kMaxCostRatioOfAny;
     FindBetter(any_, &least_cost, &best);
     return best;
@@ -241,7 +242,8 @@ class Aligner {
         }));
   }
 
-  // Parameters: a turn on the left, a shift, and the logarithm of the scale.
+  // Parameters: a rotation applied on the left, a shift, and the log of the
+  // scale.
   bool Refine(Sim3d* enu_from_world) {
     using Vector7 = Eigen::Matrix<double, 7, 1>;
     Eigen::Matrix<double, 7, 7> hessian;
@@ -255,7 +257,7 @@ class Aligner {
         Eigen::Matrix<double, 3, 7> jacobian;
         jacobian << Hat(scaled + enu_from_world->rotation * o.lever),
             -Eigen::Matrix3d::Identity(), -scaled;
-        // Tukey's biweight: what is off by more than that says nothing.
+        // Tukey's biweight: larger residuals have no weight.
         const double ratio =
             std::min(1.0, residual.norm() / (kTukeyRatio * Threshold(o)));
         const double weight =
@@ -264,7 +266,7 @@ class Aligner {
         gradient += weight * jacobian.transpose() * residual;
       }
       AddVertical(*enu_from_world, &hessian, &gradient);
-      // No scale to find: any weight holds it.
+      // The scale is fixed: a unit diagonal keeps its step at zero.
       if (input_.is_metric) {
         hessian.row(6).setZero();
         hessian.col(6).setZero();
@@ -289,8 +291,8 @@ class Aligner {
                    Eigen::Matrix<double, 7, 7>* hessian,
                    Eigen::Matrix<double, 7, 1>* gradient) const {
     const Eigen::Vector3d down = enu_from_world.rotation * down_;
-    // A hint that the positions contradict altogether (a camera that looks
-    // down) is none.
+    // Ignores a mean camera axis that the positions contradict (a camera that
+    // looks down).
     if (!has_gravity_ && -down.z() < 0.7) return;
     const double sigma = has_gravity_ ? kGravitySigmaRad : kUprightSigmaRad;
     const Eigen::Vector3d residual = down + Eigen::Vector3d::UnitZ();

@@ -20,28 +20,39 @@
 namespace adasfm {
 namespace {
 
-// The same lenses whatever is given: focal lengths from 0.38 to 2.6 of the
-// longer side, in steps of their logarithms and, where nothing is known of it,
-// with several distortions (a minimum without any is not always near that of
-// all). Then around the best one in steps that become finer.
+// The coarse grid does not depend on the given lens: focal lengths from 0.38 to
+// 2.6 times the longer side in logarithmic steps, with several distortions
+// where the distortion is unknown (the minimum without distortion is not always
+// near the overall minimum). Then the search continues around the best lens in
+// finer steps.
 constexpr int kNumSteps = 6;  // to either side
 constexpr double kCoarseStep = 0.16;
 constexpr double kCoarseDistortions[] = {-0.2, -0.1, 0.0, 0.1};
 const Eigen::Vector3d kSteps[] = {{0.08, 0.1, 0.1}, {0.03, 0.04, 0.04}};
 constexpr int kMaxNumMoves = 20;
-// What is believed of a lens that nobody has calibrated: its distortion near
-// the rim, and its second coefficient.
+// 1 sigma of the distortion near the rim, and of the second coefficient, of a
+// lens that nobody has calibrated.
 constexpr double kDistortionSigma = 0.2;
 // Pairs with few matches fit many focal lengths.
 constexpr size_t kMinNumMatches = 30;
 constexpr int kMinNumPairs = 5;
-// What a pair can count for at most, in variances of the noise: wrong pairs,
-// and things that move, want focal lengths of their own.
+// Sizes of the even subsets of a camera's pairs and of their matches; larger
+// ones gain little.
+constexpr size_t kMaxNumPairs = 200;
+constexpr size_t kMaxNumMatches = 80;
+// Scale of the Cauchy loss [px of epipolar distance].
+constexpr double kLossScalePx = 1.5;
+// Largest cost of a pair, in variances of the noise: wrong pairs and moving
+// objects fit other focal lengths.
 constexpr double kMaxPairCost = 25.0;
 constexpr double kMinNumSigmas = 3.0;
-// 1 sigma over the focal length of what all pairs have in common: exposure row
-// by row, a principal point off the middle. On three handheld recordings the
-// pairs were 2 to 5 % too long, three to seven times their scatter.
+// A focal length is used only if its 1 sigma (of the logarithm) is below this.
+// Straight drives hardly constrain it.
+constexpr double kMaxRelativeSigma = 0.05;
+// 1 sigma, relative to the focal length, of errors that all pairs share:
+// rolling shutter, a principal point off the middle. On three handheld
+// recordings the estimates were 2 to 5 % too long, three to seven times the
+// pairs' scatter.
 constexpr double kSharedSigma = 0.035;
 
 struct PairPoints {
@@ -52,14 +63,14 @@ struct PairPoints {
 
 using CostCurve = std::vector<double>;
 
-// The logarithm of a focal length's factor, the distortion near the rim (its
-// first coefficient, plus the second one times SquaredRimTangent: the two
-// hardly differ elsewhere) and its second coefficient. The first 1 +
-// NumUnknownDistortions of them are estimated.
+// The logarithm of the focal length's factor, the distortion near the rim
+// (first coefficient plus the second one times SquaredRimTangent: elsewhere the
+// two coefficients hardly differ in effect) and the second coefficient. The
+// first 1 + NumUnknownDistortions entries are estimated.
 using Lens = Eigen::Vector3d;
 
-// Coefficients of distortion that are unknown: nobody has given any. Not of
-// FOV, where zero is no lens.
+// Number of distortion coefficients to estimate: 0 if any was given, and for
+// FOV, for which zero is no valid value.
 size_t NumUnknownDistortions(const colmap::Camera& camera) {
   const auto& indices = camera.ExtraParamsIdxs();
   if (camera.ModelName() == "FOV") return 0;
@@ -69,8 +80,8 @@ size_t NumUnknownDistortions(const colmap::Camera& camera) {
   return std::min<size_t>(2, indices.size());
 }
 
-// One radial term makes up for a second one that it lacks by a wrong focal
-// length, so lenses that nobody has calibrated have two.
+// With one radial term, a wrong focal length compensates the missing second
+// one, so lenses that nobody has calibrated get two.
 colmap::Camera WithTwoRadialTerms(camera_t camera_id,
                                   const colmap::Camera& camera) {
   const std::string name = CameraModelName(ModelIdOf(camera));
@@ -116,9 +127,8 @@ std::vector<T> Subset(const std::vector<T>& items, size_t count) {
   return subset;
 }
 
-std::vector<PairPoints> SelectPairs(
-    const FocalLengthCalibrationOptions& options, const SceneData& scene,
-    camera_t camera_id) {
+std::vector<PairPoints> SelectPairs(const SceneData& scene,
+                                    camera_t camera_id) {
   std::vector<const ScenePair*> of_camera;
   for (const ScenePair& pair : scene.pairs) {
     if (pair.inlier_matches.size() >= kMinNumMatches &&
@@ -128,10 +138,10 @@ std::vector<PairPoints> SelectPairs(
     }
   }
   std::vector<PairPoints> selected;
-  for (const ScenePair* pair : Subset(of_camera, options.max_num_pairs)) {
+  for (const ScenePair* pair : Subset(of_camera, kMaxNumPairs)) {
     PairPoints points;
     for (const FeatureMatch& match :
-         Subset(pair->inlier_matches, options.max_num_matches)) {
+         Subset(pair->inlier_matches, kMaxNumMatches)) {
       points.points1.push_back(
           scene.images.at(pair->image_id1).keypoints[match.point2D_idx1]);
       points.points2.push_back(
@@ -146,7 +156,7 @@ std::vector<PairPoints> SelectPairs(
   return selected;
 }
 
-// The pair's least cost under the camera, in variances of the noise.
+// The pair's least cost under this camera, in variances of the noise.
 double ComputeCost(const FocalLengthCalibrationOptions& options,
                    const PairPoints& pair, const colmap::Camera& camera) {
   const std::vector<Bearing> bearings1 = ComputeBearings(camera, pair.points1);
@@ -161,7 +171,7 @@ double ComputeCost(const FocalLengthCalibrationOptions& options,
       calibration.transpose() * pair.fundamental_matrix * calibration,
       bearings1, bearings2, matches);
   EpipolarMinimization minimization;
-  minimization.loss_scale_px = options.loss_scale_px;
+  minimization.loss_scale_px = kLossScalePx;
   minimization.max_num_iterations = 20;
   const EpipolarMinimum minimum = MinimizeEpipolarDistances(
       minimization,
@@ -171,9 +181,9 @@ double ComputeCost(const FocalLengthCalibrationOptions& options,
   return minimum.cost / std::pow(options.keypoint_sigma_px, 2);
 }
 
-// least_costs: of each pair under all lenses tried so far, from which its
-// bounded costs count. Were they those of the grid at hand, the best lens of
-// one grid would not be that of the next, and the search went in circles.
+// least_costs: least cost of each pair over all lenses tried so far; bounded
+// costs are relative to it. Relative to the present grid only, the best lens
+// would change from grid to grid, and the search would go in circles.
 std::vector<CostCurve> ComputeCurves(
     const FocalLengthCalibrationOptions& options,
     const std::vector<PairPoints>& pairs, const colmap::Camera& camera,
@@ -213,8 +223,8 @@ int FindBest(const std::vector<CostCurve>& curves,
   return best;
 }
 
-// A lens amid its neighbours, one step to either side in all combinations of
-// the unknowns: 3, 9 or 27, the first unknown changing fastest.
+// A lens and its neighbours, one step to either side in all combinations of the
+// unknowns: 3, 9 or 27 lenses, with the first unknown changing fastest.
 std::vector<Lens> Neighbors(const Lens& lens, const Lens& steps,
                             int num_unknowns) {
   std::vector<Lens> neighbors = {lens};
@@ -230,7 +240,7 @@ std::vector<Lens> Neighbors(const Lens& lens, const Lens& steps,
   return neighbors;
 }
 
-// Derivatives of a curve over Neighbors at their middle, per step.
+// Derivatives, per step, of a curve over Neighbors at its middle.
 struct Derivatives {
   Eigen::Vector3d slope = Eigen::Vector3d::Zero();
   Eigen::Matrix3d curvature = Eigen::Matrix3d::Zero();
@@ -261,9 +271,10 @@ struct Minimum {
   double chi2_per_unknown = 0.0;
 };
 
-// Of the paraboloid through the best lens and its neighbours. One such step:
-// more of them followed what pairs have in common along the valley of focal
-// length and distortion (KITTI 07 717 px, true 707, and 751 after six).
+// Minimum of the paraboloid through the best lens and its neighbours. Only one
+// such step: further steps followed errors that pairs share along the valley of
+// focal length and distortion (KITTI 07: 717 px after one, 751 px after six,
+// true 707).
 std::optional<Minimum> FitMinimum(const std::vector<CostCurve>& curves,
                                   const Lens& best, const Lens& steps,
                                   int num_unknowns) {
@@ -298,7 +309,7 @@ std::optional<Minimum> FitMinimum(const std::vector<CostCurve>& curves,
   return minimum;
 }
 
-// The best of a grid over all lenses; none at its rim.
+// The best lens of the coarse grid; none when its focal length is at the edge.
 std::optional<Lens> FindCoarseLens(const FocalLengthCalibrationOptions& options,
                                    const std::vector<PairPoints>& pairs,
                                    const colmap::Camera& camera,
@@ -349,11 +360,7 @@ std::optional<Minimum> FindFocalLength(
 
 bool FocalLengthCalibrationOptions::IsValid(std::string* error) const {
   return OptionChecker(error)
-      .AtLeast(kMinNumPairs, "max_num_pairs", max_num_pairs)
-      .AtLeast(8, "max_num_matches", max_num_matches)
-      .Positive({{"loss_scale_px", loss_scale_px},
-                 {"keypoint_sigma_px", keypoint_sigma_px},
-                 {"max_relative_sigma", max_relative_sigma}})
+      .Positive("keypoint_sigma_px", keypoint_sigma_px)
       .AllHold();
 }
 
@@ -364,12 +371,11 @@ std::vector<CalibratedFocalLength> CalibrateFocalLengths(
   for (auto& [camera_id, given] : scene->cameras) {
     if (HasPriorFocalLength(given)) continue;
     const colmap::Camera camera = WithTwoRadialTerms(camera_id, given);
-    const std::vector<PairPoints> pairs =
-        SelectPairs(options, *scene, camera_id);
+    const std::vector<PairPoints> pairs = SelectPairs(*scene, camera_id);
     if (pairs.size() < kMinNumPairs) continue;
     const std::optional<Minimum> minimum =
         FindFocalLength(options, pairs, camera);
-    if (!minimum || minimum->sigma > options.max_relative_sigma ||
+    if (!minimum || minimum->sigma > kMaxRelativeSigma ||
         minimum->chi2_per_unknown < std::pow(kMinNumSigmas, 2)) {
       continue;
     }

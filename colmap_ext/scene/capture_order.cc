@@ -9,7 +9,7 @@ namespace {
 
 bool IsDigit(char c) { return std::isdigit(static_cast<unsigned char>(c)); }
 
-// The end of the digits that begin at `begin`, and the first one but zeros.
+// The end of the number that begins at `begin`; *first skips leading zeros.
 size_t SkipNumber(const std::string& text, size_t begin, size_t* first) {
   *first = begin;
   while (*first < text.size() && text[*first] == '0') ++*first;

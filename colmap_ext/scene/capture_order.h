@@ -15,9 +15,9 @@ struct CapturedImage {
   std::optional<timestamp_t> timestamp_ns;
 };
 
-// By time where all images have one, else by name with runs of digits as
-// numbers. Ids are no order of capture: COLMAP gives them as its threads finish
-// with the features. by_time may be null.
+// Sorts by time if all images have one, else by name with runs of digits as
+// numbers. Ids are not in capture order: COLMAP assigns them in the order in
+// which its threads finish the features. by_time may be null.
 std::vector<image_t> OrderByCapture(std::vector<CapturedImage> images,
                                     bool* by_time = nullptr);
 

@@ -11,11 +11,12 @@
 namespace adasfm {
 namespace {
 
-// What accelerometers know of the vertical over a drive: a bias that is left of
-// 0.03 m/s^2, and a wrong mounting that averages out as the machine turns.
+// 1 sigma of the vertical from accelerometers over a drive: a remaining bias of
+// 0.03 m/s^2, and a wrong extrinsic rotation whose effect averages out as the
+// machine turns.
 constexpr double kDriveGravitySigmaRad = DegToRad(0.2);
 constexpr double kDriveUprightSigmaRad = DegToRad(10.0);
-// What is within this many sigmas needs no wider loss.
+// Residuals within this many sigmas need no wider loss.
 constexpr double kNarrowLossSigmas = 4.0;
 
 }  // namespace
@@ -28,13 +29,13 @@ bool HasMetricPriors(const SceneData& scene,
 
 PositionAlignment AlignSceneToPositions(
     const SceneData& scene, const std::map<image_t, Rigid3d>& cams_from_world,
-    bool is_metric, const Eigen::Quaterniond& camera_mount) {
+    bool is_metric, const Eigen::Quaterniond& camera_imu_correction) {
   PositionAlignmentInput input;
   input.positions = scene.positions;
   input.cams_from_world = cams_from_world;
   input.is_metric = is_metric;
   input.down_in_world =
-      FindGravityInWorld(scene, cams_from_world, camera_mount);
+      FindGravityInWorld(scene, cams_from_world, camera_imu_correction);
   return AlignToPositions(input);
 }
 
@@ -50,14 +51,14 @@ std::map<image_t, Rigid3d> TransformCamsFromWorld(
 
 Verticals FindVerticals(const SceneData& scene,
                         const std::map<image_t, Rigid3d>& cams_from_enu,
-                        const Eigen::Quaterniond& camera_mount) {
+                        const Eigen::Quaterniond& camera_imu_correction) {
   Verticals verticals;
   verticals.sigma_rad = kDriveGravitySigmaRad;
   for (const auto& [image_id, pose] : cams_from_enu) {
     const auto image = scene.images.find(image_id);
     if (image == scene.images.end() || !image->second.gravity_in_cam) continue;
     verticals.gravity_in_cam[image_id] =
-        camera_mount * *image->second.gravity_in_cam;
+        camera_imu_correction * *image->second.gravity_in_cam;
   }
   if (!verticals.gravity_in_cam.empty()) return verticals;
   verticals.sigma_rad = kDriveUprightSigmaRad;

@@ -6,7 +6,7 @@
 namespace adasfm {
 namespace {
 
-// Points around the origin to fit the plane of UTM at, in m.
+// Half the side of the grid of points that UTM is fitted at [m].
 constexpr double kFitRadiusM = 100.0;
 
 Sim3d EcefFromEnu(const GeodeticPosition& origin) {

@@ -9,16 +9,17 @@
 
 namespace adasfm {
 
-// Images by their name in the database and, where that is unique, by their file
-// name: time lists often leave the folder out.
+// Finds images by their name in the database and, where that is unique, by
+// their file name: lists of times often omit the folder.
 class ImageFinder {
  public:
   void Add(image_t image_id, const std::string& name);
 
-  // kInvalidImageId when there is no such image.
+  // kInvalidImageId when there is no such image, or the file name is not
+  // unique.
   image_t Find(const std::string& name) const;
   // The image of the name or, where there is none, all images of its file name:
-  // cameras of a rig often give theirs the same ones.
+  // cameras of a rig often use the same file names.
   std::vector<image_t> FindAll(const std::string& name) const;
 
  private:

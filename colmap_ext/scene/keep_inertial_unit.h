@@ -8,12 +8,13 @@
 
 namespace adasfm {
 
-// Gives an adjusted model back the metres that the accelerometer told its
-// coarse model (colmap_ext/coarse/measure_size.h). Adjustments hold such a
-// model's scale as they hold that of one without metres, so that it may have
-// changed with the shape: the model is scaled by the median, by length, of the
-// ratio of the stated lengths (kPriorInertialLength) to its own. Without such
-// lengths between its images the model stays as it is.
+// Restores the metres of an adjusted model whose coarse model has its unit from
+// the accelerometer (colmap_ext/coarse/measure_size.h). Adjustments fix the
+// scale of such a model like that of a model without metres, so that the scale
+// may have changed with the shape. Scales the model by the median, weighted by
+// length, of the ratios of the stated lengths (kPriorInertialLength) to the
+// model's lengths. Without such lengths between its images the model stays as
+// it is.
 void KeepInertialUnit(const std::vector<RelativePosePrior>& priors,
                       colmap::Reconstruction* reconstruction);
 

@@ -9,8 +9,8 @@
 
 namespace adasfm {
 
-// The pairs of two of these images, in the scene's order; the time depends on
-// the images and their pairs, not on the scene's.
+// The pairs of two of these images, in the scene's order. The time depends on
+// the number of these images and their pairs, not on the size of the scene.
 std::vector<const ScenePair*> FindPairsAmong(const SceneData& scene,
                                              const std::set<image_t>& images);
 

@@ -11,8 +11,8 @@
 namespace adasfm {
 namespace {
 
-// Keypoints that are not numbers are zeros in a scene, where no detector finds
-// any.
+// In a scene, keypoints that are not numbers are replaced by zeros; no detector
+// finds keypoints there.
 bool IsInScene(const SceneImage& image, point2D_t index) {
   return !image.keypoints[index].isZero(0.0);
 }

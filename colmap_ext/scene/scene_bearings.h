@@ -15,8 +15,8 @@ namespace adasfm {
 std::map<image_t, std::vector<Bearing>> ComputeSceneBearings(
     const SceneData& scene, int num_threads);
 
-// The same for the registered images of a model, under its own cameras: those
-// that its adjustment has refined.
+// The same for the registered images of a model, under the model's own cameras,
+// which its adjustment may have refined.
 std::map<image_t, std::vector<Bearing>> ComputeModelBearings(
     const colmap::Reconstruction& reconstruction, int num_threads);
 

@@ -50,7 +50,7 @@ void ReadScenePriors(SqliteConnection* database,
   for (const ImageTimeRow& row : loaded.tables.image_times) {
     scene->images.at(row.image_id).timestamp_ns = row.timestamp_ns;
   }
-  Eigen::Quaterniond camera_mount = Eigen::Quaterniond::Identity();
+  Eigen::Quaterniond camera_imu_correction = Eigen::Quaterniond::Identity();
   scene->priors = std::move(loaded.tables.priors);
   scene->gyroscope_bias_covariance = loaded.tables.gyroscope_bias_covariance;
   scene->length_drift_ratio = loaded.tables.length_drift_ratio;
@@ -62,19 +62,20 @@ void ReadScenePriors(SqliteConnection* database,
   if (!options.use_original_two_view_geometries) {
     scene->inertial_scale_sigma =
         ApplyPriorCorrections(database, &scene->priors);
-    camera_mount = ReadCameraMount(database).value_or(camera_mount);
+    camera_imu_correction =
+        ReadCameraImuCorrection(database).value_or(camera_imu_correction);
   }
-  // In a model without metres the accelerometer says nothing.
+  // Inertial motions constrain nothing in a model without metres.
   if (options.use_original_two_view_geometries ||
       scene->inertial_scale_sigma > 0.0 || HasMeasuredLengths(scene->priors)) {
     scene->inertial_motions = std::move(loaded.tables.inertial_motions);
     for (InertialMotion& motion : scene->inertial_motions) {
-      TurnInertialMotion(camera_mount, &motion);
+      RotateInertialMotion(camera_imu_correction, &motion);
     }
   }
   for (const GravityRow& row : loaded.tables.gravity) {
     scene->images.at(row.image_id).gravity_in_cam =
-        camera_mount * row.gravity_in_cam;
+        camera_imu_correction * row.gravity_in_cam;
   }
   if (loaded.num_ignored_rows > 0) {
     scene->warnings.push_back(
@@ -84,7 +85,7 @@ void ReadScenePriors(SqliteConnection* database,
   }
 }
 
-// A keypoint that is not a number cannot be seen: its matches go.
+// Whether the keypoint is finite; matches of other keypoints are removed.
 bool IsUsable(const SceneImage& image, point2D_t index) {
   return image.keypoints[index].allFinite();
 }
@@ -101,8 +102,8 @@ void DropUnusableMatches(const SceneData& scene, const ImagePair& pair,
   matches->erase(end, matches->end());
 }
 
-// Names the first image that has such keypoints. They stand for nothing any
-// more, but keep their places.
+// Replaces keypoints that are not numbers by zeros, so that the indices of
+// others stay valid. The warning names the first image with such keypoints.
 void ReplaceUnusableKeypoints(SceneData* scene) {
   size_t count = 0;
   std::string name;
@@ -119,8 +120,8 @@ void ReplaceUnusableKeypoints(SceneData* scene) {
                             "with one is " + name + "); they were left out");
 }
 
-// The rows to start from, by pair: the present ones, or the originals where
-// adasfm_global replaced them.
+// The two-view geometries to use, by pair: the present rows, or the originals
+// where adasfm_global replaced them.
 std::map<ImagePair, DatabaseTwoViewGeometry> ReadRows(
     SqliteConnection* database, const SceneDataOptions& options) {
   std::map<ImagePair, DatabaseTwoViewGeometry> rows;

@@ -32,16 +32,16 @@ struct SceneImage {
 };
 
 struct ScenePair {
-  // image_id1 < image_id2, and so are the indices of the matches.
+  // image_id1 < image_id2; the indices of the matches are in the same order.
   image_t image_id1 = kInvalidImageId;
   image_t image_id2 = kInvalidImageId;
   // COLMAP's TwoViewGeometry::ConfigurationType.
   int config = 0;
   std::vector<FeatureMatch> inlier_matches;
-  // As stored: unit translation, or none when the row has no pose (COLMAP
-  // stores identity and zero then).
+  // As stored, with unit translation; none when the row has no pose (COLMAP
+  // then stores identity and zero).
   std::optional<Rigid3d> cam2_from_cam1;
-  // As stored; none when the row has none.
+  // As stored; none when the row has no matrix.
   std::optional<Eigen::Matrix3d> essential_matrix;
   // All matches before verification; filled only with read_raw_matches, and
   // empty when the database has none for the pair.
@@ -54,51 +54,52 @@ struct SceneData {
   std::map<image_t, SceneImage> images;
   // Sorted by (image_id1, image_id2).
   std::vector<ScenePair> pairs;
-  // Consecutive images, sorted by time; of a rig's frames, their leaders. Empty
-  // without sensors.
+  // Between consecutive images, sorted by time; between leaders where rigs have
+  // frames. Empty without sensors.
   std::vector<RelativePosePrior> priors;
-  // As in PriorTables; the priors share these errors.
+  // As in PriorTables; errors that the priors share.
   std::optional<Eigen::Matrix3d> gyroscope_bias_covariance;
   double length_drift_ratio = 0.0;
   std::optional<WheelScale> wheel_scale;
-  // As in PriorTables, of the camera as it is mounted; after adasfm_global only
-  // where wheels measured lengths or it found metres by them.
+  // As in PriorTables, in the true camera frame. After adasfm_global, only
+  // where wheels measured lengths or adasfm_global found metres by these
+  // motions.
   std::vector<InertialMotion> inertial_motions;
-  // The largest scale_sigma of the InertialLengths that the priors got from
-  // adasfm_global; 0 without.
+  // The largest scale_sigma of the InertialLengths that adasfm_global added to
+  // the priors; 0 without such lengths.
   double inertial_scale_sigma = 0.0;
-  // Cameras that are mounted together, and ComputeFramePriors of them.
+  // Rigs of cameras, and their ComputeFramePriors.
   CameraRigs rigs;
   std::vector<RelativePosePrior> frame_priors;
-  // Of GNSS or the like, in the ENU frame of the origin or, without one, in a
-  // metric frame of their own.
+  // Positions of GNSS or the like, in the ENU frame of the origin or, without
+  // an origin, in a metric frame of their own.
   std::vector<PositionPrior> positions;
   std::optional<GeodeticPosition> position_origin;
-  // For the user: what was left out, and why.
+  // For the user: what was skipped, and why.
   std::vector<std::string> warnings;
 };
 
 struct SceneDataOptions {
   bool read_raw_matches = false;
-  // Start from the two-view geometries, the priors and gravity as they were
-  // before adasfm_global changed them, where it did.
+  // Use the two-view geometries, the priors and gravity as they were before
+  // adasfm_global changed them.
   bool use_original_two_view_geometries = false;
-  // Times, priors, gravity and rigs of the images.
+  // Read times, priors, gravity and rigs of the images.
   bool read_priors = true;
-  // Pairs with fewer inlier matches are left out.
+  // Pairs with fewer inlier matches are skipped.
   int min_num_matches = 15;
 };
 
 // Reads a COLMAP database and its adasfm_ tables. An error for a missing file,
-// one that is not COLMAP's database, or rows that contradict each other. The
+// a file that is not COLMAP's database, or rows that contradict each other. The
 // database is not changed.
 StatusOr<SceneData> ReadSceneData(const std::string& database_path,
                                   const SceneDataOptions& options);
 
-// What models of the scene say of frames and rigs (host/frames.h): the rigs of
-// the scene, with the host's frames or, where the host has none, with frames of
-// our own. `warnings` gets one where the host's frames are not those of the
-// scene's rigs, which models then do not say.
+// Frames and rigs for models of the scene (host/frames.h): the rigs of the
+// scene, with the host's frames or, where the host has none, with frames of our
+// own. Where the host's frames are not those of the scene's rigs, models get
+// the host's frames, and `warnings` a message.
 StatusOr<ModelFrames> ReadModelFrames(const std::string& database_path,
                                       const SceneData& scene,
                                       std::vector<std::string>* warnings);

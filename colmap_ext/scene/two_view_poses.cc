@@ -13,7 +13,7 @@
 namespace adasfm {
 namespace {
 
-// Matches looked at to tell the four decompositions apart and to judge a pose.
+// Matches used to choose among the four decompositions and to test a pose.
 constexpr int kMaxNumTestedMatches = 100;
 
 enum class PoseOrigin { kNone, kStored, kDecomposed, kReestimated };
@@ -132,7 +132,7 @@ InitialViewGraph BuildInitialViewGraph(
   for (const auto& [image_id, image] : scene.images) {
     initial.graph.images.push_back(image_id);
     captured.push_back({image_id, image.name, image.timestamp_ns});
-    // Frames of a rig stay together where names are the order.
+    // Keeps the images of a frame adjacent when images are ordered by name.
     const auto rig_image = scene.rigs.images.find(image_id);
     if (rig_image == scene.rigs.images.end()) continue;
     const auto leader = leaders.find(rig_image->second.frame_id);

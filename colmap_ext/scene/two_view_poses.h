@@ -32,17 +32,17 @@ struct InitialViewGraph {
   int num_without_pose = 0;
 };
 
-// Step 2.1: the view graph of the verified pairs. A pair's pose is the stored
-// one; else the decomposed essential matrix; else (planar, uncalibrated and
-// multiple configurations without one) the five-point solution of its inlier
-// matches. Pairs are independent and draw their samples from a seed of their
-// own, so threads change nothing.
+// Step 2.1: builds the view graph of the verified pairs. A pair's pose is the
+// stored one or the decomposed essential matrix, the first that enough matches
+// support; else (for example planar, uncalibrated and multiple configurations)
+// the five-point solution of its inlier matches. Pairs are independent, each
+// with its own random seed, so that threads do not change the result.
 InitialViewGraph BuildInitialViewGraph(
     const TwoViewPoseOptions& options, const SceneData& scene,
     const std::map<image_t, std::vector<Bearing>>& bearings);
 
-// The pose (unit translation) of an essential matrix that puts most points in
-// front of both cameras.
+// The pose (unit translation) from an essential matrix for which most points
+// lie in front of both cameras.
 Rigid3d DecomposeEssential(const Eigen::Matrix3d& essential_matrix,
                            const std::vector<Bearing>& bearings1,
                            const std::vector<Bearing>& bearings2,

@@ -11,9 +11,9 @@
 namespace adasfm {
 namespace {
 
-// Seven degrees of freedom, and some points that are wrong.
+// Seven degrees of freedom, with a margin for wrong points.
 constexpr int kMinNumCommonPoints = 6;
-// As matches of a verified pair.
+// The number of matches of a verified pair.
 constexpr int kMinNumOwnPoints = 15;
 
 class ImageGroups {
@@ -43,7 +43,7 @@ class ImageGroups {
       }
     }
     Join(common);
-    // Groups that grew may have enough points with others.
+    // Larger groups may share enough points with others.
     do {
       common.clear();
       for (const std::vector<int>& track : tracks_) {
@@ -110,7 +110,7 @@ class ImageGroups {
   const std::set<image_t> images_;
   std::map<image_t, int> index_;
   DisjointSets sets_;
-  // Of each point, the indices of its images, ascending.
+  // For each point the indices of its images, ascending.
   std::vector<std::vector<int>> tracks_;
 };
 

@@ -13,7 +13,7 @@
 #include "colmap_ext/io/digest.h"
 #include "colmap_ext/io/folder_lock.h"
 #include "colmap_ext/io/output_files.h"
-#include "colmap_ext/io/step_journal.h"
+#include "colmap_ext/io/run_manifest.h"
 #include "colmap_ext/report/report.h"
 #include "colmap_ext/workspace/open_workspace.h"
 #include "colmap_ext/workspace/prepare_reconstruction.h"
@@ -36,9 +36,9 @@ StatusOr<AutomaticReconstructionResult> Reconstructor::Run() {
 }
 
 Status Reconstructor::RunStep(const std::string& name, const StepInputs& inputs,
-                              const StepJournal::StepActions& actions) {
+                              const RunManifest::StepActions& actions) {
   const StatusOr<double> seconds =
-      journal_.Run(name, inputs, actions, message_);
+      manifest_.Run(name, inputs, actions, message_);
   if (!seconds.ok()) return seconds.status();
   result_.steps.push_back({name, *seconds});
   return Status::Ok();
@@ -59,16 +59,16 @@ Status Reconstructor::Prepare() {
       FolderLock::Acquire(paths_.workspace_path, FolderLock::Mode::kExclusive);
   if (!lock.ok()) return lock.status();
   lock_ = *lock;
-  // A bag's photos and logs are input as any others once they are files.
+  // A bag's photos and logs are input only after they have been extracted.
   if (!HasRecording()) status = PrepareReconstruction(&options_, &paths_);
   if (!status.ok()) return status;
   database_path_ = InWorkspace("database.db");
   result_.model_path = InWorkspace("sparse/0");
   result_.report_path = InWorkspace("report.html");
-  StatusOr<StepJournal> journal =
+  StatusOr<RunManifest> manifest =
       OpenWorkspace(paths_.workspace_path, options_.restart, message_);
-  if (!journal.ok()) return journal.status();
-  journal_ = std::move(journal).value();
+  if (!manifest.ok()) return manifest.status();
+  manifest_ = std::move(manifest).value();
   if (!HasRecording()) return Status::Ok();
   status = paths_.bag_path.empty() ? Video() : Bag();
   return status.ok() ? PrepareReconstruction(&options_, &paths_) : status;

@@ -7,7 +7,7 @@
 #include "colmap_ext/adasfm_pipeline.h"
 #include "colmap_ext/bags/extract_bag.h"
 #include "colmap_ext/host/features.h"
-#include "colmap_ext/io/step_journal.h"
+#include "colmap_ext/io/run_manifest.h"
 #include "colmap_ext/pairs/select_pairs.h"
 #include "core/progress.h"
 #include "core/status.h"
@@ -15,29 +15,30 @@
 namespace adasfm {
 
 struct AutomaticReconstructionOptions {
-  // Of what is taken out of a bag; the calibration's part follows from the
-  // paths.
+  // Options of the extraction from a bag; has_calibration and wheel_type are
+  // set from the paths.
   BagExtractionOptions bag;
-  // Of a video's time 0 on the clock of the logs [ns]. Which frames are taken
-  // out is bag.photos.
+  // A video's time 0 on the clock of the logs [ns]. bag.photos selects the
+  // frames of a video, too.
   timestamp_t video_start_ns = 0;
   FeatureOptions features;
   PairSelectionOptions pairs;
-  // Where priors predict the motion between two images, compares only keypoints
+  // Where priors predict the motion between two images, compare only keypoints
   // near their epipolar lines (host/v3/match_sift_pairs.h).
   bool guided_matching = false;
   PriorImportOptions priors;
   GlobalStageOptions global;
   MapOptions map;
   // Whether the model adjusts focal length and distortion: 0, 1, or -1 for
-  // cameras without features.camera_params. If it does, the coarse stage leaves
-  // the matches as they are.
+  // cameras without features.camera_params. If so, the coarse stage does not
+  // refine the matches.
   int refine_intrinsics = -1;
-  // Removes what earlier calls left in the workspace, and does it all anew.
+  // Removes the results of earlier calls in the workspace and starts again.
   bool restart = false;
-  // Of import, coarse model and mapper, each, in GB (1e9 bytes); -1: theirs.
+  // Bound for import, coarse model and mapper each, in GB (1e9 bytes); -1: the
+  // default of each stage.
   double max_memory_gb = -1.0;
-  // Of all stages; -1: all of the machine's.
+  // Threads of all stages; -1: all of the machine.
   int num_threads = -1;
 
   bool IsValid(std::string* error) const;
@@ -45,15 +46,16 @@ struct AutomaticReconstructionOptions {
 
 // Empty paths: there is no such file.
 struct AutomaticReconstructionPaths {
-  // A recording that gives everything that is not given here, in place of
-  // image_path (sensors/bags/bag_reader.h).
+  // A recording in place of image_path, which provides all paths and the camera
+  // that are not given (sensors/bags/bag_reader.h).
   std::string bag_path;
-  // A film in place of image_path (bags/extract_video.h), for photos and times.
+  // A video in place of image_path (bags/extract_video.h), for photos and
+  // times.
   std::string video_path;
   std::string image_path;
   std::string workspace_path;
   // euroc, 4seasons, kitti or tum: image_path is the root folder of such a
-  // recording, and gives everything that is not given here (dataset_layout.h).
+  // recording, which provides what is not given here (dataset_layout.h).
   std::string data_format;
   std::string image_times_path;
   std::string imu_path;
@@ -71,8 +73,8 @@ struct AutomaticReconstructionResult {
   std::vector<Step> steps;
   std::string model_path;
   std::string report_path;
-  // Of the model, by this call or an earlier one: one line, and whether it is
-  // that the model failed.
+  // Verdict on the model, by this call or an earlier one: one line, and whether
+  // it says that the model failed.
   std::string verdict;
   bool has_failed = false;
 };
@@ -87,12 +89,12 @@ struct AutomaticReconstructionResult {
 //   4  coarse     coarse global SfM                    coarse/
 //   5  model      partitioned mapping                  sparse/0
 //   6  report     one page to look at                  report.html
-// Pairs are matched as soon as their features are there (early_matcher.h).
-// steps.json records what is done, and with which inputs: the same call again
-// does what is missing, a call with other options starts at the first step that
-// they change. Interruption (core/interruption.h) by `progress` keeps what is
-// finished. A database in the workspace that this function did not make is an
-// error. Throws std::invalid_argument for invalid options.
+// Pairs are matched as soon as their features are available (early_matcher.h).
+// steps.json records which steps are done, with their inputs: the same call
+// again does what is missing; a call with other options starts at the first
+// step that they affect. An interruption (core/interruption.h) by `progress`
+// keeps finished work. An error when the workspace has a database that this
+// function did not create. Throws std::invalid_argument for invalid options.
 StatusOr<AutomaticReconstructionResult> ReconstructAutomatically(
     const AutomaticReconstructionOptions& options,
     const AutomaticReconstructionPaths& paths, const ProgressCallback& progress,

@@ -10,9 +10,9 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// One row: what the matches depend on.
+// One row: the inputs that the matches depend on.
 constexpr const char* kInputsTable = "adasfm_early_inputs";
-// What grows with the work; all other tables are copied whole.
+// Tables that grow during the work; all other tables are copied completely.
 constexpr std::array<const char*, 2> kFeatureTables = {"keypoints",
                                                        "descriptors"};
 constexpr std::array<const char*, 2> kMatchTables = {"matches",
@@ -30,7 +30,7 @@ void Attach(const std::string& path, SqliteConnection* database) {
   attach.Step();
 }
 
-// A database that the extraction is writing to.
+// Attaches a database that the extraction is writing to.
 void AttachForReading(const std::string& path, SqliteConnection* database) {
   Attach(path, database);
   SqliteStatement mode(database, "PRAGMA other.journal_mode");
@@ -63,7 +63,7 @@ bool IsCopied(const SchemaEntry& entry) {
   return true;
 }
 
-// The program that made the other database finds its own version here.
+// So that the program that made the other database finds its own version here.
 void CopyVersion(SqliteConnection* database) {
   int64_t version = 0;
   {
@@ -81,8 +81,9 @@ bool HasInputs(const std::string& early_path, const std::string& inputs) {
   return statement.Step() && statement.Text(0) == inputs;
 }
 
-// Ends with the connection, unless committed. Unlike SqliteTransaction it does
-// not keep the extraction from writing to the attached database.
+// The transaction ends with the connection, unless committed. Unlike
+// SqliteTransaction, it does not block the extraction's writing to the attached
+// database.
 void BeginReadingOther(SqliteConnection* database) {
   database->Execute("BEGIN DEFERRED");
 }
@@ -98,7 +99,7 @@ int MoveMatches(const std::string& early_path,
   Attach(early_path, &database);
   SqliteTransaction transaction(&database);
   for (const char* table : kMatchTables) {
-    // A pair that lacks one of both is half written.
+    // A pair with a row in only one of the tables is incomplete.
     database.Execute(
         std::string("INSERT OR IGNORE INTO main.") + table +
         " SELECT * FROM other." + table +
@@ -209,7 +210,7 @@ StatusOr<int> TakeEarlyMatches(const std::string& early_path,
       num_pairs = MoveMatches(early_path, database_path);
     }
   } catch (const SqliteError&) {
-    // Of another COLMAP's form, say: these pairs are matched once more.
+    // For example another COLMAP's form: these pairs are matched again.
   }
   const Status removed = RemoveEarlyDatabase(early_path);
   if (!removed.ok()) return removed;

@@ -12,17 +12,17 @@ namespace adasfm {
 
 // A database beside that of the workspace, in which pairs are matched while
 // features are still being written to the other one: COLMAP's classes and
-// programs do not wait for each other's transactions. It holds the same cameras
-// and images, in the form that the host gave them, the features of the images
-// at hand, and the matches so far.
+// programs do not wait for each other's transactions. It contains the same
+// cameras and images, in the host's form, the features of the images in
+// progress, and the matches so far.
 
 inline std::string EarlyDatabasePath(const std::string& workspace_path) {
   return workspace_path + "/early.db";
 }
 
-// Makes it, unless it is there with the same inputs: a text that tells what the
-// matches depend on. Whole, or not at all. Throws SqliteError, also when
-// reading would keep the host from writing.
+// Creates the early database, unless it exists with the same inputs: a text of
+// all that the matches depend on. Creates it completely or not at all. Throws
+// SqliteError, also when reading would block the host's writing.
 void OpenEarlyDatabase(const std::string& database_path,
                        const std::string& inputs,
                        const std::string& early_path);
@@ -36,7 +36,7 @@ class EarlyFeatures {
 
   // The images with keypoints and descriptors in the workspace's database.
   std::set<image_t> FindReady();
-  // Has the early one hold the features of these images and no others.
+  // Makes the early database contain the features of exactly these images.
   void Hold(const std::set<image_t>& image_ids);
 
  private:
@@ -44,9 +44,9 @@ class EarlyFeatures {
 };
 
 // Moves the matches and two-view geometries into the workspace's database and
-// removes the early one. Returns the number of pairs: 0 if there is no early
-// database, or one of other inputs or another COLMAP's. What is in the
-// workspace's database already stays.
+// removes the early one. Returns the number of pairs: 0 without an early
+// database, and for one with other inputs or of another COLMAP. Existing rows
+// of the workspace's database stay.
 StatusOr<int> TakeEarlyMatches(const std::string& early_path,
                                const std::string& inputs,
                                const std::string& database_path);

@@ -16,17 +16,17 @@
 namespace adasfm {
 namespace {
 
-// Bounds the wait for the pairs at hand when the features are done.
+// Bounds the time until the pairs in progress are done when extraction ends.
 constexpr size_t kMaxNumPairs = 500;
 constexpr std::chrono::milliseconds kPollInterval(500);
 
-// The extraction goes first, as what is ready depends on it: the threads and
-// programs that this thread starts get a third of the time that its threads
-// get, and all that these leave. Lower, and the pairs at hand would be waited
-// for on a machine that does other work.
+// The extraction has priority, since the matching depends on it: the threads
+// and programs that this thread starts get a third of the time of the
+// extraction's threads, and all idle time. With a lower priority the pairs in
+// progress would delay the end on a machine that does other work.
 void LowerPriorityOfThread() {
 #ifdef __linux__
-  // Of the calling thread only.
+  // Affects the calling thread only.
   if (nice(5) == -1) return;
 #endif
 }
@@ -58,11 +58,11 @@ EarlyMatcher::~EarlyMatcher() {
 }
 
 void EarlyMatcher::Start() {
-  if (thread_.joinable()) return;
+  if (thread_.joinable() || !IsRunning()) return;
   try {
     thread_ = std::thread([this] { Run(); });
   } catch (const std::system_error&) {
-    // No thread is left; the next call may get one.
+    // The system has no thread left; the next call may succeed.
   }
 }
 
@@ -108,7 +108,7 @@ Status EarlyMatcher::Work() {
   const StatusOr<PairSelection> selection = SelectPairs(options, path);
   if (!selection.ok()) return selection.status();
   std::vector<ImagePair> remaining = selection->pairs;
-  // The host's program is let finish what it was given.
+  // The host's program may finish the pairs that it was given.
   const auto stop_if_told = [this](const std::string&, double share_done) {
     const std::lock_guard<std::mutex> lock(mutex_);
     if (state_ == State::kStopping) throw Interruption();

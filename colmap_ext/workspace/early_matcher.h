@@ -19,54 +19,55 @@ struct EarlyMatchingRequest {
   PairSelectionOptions pairs;
   bool guided_matching = false;
   std::string database_path;
-  // Of the database beside it, and the text that tells what the matches depend
-  // on (early_database.h).
+  // Path of the early database, and the text of all that the matches depend on
+  // (early_database.h).
   std::string early_path;
   std::string inputs;
   std::string log_path;
-  // Writes what the logs tell of the motion into a database; empty: no logs.
+  // Imports priors of the motion logs into a database; empty: no logs.
   std::function<Status(const std::string& database_path)> import_priors;
-  // Fewer pairs are left until more are ready: starting the host's program
-  // takes a second.
+  // Waits for more pairs below this number: starting the host's program takes a
+  // second.
   size_t min_num_pairs = 100;
 };
 
 // Matches pairs whose images are ready while features of others are being
-// extracted, on what the extraction leaves idle of the machine: the processor
-// while a GPU extracts or photos come from a slow disk.
+// extracted, on idle resources of the machine: the processor while a GPU
+// extracts or photos come from a slow disk.
 // Inputs: the pairs that are known without features: neighbours in time, and
-// those that the odometry predicts. They are among those that are matched
-// afterwards, so that the result is the same with and without.
-// Method: a thread of low priority, which copies the features that are ready
-// into the early database and matches there.
-// On failure it ends and says nothing: the matching afterwards does what is
-// missing, and says what is wrong.
+// those that the odometry predicts. The later matching includes these pairs, so
+// that the result is the same with and without this class.
+// Method: a thread of low priority copies the features that are ready into the
+// early database and matches there.
+// On failure it ends without a message: the later matching does what is missing
+// and reports the error.
 class EarlyMatcher {
  public:
   explicit EarlyMatcher(EarlyMatchingRequest request)
       : request_(std::move(request)) {}
-  // Ends the work; what is finished stays in the early database.
+  // Stops the work; finished work stays in the early database.
   ~EarlyMatcher();
   EarlyMatcher(const EarlyMatcher&) = delete;
   EarlyMatcher& operator=(const EarlyMatcher&) = delete;
 
-  // To be called when features have been written: from then on the host has the
-  // workspace's database open, and in its own form. Further calls do nothing.
+  // Call this when features have been written: the host then has the
+  // workspace's database open, in its own form. Further calls do nothing.
   void Start();
 
-  // Waits for the pairs at hand, and begins no others.
+  // Waits for the pairs in progress and starts no others.
   void Finish();
 
-  // Pairs matched along their predicted epipolar lines; after Finish.
+  // Number of pairs matched along their predicted epipolar lines; call after
+  // Finish.
   int NumGuided() const { return num_guided_; }
 
  private:
-  // Finishing lets the pairs at hand be finished, stopping does not.
+  // kFinishing completes the pairs in progress, kStopping does not.
   enum class State { kRunning, kFinishing, kStopping };
 
   void Run();
   Status Work();
-  // Until there is something to do; false when it is over.
+  // Waits until there is work; false when there will be none.
   bool WaitForPairs(std::vector<ImagePair>* remaining,
                     std::vector<ImagePair>* batch);
   bool IsRunning();

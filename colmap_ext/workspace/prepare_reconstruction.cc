@@ -15,7 +15,7 @@
 namespace adasfm {
 namespace {
 
-// Writes a file unless it is there with this text.
+// Writes a file unless it already has this text.
 Status WriteIfChanged(const std::string& path, const std::string& text) {
   std::ostringstream old;
   old << std::ifstream(path, std::ios::binary).rdbuf();
@@ -43,7 +43,7 @@ Status ApplyLayout(AutomaticReconstructionOptions* options,
   if (paths->image_times_path.empty()) {
     paths->image_times_path = layout->image_times_path;
   }
-  // What is bridged in a log of 200 Hz is a period of one of 10 Hz.
+  // A gap of a log of 200 Hz may be a normal period of a log of 10 Hz.
   double& max_gap_s = options->priors.estimation.max_imu_gap_s;
   max_gap_s = std::max(max_gap_s, 2.5 * layout->imu_period_s);
   const auto write = [paths](const std::string& name, const std::string& text,
@@ -58,7 +58,7 @@ Status ApplyLayout(AutomaticReconstructionOptions* options,
   return write("sensors.yaml", layout->sensors_text, &paths->sensors_path);
 }
 
-// Of the calibration of the sensors, where nobody says another one.
+// Uses the camera of the sensors' calibration, unless the user gave one.
 Status UseSensorsCamera(const std::string& sensors_path,
                         FeatureOptions* features) {
   if (sensors_path.empty() || !features->camera_params.empty() ||
@@ -106,15 +106,15 @@ Status PrepareReconstruction(AutomaticReconstructionOptions* options,
   options->pairs.descriptors.num_threads = options->num_threads;
   options->global.num_threads = options->num_threads;
   options->map.stage.num_threads = options->num_threads;
-  // EXIF's focal length may be off by a third, and says nothing of distortion;
-  // a calibration is left alone.
+  // EXIF's focal length may be wrong by a third, and EXIF has no distortion. A
+  // given calibration is not changed.
   const bool refine = options->refine_intrinsics < 0
                           ? options->features.camera_params.empty()
                           : options->refine_intrinsics == 1;
   options->map.refine_focal_length = refine;
   options->map.refine_extra_params = refine;
-  // Under intrinsics that are not right yet, epipolar lines would take most of
-  // the good matches away.
+  // With wrong intrinsics, the epipolar distances would remove most of the good
+  // matches.
   options->global.refinement.enabled = !refine;
   return Status::Ok();
 }

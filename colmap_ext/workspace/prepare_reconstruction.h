@@ -6,10 +6,10 @@
 
 namespace adasfm {
 
-// Takes from the recording (paths->data_format) what the user did not give,
-// writing the calibration and times that it has in other forms into the
-// workspace, and settles the options that follow from the input: threads for
-// all stages, and the refinement of intrinsics that nobody has calibrated.
+// Takes what the user did not give from the recording (paths->data_format);
+// writes its calibration and times, where they have other forms, into the
+// workspace. Sets the options that follow from the input: threads for all
+// stages, and the refinement of uncalibrated intrinsics.
 Status PrepareReconstruction(AutomaticReconstructionOptions* options,
                              AutomaticReconstructionPaths* paths);
 

@@ -55,9 +55,9 @@ Status Reconstructor::ExtractAll(const std::vector<std::string>& names) {
 }
 
 bool Reconstructor::CanMatchEarly() const {
-  // With a number of threads given, the rest of the machine is not ours. One
-  // GPU has enough to do with the features, and the host's matcher inside says
-  // on std::cout what it does, as the extraction does.
+  // A given number of threads forbids using the rest of the machine. Extraction
+  // already occupies a single GPU, and the host's internal matcher prints on
+  // std::cout, as the extraction does.
   const FeatureOptions& features = options_.features;
   const bool matches_here = !UsesGpu(features) && features.matcher == "adasfm";
   return options_.num_threads == -1 && (UsesHostProgram() || matches_here);
@@ -107,7 +107,8 @@ Status Reconstructor::ExtractRegistered(const ProgressCallback& progress) {
 }
 
 Status Reconstructor::Features() {
-  // The workspace may lie among the photos, or the photos of a bag in it.
+  // The workspace may be inside the folder of photos, or a bag's photos inside
+  // it.
   const StatusOr<std::vector<std::string>> names = ListFilesRecursively(
       paths_.image_path, HasRecording() ? "" : paths_.workspace_path);
   if (!names.ok()) return names.status();
@@ -133,7 +134,7 @@ Status Reconstructor::Features() {
 
 StatusOr<StepInputs> Reconstructor::MatchingInputs() const {
   const PairSelectionOptions& pairs = options_.pairs;
-  // The odometry has a say in the pairs.
+  // The odometry affects the selection of pairs.
   StatusOr<StepInputs> inputs = DigestSensors();
   if (!inputs.ok()) return inputs.status();
   const StatusOr<StepInputs> descriptors =

@@ -26,7 +26,7 @@ StatusOr<PriorImport> Reconstructor::Import(
 }
 
 StatusOr<StepInputs> Reconstructor::DigestSensors() const {
-  // "database" is no file.
+  // "database" is not a file.
   const bool has_stored_positions = paths_.gnss_path == "database";
   StatusOr<StepInputs> inputs =
       DigestPaths({{"image_times", paths_.image_times_path},

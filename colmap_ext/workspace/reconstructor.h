@@ -7,19 +7,19 @@
 #include <vector>
 
 #include "colmap_ext/io/folder_lock.h"
-#include "colmap_ext/io/step_journal.h"
+#include "colmap_ext/io/run_manifest.h"
 #include "colmap_ext/workspace/automatic_reconstruction.h"
 #include "core/progress.h"
 #include "core/status.h"
 
 namespace adasfm {
 
-// Steps whose files are replaced have nothing to remove beforehand.
+// For steps that replace their files and so have nothing to remove beforehand.
 inline Status KeepAll() { return Status::Ok(); }
 
-// The steps of ReconstructAutomatically (automatic_reconstruction.h), each of
-// which the journal of the workspace does once. The recording's, the features'
-// and matches', and the priors' stand in files of their own (reconstruct_*.cc).
+// The steps of ReconstructAutomatically (automatic_reconstruction.h). The
+// workspace's manifest runs each step once. The steps of recording, features
+// and matches, and priors are in their own files (reconstruct_*.cc).
 class Reconstructor {
  public:
   Reconstructor(const AutomaticReconstructionOptions& options,
@@ -34,8 +34,8 @@ class Reconstructor {
   StatusOr<AutomaticReconstructionResult> Run();
 
  private:
-  // The shares of the steps in the time of all; with CPU features matching is
-  // most of it.
+  // The steps' intervals of the total progress; with features on the CPU,
+  // matching takes most of the time.
   struct Range {
     double begin;
     double end;
@@ -62,23 +62,23 @@ class Reconstructor {
   }
 
   Status RunStep(const std::string& name, const StepInputs& inputs,
-                 const StepJournal::StepActions& actions);
+                 const RunManifest::StepActions& actions);
 
   Status Prepare();
-  // Photos are taken out of a file first.
+  // Whether photos are extracted from a bag or video first.
   bool HasRecording() const {
     return !paths_.bag_path.empty() || !paths_.video_path.empty();
   }
   Status Bag();
   Status Video();
-  // Does a step that takes photos out of a file.
+  // Runs the step that extracts photos from a bag or video.
   Status RunExtraction(
       const StepInputs& inputs,
       const std::function<StatusOr<BagExtraction>(const std::string&)>&
           extract);
   Status Features();
   Status ExtractAll(const std::vector<std::string>& names);
-  // Matches what it can while they are extracted.
+  // Extracts features and matches pairs at the same time where possible.
   Status ExtractRegistered(const ProgressCallback& progress);
   bool CanMatchEarly() const;
   StatusOr<StepInputs> MatchingInputs() const;
@@ -91,15 +91,15 @@ class Reconstructor {
   }
   StatusOr<StepInputs> DigestSensors() const;
   StatusOr<PriorImport> Import(const std::string& database_path) const;
-  // Before the matching, without the photos' rotations: for the choice of
-  // pairs, and so that faults of the logs are known before the long work. A run
-  // that goes on takes what is there, so that it chooses the same pairs.
+  // Imports before the matching, without two-view rotations: for the selection
+  // of pairs, and to find faults of the logs before the long work. A continued
+  // run keeps existing priors, so that it selects the same pairs.
   Status ImportForPairs(const std::string& database_path) const;
   Status Coarse();
   Status Model();
   Status Report();
   Status ReadVerdict();
-  // A model and its summary in a folder of the workspace.
+  // Checks a model and its summary in a folder of the workspace.
   Status CheckResult(const std::string& folder) const;
 
   AutomaticReconstructionOptions options_;
@@ -108,8 +108,8 @@ class Reconstructor {
   const MessageCallback& message_;
   std::string database_path_;
   std::shared_ptr<FolderLock> lock_;
-  StepJournal journal_;
-  // Of the pairs matched while features were extracted.
+  RunManifest manifest_;
+  // Guided pairs that were matched while features were extracted.
   int num_guided_early_ = 0;
   AutomaticReconstructionResult result_;
 };

@@ -58,7 +58,7 @@ void UseBagFiles(const BagFiles& files, AutomaticReconstructionOptions* options,
   fill(files.gnss_path, &paths->gnss_path);
   fill(files.sensors_path, &paths->sensors_path);
   FeatureOptions& features = options->features;
-  // One topic is one camera.
+  // One topic has one camera.
   if (features.single_camera == -1) features.single_camera = 1;
   if (!features.camera_params.empty() || files.camera.params.empty()) return;
   features.camera_model = files.camera.model;

@@ -4,23 +4,24 @@
 #include <string>
 
 #include "colmap_ext/bags/extract_video.h"
-#include "colmap_ext/io/step_journal.h"
+#include "colmap_ext/io/run_manifest.h"
 #include "colmap_ext/workspace/automatic_reconstruction.h"
 #include "core/status.h"
 
 namespace adasfm {
 
-// A bag or a video that photos are taken out of.
+// A bag or a video from which photos are extracted.
 
-// What the files of a bag depend on. A bag of gigabytes is told by its size.
+// Inputs of a bag's extraction. The bag itself is identified by names and
+// sizes.
 StatusOr<StepInputs> DigestBag(const std::string& path,
                                const BagExtractionOptions& options);
 
-// The same of a video, but for its wheel log.
+// The same for a video, without its wheel log.
 StepInputs DigestVideo(const std::string& path,
                        const VideoExtractionOptions& options);
 
-// Fills the paths and the camera that the user has not given.
+// Sets the paths and the camera that the user has not given.
 void UseBagFiles(const BagFiles& files, AutomaticReconstructionOptions* options,
                  AutomaticReconstructionPaths* paths);
 

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "colmap_ext/database/prior_corrections.h"
+#include "colmap_ext/database/prior_tables.h"
 #include "colmap_ext/workspace/early_database.h"
 #include "core/sqlite.h"
 
@@ -20,7 +21,7 @@ Status Remove(const std::string& path) {
   return Status::Error("cannot remove " + path + ": " + error.message());
 }
 
-// All statements and the rest, or nothing.
+// Executes all statements and `rest` in one transaction.
 Status Execute(const std::string& database_path,
                const std::vector<std::string>& statements,
                void (*rest)(SqliteConnection*)) {
@@ -60,15 +61,7 @@ Status ResetMatches(const std::string& database_path) {
 Status ResetPriors(const std::string& database_path) {
   const Status status = Remove(database_path + ".priors.json");
   if (!status.ok()) return status;
-  return Execute(database_path,
-                 {"DROP TABLE IF EXISTS adasfm_image_times",
-                  "DROP TABLE IF EXISTS adasfm_relative_pose_priors",
-                  "DROP TABLE IF EXISTS adasfm_gravity",
-                  "DROP TABLE IF EXISTS adasfm_position_priors",
-                  "DROP TABLE IF EXISTS adasfm_gyroscope_bias",
-                  "DROP TABLE IF EXISTS adasfm_length_drift",
-                  "DROP TABLE IF EXISTS adasfm_inertial_motions"},
-                 RemovePriorCorrections);
+  return Execute(database_path, {}, RemovePriorTables);
 }
 
 }  // namespace adasfm

@@ -7,13 +7,14 @@
 
 namespace adasfm {
 
-// Removing what steps of the automatic reconstruction left under other inputs.
+// Remove results of steps of the automatic reconstruction for other inputs.
 
-// The workspace's database, and all that was made from it.
+// The workspace's database, and all results made from it.
 Status ResetFeatures(const std::string& workspace_path);
-// Matches and two-view geometries, with what adasfm_global kept of them.
+// Matches and two-view geometries, with the backups and corrections of
+// adasfm_global.
 Status ResetMatches(const std::string& database_path);
-// The tables that adasfm_prior_importer made and adasfm_global corrected, and
+// Tables of adasfm_prior_importer with the corrections of adasfm_global, and
 // the importer's summary.
 Status ResetPriors(const std::string& database_path);
 

@@ -17,8 +17,8 @@
 namespace adasfm {
 namespace {
 
-// Clusters between two segments that are tested for consistency, the heaviest
-// ones: two million cycles, some seconds. Others are not confirmed.
+// Number of clusters between two segments that are tested for consistency,
+// heaviest first: two million cycles, some seconds. Others are not confirmed.
 constexpr size_t kMaxNumClusters = 2000;
 
 // A pair from image i to image j, indices of ViewGraph::images; i lies in the
@@ -32,8 +32,8 @@ struct Closure {
 // Pairs between the same two windows of images.
 struct ClosureCluster {
   std::vector<int> edges;
-  // Those that the odometry does not contradict, and the best of them: with a
-  // length if there are any, with most inliers.
+  // Number of edges that the odometry does not contradict, and the best of
+  // these: with a length if there are any, with most inliers.
   int num_kept = 0;
   int best_edge = -1;
   Closure best;
@@ -85,7 +85,7 @@ class LoopClosureFilter {
                         segments_.segment_of[graph_.IndexOf(edge.image_id2)]});
   }
 
-  // 1.
+  // Rule 1 of FilterLoopClosures.
   void TestPairsByOdometry() {
     removals_.assign(graph_.edges.size(), EdgeRemoval::kKept);
     for (size_t e = 0; e < graph_.edges.size(); ++e) {
@@ -162,7 +162,7 @@ class LoopClosureFilter {
     return num_changed;
   }
 
-  // 2.
+  // Rule 2.
   void Vote(const ClosureCluster& cluster) {
     ++report_.num_clusters;
     if (2 * cluster.num_kept > static_cast<int>(cluster.edges.size())) {
@@ -174,7 +174,7 @@ class LoopClosureFilter {
         Change(cluster, EdgeRemoval::kKept, EdgeRemoval::kFalseLoop);
   }
 
-  // 3.
+  // Rule 3.
   void FilterBetween(const std::pair<int, int>& segments,
                      std::vector<ClosureCluster> clusters) {
     clusters.erase(std::remove_if(clusters.begin(), clusters.end(),
@@ -209,7 +209,7 @@ class LoopClosureFilter {
     }
   }
 
-  // Of the second segment's unit in that of the first.
+  // 1 sigma of the log ratio of both segments' units.
   double UnitLogSigma(const std::pair<int, int>& segments) const {
     return segments_.is_metric[segments.first] &&
                    segments_.is_metric[segments.second]
@@ -217,8 +217,8 @@ class LoopClosureFilter {
                : options_.unit_log_sigma;
   }
 
-  // All of them for photos in any order, which have no odometry that could
-  // tell.
+  // All clusters where they are not to be split, such as photos in any order,
+  // which have no odometry to test them.
   std::vector<int> FindSet(const std::pair<int, int>& segments,
                            const std::vector<ClosureCluster>& clusters) const {
     const size_t size = std::min(clusters.size(), kMaxNumClusters);
@@ -239,8 +239,8 @@ class LoopClosureFilter {
     return FindConsistentSet(is_consistent, weights);
   }
 
-  // The cycle through both closures and the odometry at both of their ends, by
-  // its chi-square.
+  // Chi-square test of the cycle through both closures and the odometry at both
+  // of their ends.
   bool AreConsistent(const Closure& a, const Closure& b,
                      double unit_log_sigma) const {
     const auto image = [this](int index) { return graph_.images[index]; };

@@ -24,10 +24,10 @@ struct TrajectoryOdometry {
   std::vector<RelativePosePrior> priors;
 };
 
-// Two segments that loop closures could join, with nothing to confirm them: the
-// two places may only look alike.
+// Two segments that loop closures could join, but that nothing confirms:
+// possibly perceptual aliasing.
 struct UnconfirmedClosure {
-  // The pair with most inliers, and how many there are.
+  // The pair with the most inliers, and the number of pairs.
   image_t image_id1 = kInvalidImageId;
   image_t image_id2 = kInvalidImageId;
   int num_pairs = 0;
@@ -42,33 +42,35 @@ struct LoopClosureReport {
   int num_false_clusters = 0;
   int num_pairs_of_false_clusters = 0;
   int num_segments = 0;
-  // Two segments each.
+  // Each one joins two segments.
   int num_confirmed_closures = 0;
   std::vector<UnconfirmedClosure> unconfirmed_closures;
-  // Whether these were removed (split_unconfirmed_closures).
+  // Whether unconfirmed closures were removed (split_unconfirmed_closures).
   bool segments_were_split = false;
   int num_pairs_of_unconfirmed_closures = 0;
 };
 
-// What: removes false loop closures (perceptual aliasing).
-// Inputs: the odometry; the graph, with a relative pose and its sigmas for each
-// edge (rad; directions without a length are unit vectors).
-// Method:
-// 1. a pair whose chi-square against the odometry true pairs seldom exceed
-//    contradicts it (kOdometryPose; kOdometry for loop closures);
-// 2. within a trajectory segment each cluster of loop closures, pairs between
-//    the same two windows of images, votes: when most contradict, all go
-//    (kFalseLoop); when most do not, those that do have a wrong pose of a true
-//    place (kOdometryPose);
-// 3. between two segments no odometry contradicts. Pairs that are inconsistent
-//    with the best one of their cluster go, those outside of a heavy pairwise
-//    consistent set of clusters, and all of them unless it holds two places
-//    beyond a turn from each other at both ends (kUnconfirmedClosure): a single
-//    place always fits, and a straight street that looks alike all along fits
-//    everywhere. Off with split_unconfirmed_closures.
-// What holds each rule, and what was tried beside: docs/reference/global.md,
-// False loop closures. On failure: throws std::invalid_argument for invalid
-// options, or where there is not one length per edge.
+// Removes false loop closures (perceptual aliasing). graph: with a relative
+// pose and its sigmas for each edge (rad; directions without a length are unit
+// vectors).
+// 1. A pair whose chi-square against the odometry exceeds what true pairs
+//    seldom exceed contradicts the odometry (kOdometryPose; kOdometry for loop
+//    closures).
+// 2. Within a trajectory segment each cluster of loop closures (pairs between
+//    the same two windows of images) votes. When at least half of its pairs
+//    contradict the odometry, the others are removed too (kFalseLoop).
+//    Otherwise the contradicting pairs have a wrong pose of a true place
+//    (kOdometryPose).
+// 3. Between two segments there is no odometry to contradict pairs. Pairs are
+//    removed that are inconsistent with the best pair of their cluster, or
+//    whose cluster is outside of a pairwise consistent set of large weight. All
+//    are removed unless this set contains two places that are separated by a
+//    turn at both ends (kUnconfirmedClosure): a single place always fits, and a
+//    straight street that looks alike all along fits everywhere. Off without
+//    split_unconfirmed_closures.
+// Evidence for each rule and alternatives: docs/reference/global.md, False loop
+// closures. Throws std::invalid_argument for invalid options, or where there is
+// not one length per edge.
 LoopClosureReport FilterLoopClosures(const LoopClosureOptions& options,
                                      const TrajectoryOdometry& odometry,
                                      ViewGraph* graph);

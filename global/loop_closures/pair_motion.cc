@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "core/so3.h"
+#include "global/odometry/uncertain_motion.h"
 
 namespace adasfm {
 namespace {
@@ -13,13 +14,6 @@ namespace {
 using Vector6d = Eigen::Matrix<double, 6, 1>;
 using Matrix6d = Eigen::Matrix<double, 6, 6>;
 using Translation = PairMotion::Translation;
-
-Eigen::Matrix3d TranslationCovariance(const Eigen::Vector3d& direction,
-                                      double along, double across) {
-  const Eigen::Matrix3d along_part = direction * direction.transpose();
-  return along * along * along_part +
-         across * across * (Eigen::Matrix3d::Identity() - along_part);
-}
 
 ChiSquare ComputeChiSquare(const Vector6d& error, const Matrix6d& covariance,
                            int dof) {
@@ -58,7 +52,7 @@ PairMotion PairMotion::Inverse() const {
 PairMotion MeasurePair(const LoopClosureOptions& options,
                        const ViewGraphEdge& edge,
                        const std::optional<EdgeLength>& length, double unit) {
-  // What a place is wide, where centres are one as far as vision can tell.
+  // 1 sigma of a position, as a ratio of `unit`; closer centres look like one.
   constexpr double kPositionSigmaRatio = 0.06;
   const double floor = kPositionSigmaRatio * unit;
   const double angle = DegToRad(options.pair_angle_sigma_deg);
@@ -69,7 +63,7 @@ PairMotion MeasurePair(const LoopClosureOptions& options,
       rotation_sigma * rotation_sigma * Eigen::Matrix3d::Identity();
   auto translation_covariance =
       pair.motion.covariance.bottomRightCorner<3, 3>();
-  // Without a baseline the direction says nothing.
+  // Without a baseline the direction means nothing.
   if (!edge.has_translation || !edge.has_baseline) return pair;
   const Eigen::Vector3d direction =
       edge.cam2_from_cam1.translation.normalized();
@@ -77,12 +71,12 @@ PairMotion MeasurePair(const LoopClosureOptions& options,
   if (!length.has_value()) {
     pair.translation = Translation::kDirection;
     pair.motion.cam2_from_cam1.translation = direction;
-    translation_covariance = TranslationCovariance(direction, 0.0, across);
+    translation_covariance = CovarianceAlong(direction, 0.0, across);
     return pair;
   }
   pair.translation = Translation::kFull;
   pair.motion.cam2_from_cam1.translation = length->length * direction;
-  translation_covariance = TranslationCovariance(
+  translation_covariance = CovarianceAlong(
       direction,
       std::hypot(length->length * std::hypot(options.pair_length_log_sigma,
                                              length->log_sigma),
@@ -110,7 +104,7 @@ ChiSquare TestPair(const PairMotion& pair, const UncertainMotion& predicted,
     translation *= length;
     covariance.bottomRows<3>() *= length;
     covariance.rightCols<3>() *= length;
-    // A pair that points away has no length that fits.
+    // No positive length fits a pair that points away.
     if (length > 0.0) {
       dof = 5;
       const double unknown = 1e3 * length;

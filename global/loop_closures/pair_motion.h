@@ -15,12 +15,12 @@ struct ChiSquare {
   double value = 0.0;
   int dof = 0;
 
-  // With which probability a value is larger; 1 without degrees of freedom.
+  // Probability of a larger value; 1 without degrees of freedom.
   double Probability() const;
 };
 
 // The relative pose that a pair measures, with its covariance: the sigmas of
-// its edge, and at least those of the options.
+// its edge combined with those of the options.
 struct PairMotion {
   enum class Translation {
     kNone,       // rotation only; the value is 0
@@ -39,10 +39,11 @@ PairMotion MeasurePair(const LoopClosureOptions& options,
                        const ViewGraphEdge& edge,
                        const std::optional<EdgeLength>& length, double unit);
 
-// The difference of a pair and of what predicts it, with the covariances of
+// Tests the difference of a pair and its prediction, with the covariances of
 // both. has_position: of the prediction. A pair of unknown length gets the
 // length that fits best, so its direction alone is tested (2 degrees of
-// freedom); a rotation has 3 and a full translation 3.
+// freedom, 3 where no positive length fits); a rotation has 3 and a full
+// translation 3.
 ChiSquare TestPair(const PairMotion& pair, const UncertainMotion& predicted,
                    bool has_position);
 

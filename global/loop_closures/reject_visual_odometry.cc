@@ -10,10 +10,10 @@
 namespace adasfm {
 namespace {
 
-// An odometry edge is named by the chain's index of its later image. By edge,
-// the first one of its run.
+// By visual odometry edge, the first one of its run. An edge is named by the
+// chain's index of its later image.
 std::map<int, int> FindRuns(const OdometryChain& chain,
-                            const VisualSteps& steps,
+                            const VisualOdometryEdges& steps,
                             size_t num_sensor_priors) {
   std::set<int> edges;
   for (size_t k = num_sensor_priors; k < steps.priors.size(); ++k) {
@@ -34,11 +34,11 @@ struct Tally {
 
 }  // namespace
 
-int RejectVisualOdometry(const VisualStepOptions& options,
+int RejectVisualOdometry(const VisualOdometryOptions& options,
                          const LoopClosureOptions& loop_options,
                          const OdometryChainOptions& chain_options,
                          const ViewGraph& graph, size_t num_sensor_priors,
-                         VisualSteps* steps) {
+                         VisualOdometryEdges* steps) {
   const OdometryChain chain(steps->priors, chain_options);
   const std::map<int, int> run_of = FindRuns(chain, *steps, num_sensor_priors);
   std::map<int, Tally> tallies;  // by run

@@ -5,24 +5,23 @@
 
 #include "global/loop_closures/loop_closure_options.h"
 #include "global/odometry/odometry_chain.h"
-#include "global/odometry/visual_steps.h"
+#include "global/odometry/visual_odometry.h"
 #include "global/view_graph/view_graph.h"
 
 namespace adasfm {
 
 // Rejects visual odometry that its own pairs contradict: photos in any order
 // and a hand-held camera must exclude no pair, while a drive that was filmed in
-// order keeps its chain.
-// Inputs: steps->priors; those from num_sensor_priors on are by vision alone.
-// Method. A run is a sequence of visual odometry edges that follow each other.
-// It goes when more than options.max_contradicting_ratio of the pairs within
-// it, 2 to options.max_num_steps edges long, fail the chi-square test against
-// the chain.
-// Returns the number of odometry edges rejected. On failure: nothing to fail.
-int RejectVisualOdometry(const VisualStepOptions& options,
+// order keeps its chain. steps->priors from num_sensor_priors on are by vision
+// alone.
+// A run is a sequence of consecutive visual odometry edges. It is rejected when
+// more than options.max_contradicting_ratio of the pairs within it, 2 to
+// options.max_num_steps edges long, fail the chi-square test against the chain.
+// Returns the number of odometry edges rejected.
+int RejectVisualOdometry(const VisualOdometryOptions& options,
                          const LoopClosureOptions& loop_options,
                          const OdometryChainOptions& chain_options,
                          const ViewGraph& graph, size_t num_sensor_priors,
-                         VisualSteps* steps);
+                         VisualOdometryEdges* steps);
 
 }  // namespace adasfm

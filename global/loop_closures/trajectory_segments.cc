@@ -18,7 +18,7 @@ bool IsVisual(const ViewGraphEdge& edge) {
 void JoinSmallSegments(const ViewGraph& graph, DisjointSets* sets) {
   std::vector<int> num_images(graph.images.size(), 0);
   for (size_t i = 0; i < graph.images.size(); ++i) ++num_images[sets->Find(i)];
-  // Pairs, by small segment and other one.
+  // Number of pairs, by small and other segment.
   std::map<int, std::map<int, int>> num_shared;
   for (const ViewGraphEdge& edge : graph.edges) {
     if (!IsVisual(edge)) continue;
@@ -40,7 +40,7 @@ std::vector<int> CountHeadings(const LoopClosureOptions& options,
                                const OdometryChain& chain,
                                const ViewGraph& graph) {
   std::vector<int> heading_of(graph.images.size(), 0);
-  std::vector<std::pair<int, int>> order;  // in the chain, image
+  std::vector<std::pair<int, int>> order;  // index in the chain, image
   for (size_t i = 0; i < graph.images.size(); ++i) {
     const int index = chain.Index(graph.images[i]);
     if (index >= 0) order.emplace_back(index, i);

@@ -11,12 +11,13 @@
 
 namespace adasfm {
 
-// Smaller segments belong to that with which they share most pairs.
+// Smaller segments are joined to the segment with which they share the most
+// pairs.
 inline constexpr int kMinNumSegmentImages = 3;
 
-// The segments of a trajectory: images between which priors with a position, or
-// pairs of images that follow each other, lead from one to the next. All
-// vectors are in the order of ViewGraph::images.
+// The segments of a trajectory: images that are connected by priors with a
+// position or by pairs of images that follow each other. All vectors are in the
+// order of ViewGraph::images.
 struct TrajectorySegments {
   // The index of one image of the segment, the same for all of them.
   std::vector<int> segment_of;
@@ -26,8 +27,9 @@ struct TrajectorySegments {
   std::vector<bool> is_metric;
   // ViewGraph::CaptureRank.
   std::vector<int64_t> rank_of;
-  // Counts the turns of the odometry: a new heading begins where the camera
-  // looks min_turn_deg away from where it looked at the beginning of the last.
+  // Number of the image's heading in the odometry: a new heading begins where
+  // the rotation exceeds min_turn_deg since the last one began, and with each
+  // piece.
   std::vector<int> heading_of;
 };
 

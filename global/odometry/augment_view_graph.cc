@@ -11,8 +11,8 @@
 namespace adasfm {
 namespace {
 
-// A prior as an edge from the smaller to the larger id; nothing when an image
-// is missing or the prior spans too long a time.
+// A prior as an edge from the smaller to the larger id. False when an image is
+// missing, the motion is not known (IsKnownMotion) or a value is not finite.
 bool EdgeFromPrior(const AugmentationOptions& options,
                    const RelativePosePrior& prior, const ViewGraph& graph,
                    ViewGraphEdge* edge) {
@@ -36,8 +36,8 @@ bool EdgeFromPrior(const AugmentationOptions& options,
   }
   const double length = prior.cam2_from_cam1.translation.norm();
   if (prior.HasLength() && options.use_metric_lengths) edge->length_m = length;
-  // A standstill has a length (none) but no direction; only with the length
-  // kept does it say something.
+  // A standstill has length zero and no direction, and is useful only if the
+  // length is kept.
   constexpr double kMinLength = 1e-6;
   edge->has_translation = prior.HasRotation() && prior.HasDirection() &&
                           (length > kMinLength || edge->length_m.has_value());
@@ -100,7 +100,7 @@ int AddSensorEdges(const AugmentationOptions& options,
       added.push_back(edge);
       ++num_added;
     } else if (!graph->edges[existing].IsKept()) {
-      // Vision had something, but nothing useful.
+      // The visual edge was removed; the prior replaces it.
       edge.num_inliers = 0;
       graph->edges[existing] = edge;
       ++num_added;
@@ -139,7 +139,7 @@ int AugmentTranslations(const AugmentationOptions& options,
         edge->source = EdgeSource::kAugmented;
       }
     } else if (sensor.length_m.has_value() && edge->has_translation) {
-      // A speed alone: vision's direction, the sensor's length.
+      // The sensors give the length alone, vision the direction.
       edge->cam2_from_cam1.translation =
           edge->cam2_from_cam1.translation.normalized() * *sensor.length_m;
     } else {

@@ -10,10 +10,10 @@
 namespace adasfm {
 
 struct AugmentationOptions {
-  // Off: the plain visual graph; where vision has no edge it stays split.
+  // Off: the graph is purely visual, and stays split where vision has no edge.
   bool enabled = true;
-  // eps_T: priors over longer times take part only if they know the motion all
-  // the same (IsKnownMotion).
+  // eps_T: priors over longer times are used only if their covariance is small
+  // (IsKnownMotion).
   double max_prior_time_gap_s = 0.5;
   // Keep lengths in metres; otherwise unit vectors, as the paper does.
   bool use_metric_lengths = true;
@@ -21,11 +21,11 @@ struct AugmentationOptions {
   bool IsValid(std::string* error) const;
 };
 
-// Whether a prior may take part: eps_T stands for the error that grows with
-// time. A prior over a longer time, of a machine that takes a photo a second,
-// must show that it errs little by its covariance: each rotation by at most a
-// degree and, where there is one, the translation by at most a twentieth of its
-// length or 5 cm (1 sigma).
+// Whether a prior may be used. eps_T stands for the error that grows with time.
+// A prior over a longer time, of a machine that takes a photo a second, must
+// have a small covariance (1 sigma): at most a degree for each axis of the
+// rotation and, where there is a translation, the larger of 5 cm and a
+// twentieth of its length.
 bool IsKnownMotion(const AugmentationOptions& options,
                    const RelativePosePrior& prior);
 

@@ -13,10 +13,10 @@
 namespace adasfm {
 namespace {
 
-// Of a step that vision and the size tell.
+// 1 sigma of a step within a model of known scale, as a ratio.
 constexpr double kStepSigmaRatio = 0.02;
 constexpr size_t kMinNumImagesOfSide = 8;
-// Of a model whose size is found across a gap.
+// Largest sigma of a scale found across a gap.
 constexpr double kMaxFoundSizeSigma = 0.1;
 // Longer ones are known to metres only.
 constexpr double kMaxGapS = 20.0;
@@ -50,8 +50,7 @@ std::vector<DriveChain> FindChains(
   return chains;
 }
 
-// Which model each image is in; runs that are too short to tell a velocity are
-// in none.
+// Sets the model of each image; runs too short for a velocity have none.
 void LabelImages(const std::vector<SizedModel>& models, DriveChain* chain) {
   for (const image_t image_id : chain->images) {
     int label = kNoModel;
@@ -139,8 +138,8 @@ class GapBridger {
     return models_[chain.models[k]].scale.has_value();
   }
 
-  // Of a model across a gap from one whose size is known. False when there is
-  // no such model any more.
+  // Finds the scale of a model across a gap from one of known scale. False when
+  // there is none left.
   bool FindSize() {
     for (const DriveChain& chain : chains_) {
       for (const DriveGap& gap : FindGaps(chain)) {
@@ -160,7 +159,7 @@ class GapBridger {
     return false;
   }
 
-  // Within models.
+  // Sets the motions of steps within models.
   void AddSteps(const DriveChain& chain,
                 std::vector<RelativePosePrior>* priors) const {
     for (size_t k = 0; k < chain.priors.size(); ++k) {

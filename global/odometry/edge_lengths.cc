@@ -11,21 +11,26 @@
 namespace adasfm {
 namespace {
 
-// Starts every part of the graph that shares too few points with the others,
-// the edges with most matches first. Their units are tied by the depth of the
-// scene: its median is taken to be the same everywhere.
-void SeedParts(const EdgeLengthOptions& options, const ViewGraph& graph,
-               LengthPropagation* propagation) {
+// Edges that share at least this many keypoints come first; without metres,
+// images that these edges do not reach start a part with a unit of its own.
+constexpr int kNumSharedReliable = 20;
+// Passes over all edges after the first.
+constexpr int kNumSweeps = 3;
+
+// Seeds every part of the graph that shares too few points with the others, the
+// edges with most matches first. The units of the parts are tied by the median
+// depth of the scene, which is assumed to be the same everywhere.
+void SeedParts(const ViewGraph& graph, LengthPropagation* propagation) {
   std::vector<int> order(graph.edges.size());
   std::iota(order.begin(), order.end(), 0);
   std::stable_sort(order.begin(), order.end(), [propagation](int a, int b) {
     return propagation->NumMatches(a) > propagation->NumMatches(b);
   });
   for (const int e : order) {
-    if (propagation->NumMatches(e) < options.num_shared_reliable) break;
+    if (propagation->NumMatches(e) < kNumSharedReliable) break;
     if (propagation->TouchesKnown(e)) continue;
     propagation->Seed(e);
-    propagation->Spread(options.num_shared_reliable);
+    propagation->Spread(kNumSharedReliable);
   }
 }
 
@@ -33,12 +38,7 @@ void SeedParts(const EdgeLengthOptions& options, const ViewGraph& graph,
 
 bool EdgeLengthOptions::IsValid(std::string* error) const {
   return OptionChecker(error)
-      .Positive({{"min_parallax_deg", min_parallax_deg},
-                 {"max_log_sigma", max_log_sigma}})
       .AtLeast(1, "max_num_matches", max_num_matches)
-      .AtLeast(1, "min_num_shared", min_num_shared)
-      .AtLeast(min_num_shared, "num_shared_reliable", num_shared_reliable)
-      .AtLeast(0, "num_sweeps", num_sweeps)
       .AllHold();
 }
 
@@ -61,17 +61,17 @@ EdgeLengths EstimateEdgeLengths(
       if (start.lengths[e].has_value()) propagation.Start(e, *start.lengths[e]);
     }
   }
-  propagation.Spread(options.num_shared_reliable);
-  if (result.metric) propagation.Spread(options.min_num_shared);
+  propagation.Spread(kNumSharedReliable);
+  if (result.metric) propagation.Spread(LengthPropagation::kMinNumShared);
   std::vector<bool> is_by_depth(num_edges, false);
   for (size_t e = 0; result.metric && e < num_edges; ++e) {
     is_by_depth[e] = !propagation.IsKnown(e) || (e < start.lengths.size() &&
                                                  start.lengths[e].has_value() &&
                                                  start.lengths[e]->is_by_depth);
   }
-  SeedParts(options, graph, &propagation);
-  propagation.Spread(options.min_num_shared);
-  for (int i = 0; i < options.num_sweeps; ++i) propagation.Sweep();
+  SeedParts(graph, &propagation);
+  propagation.Spread(LengthPropagation::kMinNumShared);
+  for (int i = 0; i < kNumSweeps; ++i) propagation.Sweep();
   result.lengths.resize(num_edges);
   for (size_t e = 0; e < num_edges; ++e) {
     if (!propagation.IsKnown(e)) continue;

@@ -13,20 +13,8 @@
 namespace adasfm {
 
 struct EdgeLengthOptions {
-  // Matches with rays closer than this say nothing about depth.
-  double min_parallax_deg = 1.0;
   // Matches used per edge, those with the largest parallax.
   int max_num_matches = 150;
-  // Keypoints with known depth that an edge must share.
-  int min_num_shared = 5;
-  // Edges that share at least this many come first; without metres, images out
-  // of their reach start a part with a unit of its own.
-  int num_shared_reliable = 20;
-  // Lengths less certain than this (1 sigma of their logarithm) are not
-  // learned.
-  double max_log_sigma = 0.2;
-  // Passes over all edges after the first.
-  int num_sweeps = 3;
   int num_threads = -1;
 
   bool IsValid(std::string* error) const;
@@ -38,8 +26,9 @@ struct EdgeLength {
   double length = 0.0;
   // 1 sigma of log(length).
   double log_sigma = 0.0;
-  // No metres reach the edge, though there are some: the scene is taken to be
-  // as deep there as elsewhere, which is right within a factor of two or so.
+  // No metres reach the edge, though the graph has some. The scene is assumed
+  // to be as deep there as elsewhere, which is right within a factor of two or
+  // so.
   bool is_by_depth = false;
 };
 
@@ -49,12 +38,13 @@ struct EdgeLengths {
   bool metric = false;
 };
 
-// How long the visual edges are, through the points that they share: a keypoint
-// has one depth in its image, and each edge sees it as a multiple of its own
-// length. Metric lengths of the priors start it; without any
-// the depth of the scene sets the unit. So collinear centres, which directions
-// alone leave free, become solvable. known_lengths_m: of sensor edges. start:
-// lengths found before, of the same graph's edges, or none.
+// Estimates baseline lengths of two-view edges. A keypoint matched in several
+// edges has one depth; each edge measures it in units of its own baseline, so
+// ratios of depths are ratios of baselines. Metric lengths of the priors start
+// the estimation; without any the depth of the scene sets the unit. This
+// determines collinear centres, which directions alone leave free.
+// known_lengths_m: of sensor edges. start: lengths found before, of the same
+// graph's edges, or none.
 EdgeLengths EstimateEdgeLengths(
     const EdgeLengthOptions& options, const ViewGraph& graph,
     const std::map<ImagePair, double>& known_lengths_m,

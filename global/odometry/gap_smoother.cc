@@ -8,10 +8,10 @@ namespace adasfm {
 namespace {
 
 constexpr double kGravityMps2 = 9.81;         // m/s^2
-constexpr double kGravitySizeSigma = 0.02;    // of its size
+constexpr double kGravitySizeSigma = 0.02;    // m/s^2, of its magnitude
 constexpr double kBiasSigma = 0.3;            // m/s^2, an axis
 constexpr double kAccelerometerNoise = 0.03;  // m/s^2 sqrt(s)
-// Of the smoother, on each side: enough for the velocity, gravity and bias.
+// Duration on each side: enough for the velocity, gravity and bias.
 constexpr double kSideS = 5.0;
 constexpr size_t kMaxNumImagesOfSide = 50;
 
@@ -45,7 +45,7 @@ double GapSmoother::Seconds() const {
 }
 
 bool GapSmoother::Solve() {
-  // Which way gravity points the first solution tells.
+  // The first solution determines the direction of gravity.
   Eigen::Vector3d gravity = Eigen::Vector3d::Zero();
   for (int iteration = 0; iteration < 3; ++iteration) {
     BuildEquations(gravity);
@@ -176,8 +176,8 @@ void GapSmoother::AddMotion(size_t k) {
                {Bias(), -turn * motion.velocity_by_bias}},
               turn * motion.delta_velocity,
               kAccelerometerNoise * std::sqrt(dt));
-  // With the mean of both velocities, so that the noise of the velocity is
-  // not in it.
+  // Uses the mean of both velocities, so that the velocity's noise is not in
+  // the equation.
   AddEquation({{Position(k + 1), one},
                {Position(k), -one},
                {Velocity(k), -0.5 * dt * one},

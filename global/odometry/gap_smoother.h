@@ -22,7 +22,7 @@ namespace adasfm {
 
 inline constexpr int kNoModel = -1;
 
-// Images in a row, with a motion and a rotation from each to the next.
+// Consecutive images, with a motion and a rotation from each to the next.
 struct DriveChain {
   std::vector<image_t> images;
   std::vector<const InertialMotion*> motions;
@@ -32,23 +32,23 @@ struct DriveChain {
 };
 
 struct DriveGap {
-  // The last image before it and the first one behind it.
+  // The last image before the gap and the first one after it.
   size_t first = 0;
   size_t last = 0;
 };
 
-// A model in its own unit, and what the accelerometer tells of that.
+// A model in its own unit, and its scale where it is known.
 struct SizedModel {
   std::map<image_t, Rigid3d> cams_from_world;
   std::optional<InertialScale> scale;
 };
 
-// The way across one gap (docs/reference/math.md, Across a gap): the linear
+// Motion across one gap (docs/reference/math.md, Across a gap): the linear
 // smoother of BridgeGaps, in the frame of the model on the near side, in
-// metres. What it refers to must outlive it.
+// metres. The referenced arguments must outlive the object.
 class GapSmoother {
  public:
-  // Of an image's position in its model, an axis, m.
+  // 1 sigma of an image's position in its model, per axis, m.
   static constexpr double kPositionSigmaM = 0.01;
 
   GapSmoother(const std::vector<RelativePosePrior>& priors,
@@ -58,9 +58,9 @@ class GapSmoother {
   double Seconds() const;
   // False when the equations have no solution.
   bool Solve();
-  // Of the model on one side.
+  // Scale of the model on one side.
   InertialScale Scale(bool is_far) const;
-  // The translations of the steps of the gap, as of priors.
+  // The translations of the gap's steps, in the convention of priors.
   std::vector<MeasuredTranslation> Steps() const;
 
  private:
@@ -68,7 +68,7 @@ class GapSmoother {
   // Gravity, bias, place of the far side, size of the near and the far side.
   static constexpr int kNumShared = 11;
 
-  // Of an unknown.
+  // The coefficients of an unknown.
   using Factor =
       Eigen::Matrix<double, 3, Eigen::Dynamic, Eigen::ColMajor, 3, 3>;
 
@@ -104,25 +104,26 @@ class GapSmoother {
     return solution_.segment<3>(Position(k)) + Lever(k);
   }
 
-  // In the frame of the near side; the far side as the priors turn.
+  // In the frame of the near side; the priors connect the far side.
   void FindRotations();
-  // An equation in each axis: the blocks times these matrices add up to the
-  // value, but for this sigma.
+  // An equation in each axis: the factors times their unknowns add up to the
+  // value, with this sigma.
   void AddEquation(const std::vector<std::pair<int, Factor>>& blocks,
                    const Eigen::Vector3d& value, double sigma);
-  // gravity: its direction, zero while nothing tells it.
+  // gravity: gives its direction; zero while unknown.
   void BuildEquations(const Eigen::Vector3d& gravity);
   void AddSize(size_t side, int size);
   void AddMotion(size_t k);
-  // Of the way from one side to the other, in the frame of the near side. What
-  // the rotations err by tilts gravity, the more the longer the gap is.
+  // Covariance of the translation from one side to the other, in the frame of
+  // the near side. Errors of the rotations tilt gravity, the more the longer
+  // the gap is.
   Eigen::Matrix3d Covariance() const;
 
   const std::vector<RelativePosePrior>& priors_;
   const std::vector<SizedModel>& models_;
   const DriveChain& chain_;
   const DriveGap gap_;
-  // Of the smoother.
+  // The first and the last image of the smoother.
   size_t first_ = 0;
   size_t last_ = 0;
   std::vector<Eigen::Quaterniond> world_from_cams_;

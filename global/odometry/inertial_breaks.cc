@@ -12,12 +12,12 @@
 namespace adasfm {
 namespace {
 
-// Smaller ones are tears at weak places, which the mapper mends in part; a part
-// that was taken out is lost to the model.
+// Smaller jumps are tears at weak places, which the mapper mends in part; a
+// part that is removed is lost to the model.
 constexpr double kMinJumpM = 2.0;
-// Of the median; in the final models of eleven drives 99 % are within 5.
+// Ratio to the median; in the final models of eleven drives 99 % are within 5.
 constexpr double kMinRatio = 10.0;
-// Both neighbours tell one jump, by this share of it.
+// Largest difference of the jumps by both neighbours, as a share of the jump.
 constexpr double kMaxDisagreement = 0.25;
 constexpr size_t kMinNumImagesOfPart = 3;
 
@@ -72,10 +72,10 @@ std::vector<Interval> FindIntervals(
   return intervals;
 }
 
-// Between an interval and the next one, in metres and seconds.
+// The change from an interval to the next one, in metres and seconds.
 struct Change {
   bool known = false;
-  // Of velocity, less what the IMU integrated: gravity and errors.
+  // Change of velocity minus what the IMU integrated: gravity and errors.
   Eigen::Vector3d velocity = Eigen::Vector3d::Zero();
   double dt_s = 0.0;
 };
@@ -90,7 +90,7 @@ class Poses {
     return cams_from_world_.at(image_id).rotation.conjugate();
   }
 
-  // Mean velocity over an interval, and what the IMU adds to that at its start.
+  // Velocity at the start: the mean over the interval, corrected by the IMU.
   Eigen::Vector3d VelocityAtStart(const Interval& interval) const {
     const Eigen::Vector3d way = ImuPosition(interval.image_id2, interval) -
                                 ImuPosition(interval.image_id1, interval);
@@ -150,9 +150,9 @@ double RemoveGravity(std::vector<Change>* changes) {
   return UpperMedian(&errors);
 }
 
-// By which the model is longer across interval k than the accelerometer
-// allows; none where its neighbours do not agree. What is usual, m/s^2, grows
-// with the square of the time, as by a tilt.
+// The jump across interval k, in metres, by which the model's motion exceeds
+// the accelerometer's; none where the neighbours do not agree. The effect of
+// the usual error (m/s^2) grows with the square of the time, as by a tilt.
 std::optional<Eigen::Vector3d> FindJump(const std::vector<Interval>& intervals,
                                         const std::vector<Change>& changes,
                                         size_t k, double usual) {
@@ -171,7 +171,7 @@ std::optional<Eigen::Vector3d> FindJump(const std::vector<Interval>& intervals,
   return 0.5 * (before + after);
 }
 
-// Images that lie right against each other, and where they were moved to.
+// Images whose relative positions are right, and the offset of all of them.
 struct Place {
   Eigen::Vector3d offset_m = Eigen::Vector3d::Zero();
   std::set<image_t> images;

@@ -12,21 +12,24 @@
 
 namespace adasfm {
 
-// What: parts of a model without wheels that an accelerometer puts elsewhere.
-// Look-alikes that face the same way hold a part to a false place, and no
-// rotation contradicts; but nothing moves by 30 m in half a second.
+// Finds parts of a model without wheels whose place contradicts the
+// accelerometer. Aliased pairs that face the same way can fix a part at a false
+// place that no rotation contradicts; but nothing moves by 30 m in half a
+// second.
 //
-// Inputs: motions of consecutive images in order of time; priors, whose
-// rotations lead over images without a pose; poses in the model's unit.
-// Method. Between images in a row that have a pose, the velocities that both
-// neighbouring intervals tell must differ as the IMU integrated (with gravity
-// as the median of all). An interval across which both neighbours' velocities
-// miss the next image by one and the same jump, of more than 2 m and ten times
-// what is usual in this model for the time between, is a break; an image that
-// is wrong by itself gives no two equal jumps. Runs of images between breaks
-// whose jumps sum up to nothing lie in one place.
+// motions: of consecutive images in order of time. priors: their rotations are
+// used across images without a pose. cams_from_world: in the model's unit.
+//
+// For consecutive images with a pose, the velocities of both neighbouring
+// intervals must differ as the IMU integrated (with gravity as the median of
+// all). An interval is a break if the velocities of both neighbours miss the
+// next image by the same jump, of more than 2 m and ten times what is usual in
+// this model for the time between. An image that is wrong by itself gives no
+// two equal jumps. Runs of images between breaks whose jumps sum up to zero lie
+// in one place.
+//
 // Returns the images of each place but that of most images, the largest first;
-// nothing where the accelerometer does not tell the size
+// nothing where the accelerometer does not determine the scale
 // (EstimateInertialScale) and for places of fewer than 3 images.
 std::vector<std::set<image_t>> FindPartsByInertia(
     const std::vector<InertialMotion>& motions,

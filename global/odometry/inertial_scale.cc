@@ -12,36 +12,38 @@
 namespace adasfm {
 namespace {
 
-// Of a window: position and velocity at its start, and what its gravity is off.
+// Unknowns of a window: position and velocity at its start, error of its
+// gravity.
 constexpr int kNumLocal = 9;
-// Of all windows, in the unit of the centres: gravity, bias, units a metre.
+// Unknowns of all windows, in the centres' unit: gravity, bias, units per
+// metre.
 constexpr int kNumShared = 7;
 constexpr int kBias = 3;
 constexpr int kUnit = 6;
 constexpr double kGravitySigma = 0.1;            // m/s^2, of a window
 constexpr double kAccelerometerBiasSigma = 0.3;  // m/s^2
 constexpr double kGravity = 9.81;
-// By which share gravity and the rest of what was measured may be of two sizes.
+// Largest relative difference of the scales by gravity and by the other data.
 constexpr double kMaxGravityError = 0.1;
 constexpr double kMaxSigmaRatio = 0.2;
-// Of the scales of an accelerometer's axes, which nothing here sees.
+// 1 sigma of the scales of an accelerometer's axes, which the data do not
+// observe.
 constexpr double kScaleFactorSigma = 0.002;
-// A straight line through p0 and v0 takes two images, a curve with the size and
-// something left over some more.
+// p0 and v0 alone take two images, the scale and redundancy some more.
 constexpr int kMinNumImages = 5;
 constexpr double kMinShareOfWindow = 0.6;
-// Fewer do not tell what they err by.
+// Fewer windows do not determine their errors.
 constexpr size_t kMinNumWindows = 8;
 constexpr int kNumIterations = 20;
 
-// Its equations are in columns: shared unknowns, right-hand side, and its own
-// unknowns, which are eliminated.
+// Normal equations, in columns: shared unknowns, right-hand side, and the
+// window's own unknowns, which are eliminated.
 struct Window {
   int num_residuals = 0;
   Eigen::Matrix<double, kNumShared + 1 + kNumLocal, kNumShared + 1 + kNumLocal>
       squares = Eigen::Matrix<double, kNumShared + 1 + kNumLocal,
                               kNumShared + 1 + kNumLocal>::Zero();
-  // Without its own unknowns, for the present noise.
+  // With the own unknowns eliminated, for the present noise.
   Eigen::Matrix<double, kNumShared + 1, kNumShared + 1> reduced;
   double chi = 0.0;  // root mean square of the residuals
   double weight = 1.0;
@@ -136,7 +138,7 @@ std::vector<Window> BuildWindows(
   return windows;
 }
 
-// The size by windows of one length.
+// The scale by windows of one length.
 class ScaleSolver {
  public:
   explicit ScaleSolver(std::vector<Window> windows)
@@ -173,7 +175,7 @@ class ScaleSolver {
       residuals += information * window.chi * window.chi *
                    (window.num_residuals - kNumOwnDof);
     }
-    // By as much the unit is too small where the noise is all the IMU's.
+    // How much the unit would be too small if all noise were the IMU's.
     const double bias = unit * residuals / signal;
     InertialScale scale;
     scale.metres_per_unit = 1.0 / unit;
@@ -185,7 +187,7 @@ class ScaleSolver {
 
  private:
   static constexpr double kHeld = 1e6;
-  // Position and velocity, which nothing else is known of.
+  // Position and velocity, which have no prior.
   static constexpr int kNumOwnDof = 6;
 
   using Matrix = Eigen::Matrix<double, kNumShared, kNumShared>;
@@ -199,8 +201,8 @@ class ScaleSolver {
     return window.weight / (noise_ * noise_);
   }
 
-  // Adds what is believed of an acceleration, zero with this sigma (m/s^2), to
-  // the information that equations of this noise have of it; it is held at zero
+  // Adds the prior of an acceleration, zero with this sigma (m/s^2), to its
+  // information in equations of this noise. The acceleration is held at zero
   // until the unit is known.
   template <typename Diagonal>
   void HoldBack(double sigma, double noise, Diagonal information) const {
@@ -250,8 +252,8 @@ class ScaleSolver {
     }
   }
 
-  // What the solutions without one window each differ by. The residuals within
-  // a window are alike, so that their number says little.
+  // Spread of the solutions that leave out one window each. The residuals
+  // within a window are alike, so that their number is not meaningful.
   double JackknifeVariance() const {
     double sum = 0.0;
     for (const Window& window : windows_) {
@@ -277,8 +279,8 @@ class ScaleSolver {
   double variance_ = 0.0;  // of the units a metre
 };
 
-// All are of the same data: the mean is no better known than the best, and
-// worse by what they differ.
+// All scales are of the same data: the mean has the least of their sigmas, and
+// in addition their spread.
 InertialScale CombineScales(const std::vector<InertialScale>& scales) {
   double sum = 0.0, mean = 0.0, square = 0.0;
   for (const InertialScale& scale : scales) {

@@ -15,10 +15,14 @@ namespace adasfm {
 namespace {
 
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
-// Whose observations are there twice at a time.
+// Matches whose rays enclose a smaller angle do not constrain depth.
+constexpr double kMinParallaxRad = DegToRad(1.0);
+// Lengths less certain than this (1 sigma of their logarithm) are rejected.
+constexpr double kMaxLogSigma = 0.2;
+// Their observations are in memory twice.
 constexpr size_t kNumEdgesAtATime = 1000;
 
-// At most.
+// Upper bound.
 size_t CountObservations(const EdgeLengthOptions& options,
                          const ViewGraph& graph,
                          const GlobalCorrespondences& correspondences) {
@@ -89,7 +93,7 @@ std::vector<LengthPropagation::Observation> LengthPropagation::ObserveEdge(
       edge.cam2_from_cam1.rotation.toRotationMatrix();
   const Eigen::Vector3d translation =
       edge.cam2_from_cam1.translation.normalized();
-  const double min_sin_parallax = std::sin(DegToRad(options_.min_parallax_deg));
+  const double min_sin_parallax = std::sin(kMinParallaxRad);
   using Candidate = std::pair<Observation, Observation>;
   std::vector<Candidate> candidates;
   for (const FeatureMatch& match : matches->second) {
@@ -171,7 +175,7 @@ void LengthPropagation::Seed(int edge) {
   for (size_t o = edge_begin_[edge]; o < edge_begin_[edge + 1]; o += 2) {
     log_depths.push_back({observations_[o].offset, 1.0});
   }
-  Fix(edge, SeedDepth() - WeightedMedian(&log_depths), options_.max_log_sigma);
+  Fix(edge, SeedDepth() - WeightedMedian(&log_depths), kMaxLogSigma);
 }
 
 double LengthPropagation::SeedDepth() {
@@ -214,7 +218,7 @@ void LengthPropagation::Sweep() {
   });
 }
 
-// For each edge the median of the others, from one sorted list.
+// For each edge the median depth by the other edges, from one sorted list.
 void LengthPropagation::PredictDepths(int keypoint) {
   struct Entry {
     double value;
@@ -245,10 +249,10 @@ void LengthPropagation::PredictDepths(int keypoint) {
   }
 }
 
-// The logarithm of a length and its sigma.
+// The logarithm of a length and its sigma; false if too uncertain.
 bool LengthPropagation::LearnLength(std::vector<WeightedValue>* values,
                                     EdgeLength* log_length) const {
-  if (static_cast<int>(values->size()) < options_.min_num_shared) return false;
+  if (static_cast<int>(values->size()) < kMinNumShared) return false;
   log_length->length = WeightedMedian(values);
   for (WeightedValue& value : *values) {
     value.value = std::abs(value.value - log_length->length);
@@ -257,7 +261,7 @@ bool LengthPropagation::LearnLength(std::vector<WeightedValue>* values,
   // mean's error to the median's.
   log_length->log_sigma = 1.4826 * 1.2533 * WeightedMedian(values) /
                           std::sqrt(static_cast<double>(values->size()));
-  return log_length->log_sigma <= options_.max_log_sigma;
+  return log_length->log_sigma <= kMaxLogSigma;
 }
 
 }  // namespace adasfm

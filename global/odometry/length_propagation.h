@@ -17,15 +17,18 @@ namespace adasfm {
 // known depth). One match is two observations, one in each image.
 class LengthPropagation {
  public:
+  // Keypoints with known depth that an edge must share.
+  static constexpr int kMinNumShared = 5;
+
   LengthPropagation(const EdgeLengthOptions& options, const ViewGraph& graph,
                     const GlobalCorrespondences& correspondences);
 
-  // A length that stays.
+  // Sets a length that stays fixed.
   void Fix(int edge, double log_length, double log_sigma);
-  // A length to start from.
+  // Sets an initial length.
   void Start(int edge, const EdgeLength& length);
   // Fixes a length at which the edge's points have the same median depth as
-  // those of all seeds, and of the edges that were known before.
+  // those of all seeds, and of the edges known before the first seed.
   void Seed(int edge);
   // Whether an edge of known length ends at one of its images.
   bool TouchesKnown(int edge) const;
@@ -38,23 +41,25 @@ class LengthPropagation {
   // Spreads lengths from the known edges to those that share enough keypoints
   // with them, most first.
   void Spread(int min_num_shared);
-  // Learns all known lengths anew from each other, all at once.
+  // Re-estimates all known lengths but the fixed ones from each other, all at
+  // once.
   void Sweep();
-  // By edge: lengths of one number have one unit, fixed ones the same. An edge
-  // whose length nothing tells has a unit of its own; -1 without parallax.
+  // Unit by edge: lengths of one number share a unit, as do all fixed lengths.
+  // An edge of unknown length has a unit of its own; -1 with too little
+  // parallax.
   std::vector<int> FindUnits() const;
 
  private:
-  // What an edge sees of a keypoint: log depth = log length(edge) + offset.
-  // There are hundreds for each edge, so they are kept small.
+  // Depth of a keypoint in an edge: log depth = log length(edge) + offset.
+  // Small, since each edge has hundreds.
   struct Observation {
     int keypoint = 0;
     int edge = 0;
     float offset = 0.0f;
     float weight = 0.0f;
   };
-  // Of the units that an edge shares enough keypoints with, those whose size
-  // against its own these tell.
+  // The units whose scale relative to the edge's own is determined by the
+  // keypoints that they share with the edge.
   std::vector<int> FindUnitsOfKnownSize(int edge, DisjointSets* sets) const;
   std::vector<Observation> ObserveEdge(
       const ViewGraphEdge& edge,
@@ -83,9 +88,10 @@ class LengthPropagation {
   std::vector<char> is_known_;
   std::vector<char> is_fixed_;
   std::vector<char> has_known_;  // by image
-  // The logarithm of a seed's median depth; found with the first one.
+  // The logarithm of a seed's median depth; found with the first seed.
   std::optional<double> seed_log_depth_;
-  // By keypoint: known edges, and the depth with the number it was found from.
+  // By keypoint: the number of known edges, that number when the depth was
+  // computed, and the depth.
   std::vector<int> num_known_;
   std::vector<int> num_known_at_depth_;
   std::vector<double> log_depths_;

@@ -16,8 +16,9 @@ namespace {
 
 using Matrix6d = Eigen::Matrix<double, 6, 6>;
 
-// Columns of OdometryChain::Systematic: the mount, the direction of driving.
-constexpr int kMount = 4;
+// Columns of OdometryChain::Systematic: camera-IMU rotation, direction of
+// driving.
+constexpr int kCameraImu = 4;
 constexpr int kDriving = 7;
 
 // The prior's covariance with zeros for what it does not observe, which the
@@ -46,14 +47,16 @@ Eigen::Matrix3d CameraFromMiddle(const Rigid3d& motion) {
   return ExpSo3(0.5 * LogSo3(motion.rotation)).toRotationMatrix();
 }
 
-// The part of the motion that was observed.
+// The observed part of the motion, corrected by shared_rotation_errors.
 Rigid3d ObservedMotion(const OdometryChainOptions& options,
                        const RelativePosePrior& prior) {
-  const SharedTurns turns = options.shared_turns.value_or(SharedTurns());
+  const SharedRotationErrors turns =
+      options.shared_rotation_errors.value_or(SharedRotationErrors());
   Rigid3d motion;
   if (prior.HasRotation()) {
-    const Eigen::Quaterniond mount = ExpSo3(turns.mount_rad);
-    motion.rotation = mount * prior.cam2_from_cam1.rotation * mount.conjugate();
+    const Eigen::Quaterniond camera_imu = ExpSo3(turns.camera_imu_rad);
+    motion.rotation =
+        camera_imu * prior.cam2_from_cam1.rotation * camera_imu.conjugate();
   }
   if (prior.HasMotion()) {
     motion.translation =
@@ -63,14 +66,15 @@ Rigid3d ObservedMotion(const OdometryChainOptions& options,
   return motion;
 }
 
-// A root of the translation's covariance, or of what it says of the length
-// where vision knows the direction that all steps share.
+// A root of the translation's covariance, or only of its part along the motion
+// where vision has estimated the direction that all steps share.
 Eigen::Matrix3d PersistentRoot(const OdometryChainOptions& options,
                                const RelativePosePrior& prior,
                                const Rigid3d& motion) {
   const Eigen::Matrix3d covariance =
       ObservedCovariance(prior).bottomRightCorner<3, 3>();
-  if (!options.shared_turns || !(motion.translation.squaredNorm() > 0.0)) {
+  if (!options.shared_rotation_errors ||
+      !(motion.translation.squaredNorm() > 0.0)) {
     return SquareRoot(covariance);
   }
   const Eigen::Vector3d along = motion.translation.normalized();
@@ -86,7 +90,7 @@ Eigen::Matrix<double, 6, 13> SharedJacobian(const OdometryChainOptions& options,
   const Eigen::Matrix3d camera_from_middle = CameraFromMiddle(motion);
   jacobian.block<3, 1>(3, 0) = motion.translation;
   jacobian.block<3, 3>(0, 1) = SecondsFromNs(prior.dt_ns) * camera_from_middle;
-  jacobian.block<3, 3>(0, kMount) =
+  jacobian.block<3, 3>(0, kCameraImu) =
       Eigen::Matrix3d::Identity() - motion.rotation.toRotationMatrix();
   jacobian.block<3, 3>(3, kDriving) =
       -Hat(motion.translation) * camera_from_middle;
@@ -115,7 +119,7 @@ OdometryChainOptions WithoutSharedErrors(const OdometryChainOptions& options) {
   independent.gyro_bias_covariance = Eigen::Matrix3d::Zero();
   independent.extrinsic_rotation_sigma_rad = 0.0;
   independent.driving_direction_sigma_rad = 0.0;
-  independent.shared_turns.reset();
+  independent.shared_rotation_errors.reset();
   independent.persistent_translation_ratio = 0.0;
   return independent;
 }
@@ -144,8 +148,8 @@ OdometryChain::OdometryChain(const std::vector<RelativePosePrior>& priors,
     next[prior.image_id1] = k;
     has_previous.insert(prior.image_id2);
   }
-  // A piece starts where no prior leads; a ring has no such image and is left
-  // out: time does not run in circles.
+  // A piece starts at an image to which no prior leads. A ring, which is
+  // impossible in time, has no such image and is left out.
   for (const auto& [image_id, step] : next) {
     if (!has_previous.count(image_id)) AppendPiece(image_id, next, sorted);
   }
@@ -177,8 +181,8 @@ void OdometryChain::AppendPiece(image_t first,
     node.covariance += start_from_error * ObservedCovariance(prior) *
                        start_from_error.transpose();
     const double dt_s = SecondsFromNs(prior.dt_ns);
-    // A later bias differs from that of the piece's start by its walk up to
-    // here.
+    // A later bias differs from that at the piece's start by its random walk so
+    // far.
     node.walk.seconds += dt_s;
     const auto gyro_sum = node.systematic.middleCols<3>(kGyro);
     node.walk.sum += dt_s * gyro_sum;
@@ -237,8 +241,8 @@ ChainMotion OdometryChain::Motion(image_t image_id1, image_t image_id2) const {
   return motion;
 }
 
-// A change e of the scale at a place moves the later end by e times the way
-// from that place to it: the sum of the ways' outer products, over the places.
+// A change e of the scale at a place moves the later end by e (end - place):
+// the sum of (end - place)(end - place)^T over the places.
 Eigen::Matrix3d OdometryChain::SumOfScaleChanges(const Node& earlier,
                                                  const Node& later) {
   const Eigen::Vector3d end = later.cam_from_start.TargetOriginInSource();
@@ -249,8 +253,8 @@ Eigen::Matrix3d OdometryChain::SumOfScaleChanges(const Node& earlier,
          earlier.place_square_sum;
 }
 
-// The bias changes by an increment at each step, which turns all later ones:
-// the sum over the steps of the outer products of what lies behind them.
+// A bias increment at a step acts on all later steps: the sum over the steps k
+// of dt_k (end - G_k)(end - G_k)^T, with G the gyro columns.
 OdometryChain::Matrix6d OdometryChain::SumOfWalks(const Node& earlier,
                                                   const Node& later) {
   const Eigen::Matrix<double, 6, 3> end = later.systematic.middleCols<3>(kGyro);
@@ -286,8 +290,9 @@ ChainMotion OdometryChain::MotionOfLeaders(image_t image_id1,
   shared.block<3, 3>(kGyro, kGyro) = options_.gyro_bias_covariance.value_or(
       std::pow(options_.gyro_bias_sigma_rad_s, 2) *
       Eigen::Matrix3d::Identity());
-  if (options_.shared_turns) {
-    shared.block<6, 6>(kMount, kMount) = options_.shared_turns->covariance;
+  if (options_.shared_rotation_errors) {
+    shared.block<6, 6>(kCameraImu, kCameraImu) =
+        options_.shared_rotation_errors->covariance;
   }
   const Systematic systematic = later.systematic - earlier.systematic;
   const Matrix6d covariance_in_start =

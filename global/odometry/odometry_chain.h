@@ -13,46 +13,49 @@
 
 namespace adasfm {
 
-// By what vision turns all priors alike (CorrectCameraMount): their rotations R
-// become Exp(mount) R Exp(-mount), their translations Exp(H driving_direction)
-// of theirs, where H leads to the later camera from the one halfway. rad.
-struct SharedTurns {
-  Eigen::Vector3d mount_rad = Eigen::Vector3d::Zero();
+// Visual corrections that all priors share (CorrectCameraImuRotation), rad.
+// Their rotations R become Exp(camera_imu) R Exp(-camera_imu), their
+// translations t become Exp(H driving_direction) t, where H rotates from the
+// camera halfway to the later camera.
+struct SharedRotationErrors {
+  Eigen::Vector3d camera_imu_rad = Eigen::Vector3d::Zero();
   Eigen::Vector3d driving_direction_rad = Eigen::Vector3d::Zero();
   // Of both in this order, rad^2.
   Eigen::Matrix<double, 6, 6> covariance = Eigen::Matrix<double, 6, 6>::Zero();
 };
 
-// Errors that all steps of the chain share: they grow with the length of the
-// path, not with its root, and are what decides after kilometres.
+// Errors that all steps of the chain share. They grow with the length of the
+// path, not with its root, and dominate after kilometres.
 struct OdometryChainOptions {
   // 1 sigma of the wheels' common scale error.
   double scale_sigma = 0.01;
-  // Of the gyro bias that is left, in the camera frame, rad^2/s^2, as the
-  // import states it.
+  // Covariance of the remaining gyro bias in the camera frame, rad^2/s^2, as
+  // the import states it.
   std::optional<Eigen::Matrix3d> gyro_bias_covariance;
-  // 1 sigma of it where that is not stated, rad/s, per axis, and of its random
-  // walk, rad/s/sqrt(s).
+  // 1 sigma per axis of the gyro bias where no covariance is stated, rad/s, and
+  // of its random walk, rad/s/sqrt(s).
   double gyro_bias_sigma_rad_s = 2e-4;
   double gyro_bias_walk_rad_s_sqrt_s = 2e-5;
   // 1 sigma, per axis, of the rotation of T_cam_imu and of the direction of
   // driving in the camera, rad.
   double extrinsic_rotation_sigma_rad = 5e-3;
   double driving_direction_sigma_rad = 0.01;
-  // What vision found of both, with its own covariance.
-  std::optional<SharedTurns> shared_turns;
-  // The steps of a smoothed drive share the errors of its tilt and velocity:
-  // this many sigmas of their translations persist from step to step, besides
-  // the part that changes; across the motion only without shared_turns.
+  // Visual estimate of both, whose covariance replaces these sigmas.
+  std::optional<SharedRotationErrors> shared_rotation_errors;
+  // The steps of a smoothed drive share errors of tilt and velocity: this many
+  // sigmas of their translations persist from step to step, besides the part
+  // that changes. With shared_rotation_errors, only the part along the motion
+  // persists.
   double persistent_translation_ratio = 1.0;
-  // 1 sigma, per step, of the change of scale from there on, as a ratio. Where
-  // vision alone makes the steps, nothing holds their scale.
+  // 1 sigma, as a ratio, of the scale change at each step, which lasts for all
+  // later steps. Visual odometry alone does not constrain its scale.
   double scale_drift_ratio = 0.0;
 
   bool IsValid(std::string* error) const;
 };
 
-// Only the errors that differ from step to step are left.
+// Sets the errors that all steps share to zero. The gyro bias's random walk and
+// the scale drift stay.
 OdometryChainOptions WithoutSharedErrors(const OdometryChainOptions& options);
 
 // The motion between any two images of the chain.
@@ -67,9 +70,9 @@ struct ChainMotion {
 };
 
 // The priors of consecutive images composed, with their covariance
-// (docs/reference/global.md): every step's error is carried to the frame of the
-// chain's start, where errors of different steps simply add up; so one prefix
-// sum answers for any two images in constant time.
+// (docs/reference/global.md). Each step's error is transformed to the frame of
+// the chain's start, where errors of different steps add up; so prefix sums
+// give the covariance between any two images in constant time.
 class OdometryChain {
  public:
   OdometryChain() = default;
@@ -102,12 +105,12 @@ class OdometryChain {
 
  private:
   using Matrix6d = Eigen::Matrix<double, 6, 6>;
-  // By the scale, the gyro bias, the rotation of T_cam_imu, the direction of
-  // driving and the persistent translation error.
+  // Derivatives by the scale, the gyro bias, the rotation of T_cam_imu, the
+  // direction of driving and the persistent translation error.
   using Systematic = Eigen::Matrix<double, 6, 13>;
-  static constexpr int kGyro = 1;  // its columns
-  // Prefix sums, weighted by time, of what the gyro bias has done before each
-  // step.
+  static constexpr int kGyro = 1;  // first of its columns
+  // Prefix sums, weighted by time, of the gyro columns of Systematic before
+  // each step.
   struct Walk {
     double seconds = 0.0;
     Eigen::Matrix<double, 6, 3> sum = Eigen::Matrix<double, 6, 3>::Zero();
@@ -139,9 +142,10 @@ class OdometryChain {
     image_t leader = kInvalidImageId;
     UncertainMotion follower_from_leader;
   };
-  // The motion between the images that these follow.
+  // The motion between the leaders of both images.
   ChainMotion MotionOfLeaders(image_t image_id1, image_t image_id2) const;
-  // The identity, with no error, for an image that follows none.
+  // From the leader; the identity, with no error, for an image that follows
+  // none.
   UncertainMotion FromLeader(image_t image_id) const;
 
   OdometryChainOptions options_;

@@ -18,11 +18,11 @@
 namespace adasfm {
 namespace {
 
-// Sets of images, by image: which sets it is in.
+// For each image, the sets that contain it.
 using Memberships = std::vector<std::set<int>>;
 
-// One set per unit, the first one of metres. shape_sigmas: by set, how well the
-// best of its directions is known.
+// One set per unit, the first one of metres. shape_sigmas: by set, the least
+// direction sigma of its edges.
 Memberships CollectUnits(const ViewGraph& graph, const std::vector<int>& units,
                          std::vector<double>* shape_sigmas) {
   Memberships sets_of(graph.images.size());
@@ -50,7 +50,7 @@ Memberships CollectUnits(const ViewGraph& graph, const std::vector<int>& units,
   return sets_of;
 }
 
-// Images of joined sets are those of the first of them.
+// Replaces joined sets by the first of them.
 void TakeRoots(DisjointSets* joined, Memberships* sets_of) {
   for (std::set<int>& sets : *sets_of) {
     std::set<int> roots;
@@ -80,11 +80,12 @@ bool JoinSetsOfOneSize(Memberships* sets_of, int num_sets) {
   return any;
 }
 
-// The least error of a shape, as a share of its extent: that of a direction
-// known to 0.3 deg.
+// Least sigma of a shape, as a share of its extent: that of a direction known
+// to 0.3 deg.
 constexpr double kMinShapeSigma = 0.005;
 
-// Joins sets whose sizes rings of sets tell. Returns whether there were any.
+// Joins sets whose scales rings of sets determine. Returns whether there were
+// any.
 bool JoinSetsByClosure(
     const std::vector<double>& shape_sigmas,
     const std::vector<std::optional<Eigen::Vector3d>>& centers,
@@ -119,7 +120,7 @@ std::vector<int> ChooseLargest(const Memberships& sets_of, int num_sets) {
   return part_of;
 }
 
-// Strongest edges first.
+// Images without a part join a neighbour's part, strongest edges first.
 void JoinTheRest(const ViewGraph& graph, std::vector<int>* part_of) {
   std::vector<std::vector<std::pair<int, int>>> neighbors(graph.images.size());
   for (const ViewGraphEdge& edge : graph.edges) {
@@ -147,7 +148,7 @@ void JoinTheRest(const ViewGraph& graph, std::vector<int>* part_of) {
   }
 }
 
-// Those of no part, which no edge with a length is near, are one together.
+// Images without a part, near no edge with a length, form one part.
 std::vector<int> NameByFirstImage(const std::vector<int>& part_of) {
   std::map<int, int> names;
   std::vector<int> named;
@@ -177,7 +178,7 @@ std::vector<int> FindLengthUnits(
       propagation.Start(e, length);
     }
   }
-  propagation.Spread(options.min_num_shared);
+  propagation.Spread(LengthPropagation::kMinNumShared);
   return propagation.FindUnits();
 }
 

@@ -9,10 +9,10 @@
 namespace adasfm {
 namespace {
 
-// As sizes that compare through keypoints (length_propagation.h).
+// As for scales that compare through keypoints (spread_lengths.cc).
 constexpr double kMaxSizeSigma = 0.05;
-// Before any ring, as a share of a size and of the extent of the whole: so weak
-// that no ring notices.
+// Prior sigma, as a share of a scale and of the extent of the whole: so weak
+// that it does not affect a ring.
 constexpr double kFreeSigma = 100.0;
 // A place that two sets share is exact to this share of the extent.
 constexpr double kPlaceSigma = 1e-4;
@@ -37,7 +37,7 @@ class ClosureProblem {
 
   bool HasRings() const { return num_rows_ > 0; }
 
-  // Of the sizes of all sets that close rings.
+  // Covariance of the scales of all sets that close rings.
   Eigen::MatrixXd SizeCovariance() {
     const Eigen::SparseMatrix<double> information = Information();
     const Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>> ldlt(information);

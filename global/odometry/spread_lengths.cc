@@ -9,7 +9,7 @@
 namespace adasfm {
 
 void LengthPropagation::Spread(int min_num_shared) {
-  // Shared keypoints, -edge.
+  // Number of shared keypoints, -edge.
   std::priority_queue<std::pair<int, int>> queue;
   std::vector<int> num_shared(graph_.edges.size(), 0);
   std::vector<char> has_depth(num_known_.size(), false);
@@ -43,7 +43,7 @@ void LengthPropagation::Spread(int min_num_shared) {
     if (is_known_[e]) announce(e);
   }
   enqueue();
-  // How many keypoints an edge shared when it was last refused.
+  // How many keypoints an edge shared when its length was last rejected.
   std::vector<int> num_refused(num_edges, 0);
   while (!queue.empty()) {
     const auto [count, negative] = queue.top();
@@ -59,8 +59,8 @@ void LengthPropagation::Spread(int min_num_shared) {
   }
 }
 
-// The depth of a keypoint by its known edges; found anew only when they have
-// become half as many again.
+// The depth of a keypoint by its known edges, computed anew only when their
+// number has grown by more than half.
 double LengthPropagation::StartingDepth(int keypoint) {
   if (2 * num_known_[keypoint] <= 3 * num_known_at_depth_[keypoint]) {
     return log_depths_[keypoint];
@@ -94,12 +94,12 @@ bool LengthPropagation::LearnFromStart(int edge) {
 
 std::vector<int> LengthPropagation::FindUnitsOfKnownSize(
     int edge, DisjointSets* sets) const {
-  // A lane of 10 m then errs by half a metre.
+  // At this sigma a lane of 10 m errs by half a metre.
   constexpr double kMaxSizeLogSigma = 0.05;
-  // A few wrong matches agree by chance; the spread of so many keypoints tells
-  // the sigma to a third.
+  // A few wrong matches agree by chance; the spread of this many keypoints
+  // determines the sigma to a third.
   constexpr size_t kMinNumShared = 12;
-  // By unit: how the depths of the keypoints compare with the edge's own.
+  // By unit: log ratios of the keypoints' depths to those by the edge itself.
   std::map<int, std::vector<WeightedValue>> depths;
   for (size_t o = edge_begin_[edge]; o < edge_begin_[edge + 1]; ++o) {
     const Observation& own = observations_[o];
@@ -151,7 +151,7 @@ std::vector<int> LengthPropagation::FindUnits() const {
   }
   std::vector<int> units(num_edges, -1);
   for (int e = 0; e < num_edges; ++e) {
-    if (is_known_[e] || NumMatches(e) >= options_.min_num_shared) {
+    if (is_known_[e] || NumMatches(e) >= kMinNumShared) {
       units[e] = sets.Find(e);
     }
   }

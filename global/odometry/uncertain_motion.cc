@@ -56,4 +56,11 @@ UncertainMotion operator*(const UncertainMotion& c_from_b,
   return product;
 }
 
+Eigen::Matrix3d CovarianceAlong(const Eigen::Vector3d& direction, double along,
+                                double across) {
+  const Eigen::Matrix3d along_part = direction * direction.transpose();
+  return along * along * along_part +
+         across * across * (Eigen::Matrix3d::Identity() - along_part);
+}
+
 }  // namespace adasfm

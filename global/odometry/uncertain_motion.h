@@ -25,6 +25,10 @@ UncertainMotion operator*(const UncertainMotion& c_from_b,
 // xi = (dtheta, dt - dtheta x t) of P_true = exp(xi) P.
 Eigen::Matrix<double, 6, 6> TwistFromError(const Eigen::Vector3d& translation);
 
+// Covariance of a translation by its sigmas along a unit vector and across it.
+Eigen::Matrix3d CovarianceAlong(const Eigen::Vector3d& direction, double along,
+                                double across);
+
 // The same twist seen from another frame: (R omega, R v + t x R omega).
 Eigen::Matrix<double, 6, 6> Adjoint(const Rigid3d& target_from_source);
 

@@ -16,15 +16,22 @@ namespace {
 
 using Rotations = std::vector<Eigen::Matrix3d>;
 
-std::vector<RotationEdge> CollectEdges(const RotationAveragingOptions& options,
-                                       const ViewGraph& graph) {
+// Chatterjee and Govindu 2013: first L1 steps, then IRLS, until the mean change
+// falls below kConvergenceRad.
+constexpr int kMaxNumL1Iterations = 10;
+constexpr int kMaxNumIrlsIterations = 100;
+constexpr double kConvergenceRad = 1e-7;
+// Sigmas of edges below this are taken as this, so that no edge dominates.
+constexpr double kMinEdgeSigmaRad = 2e-4;
+
+std::vector<RotationEdge> CollectEdges(const ViewGraph& graph) {
   std::vector<RotationEdge> edges;
   for (const ViewGraphEdge& edge : graph.edges) {
     if (!edge.IsKept() || !edge.has_rotation) continue;
-    edges.push_back(
-        {graph.IndexOf(edge.image_id1), graph.IndexOf(edge.image_id2),
-         edge.cam2_from_cam1.rotation.toRotationMatrix(),
-         std::max(edge.rotation_sigma_rad, options.min_rotation_sigma_rad)});
+    edges.push_back({graph.IndexOf(edge.image_id1),
+                     graph.IndexOf(edge.image_id2),
+                     edge.cam2_from_cam1.rotation.toRotationMatrix(),
+                     std::max(edge.rotation_sigma_rad, kMinEdgeSigmaRad)});
   }
   return edges;
 }
@@ -43,7 +50,7 @@ double LossScale(const RotationAveragingOptions& options,
                   kNumSigmas * edge.sigma_rad);
 }
 
-// Robust without a scale, so that starts far from the optimum compare too.
+// Needs no loss scale, so that starts far from the optimum compare too.
 double SumOfAbsoluteErrors(const std::vector<RotationEdge>& edges,
                            const Rotations& rotations) {
   double sum = 0.0;
@@ -99,12 +106,11 @@ void StartFromSdp(const RotationAveragingOptions& options,
   RotationSdpOptions sdp_options;
   sdp_options.min_rank = options.min_rank;
   sdp_options.max_rank = options.max_rank;
-  sdp_options.max_num_sweeps = options.max_num_sdp_sweeps;
-  sdp_options.tolerance = options.sdp_tolerance;
   const RotationSdpSolution solution =
       SolveRotationSdp(sdp_options, edges, *rotations);
   result->sdp_rank = solution.rank;
-  // The relaxation is of plain squares: wrong edges may have bent it.
+  // The relaxation uses plain squares: wrong edges may have distorted the
+  // solution.
   if (SumOfAbsoluteErrors(edges, solution.rotations) <
       SumOfAbsoluteErrors(edges, *rotations)) {
     *rotations = solution.rotations;
@@ -135,8 +141,8 @@ double NodeCost(const RotationAveragingOptions& options,
   return cost;
 }
 
-// Nodes that most of their edges contradict may be caught in a wrong optimum:
-// each takes what one of its neighbours says, when that costs less.
+// Nodes that most of their edges contradict may be in a wrong optimum: each
+// takes the rotation that one of its edges predicts, when that costs less.
 void RepairNodes(const RotationAveragingOptions& options,
                  const std::vector<RotationEdge>& edges, Rotations* rotations) {
   std::vector<std::vector<int>> edges_of(rotations->size());
@@ -171,31 +177,31 @@ void RepairNodes(const RotationAveragingOptions& options,
   }
 }
 
-// L1 steps, then Geman-McClure from wide to the loss scale, which follows the
-// rotations from far away without losing them to wrong edges.
+// L1 steps, then Geman-McClure with a scale that narrows to the loss scale:
+// this converges from far away without being misled by wrong edges.
 void RunIterations(const RotationAveragingOptions& options,
                    const std::vector<RotationEdge>& edges,
                    LaplacianSolver* solver, Rotations* rotations,
                    GlobalRotations* result) {
   Loss loss;
-  for (int k = 0; k < options.max_num_l1_iterations; ++k) {
+  for (int k = 0; k < kMaxNumL1Iterations; ++k) {
     const double change = Iterate(options, loss, edges, solver, rotations);
     ++result->num_iterations;
-    if (change < options.convergence_rad) break;
+    if (change < kConvergenceRad) break;
   }
   constexpr double kWidestFactor = 16.0;
   constexpr double kNarrowing = 0.7;
   loss.is_l1 = false;
   loss.scale_factor = kWidestFactor;
   bool was_repaired = false;
-  for (int k = 0; k < options.max_num_irls_iterations; ++k) {
+  for (int k = 0; k < kMaxNumIrlsIterations; ++k) {
     const double change = Iterate(options, loss, edges, solver, rotations);
     ++result->num_iterations;
     if (change < 0.0) return;
     if (loss.scale_factor == 1.0 && !was_repaired) {
       RepairNodes(options, edges, rotations);
       was_repaired = true;
-    } else if (loss.scale_factor == 1.0 && change < options.convergence_rad) {
+    } else if (loss.scale_factor == 1.0 && change < kConvergenceRad) {
       result->converged = true;
       return;
     }
@@ -210,12 +216,7 @@ bool RotationAveragingOptions::IsValid(std::string* error) const {
       .AtLeast(3, "min_rank", min_rank)
       .Require(max_rank >= min_rank && max_rank <= 12, "max_rank", max_rank,
                "must be from min_rank to 12")
-      .AtLeast(1, "max_num_sdp_sweeps", max_num_sdp_sweeps)
-      .AtLeast(0, "max_num_l1_iterations", max_num_l1_iterations)
-      .AtLeast(1, "max_num_irls_iterations", max_num_irls_iterations)
-      .Positive({{"loss_scale_deg", loss_scale_deg},
-                 {"min_rotation_sigma_rad", min_rotation_sigma_rad},
-                 {"convergence_rad", convergence_rad}})
+      .Positive({{"loss_scale_deg", loss_scale_deg}})
       .AllHold();
 }
 
@@ -223,7 +224,7 @@ GlobalRotations EstimateGlobalRotations(const RotationAveragingOptions& options,
                                         const ViewGraph& graph) {
   GlobalRotations result;
   const size_t num_nodes = graph.images.size();
-  const std::vector<RotationEdge> edges = CollectEdges(options, graph);
+  const std::vector<RotationEdge> edges = CollectEdges(graph);
   Rotations rotations;
   if (num_nodes == 0 ||
       !PropagateRotationsOverTree(edges, num_nodes, &rotations)) {

@@ -19,33 +19,22 @@ struct RotationAveragingOptions {
   // until the certificate holds or max_rank is reached.
   int min_rank = 3;
   int max_rank = 6;
-  int max_num_sdp_sweeps = 100;
-  // Sweeps stop when the cost's relative change falls below this.
-  double sdp_tolerance = 1e-6;
-
-  // Chatterjee and Govindu 2013: first L1 steps, then IRLS.
-  int max_num_l1_iterations = 10;
-  int max_num_irls_iterations = 100;
-  // Iterations stop when the mean change falls below this.
-  double convergence_rad = 1e-7;
   // Where the robust loss takes over, degrees; never below three sigmas.
   double loss_scale_deg = 2.0;
-  // Sigmas of edges below this are taken as this, so that no edge dominates.
-  double min_rotation_sigma_rad = 2e-4;
 
   bool IsValid(std::string* error) const;
 };
 
 struct GlobalRotations {
-  // False when the graph has no images or its edges with rotation do not
-  // connect it; cams_from_world then holds nothing.
+  // False when the graph has no images, its edges with rotation do not connect
+  // it, or a result is not finite; cams_from_world is then empty.
   bool success = false;
   bool converged = false;
   std::map<image_t, Eigen::Quaterniond> cams_from_world;
   int num_iterations = 0;
-  // The start: rank reached, and a lower bound of the optimum's share in the
-  // cost of the rotations that the averaging began with, in plain squares (1:
-  // certified optimal, 0: nothing known).
+  // With use_sdp_start: rank reached, and a lower bound of the ratio of the
+  // optimal cost to that of the rotations that the averaging began with, in
+  // plain squares (1: certified optimal, 0: nothing known).
   int sdp_rank = 0;
   double sdp_optimality = 0.0;
 };

@@ -18,7 +18,7 @@ Eigen::SparseMatrix<double> CertificateMatrix(
 // A number b >= 0 with lambda_min(S) >= -b for a symmetric matrix given by its
 // lower triangle: S + b I has a Cholesky factor, with the margin of Rump (2006)
 // for what round-off could hide. The search starts at `guess` >= 0; infinity
-// when even the matrix's own size is not enough (NaN).
+// when even a shift by the matrix's norm fails (NaN).
 double BoundNegativeEigenvalue(const Eigen::SparseMatrix<double>& matrix,
                                double guess);
 

@@ -167,13 +167,13 @@ RotationSdpSolution SolveRotationSdp(
     if (solution.rank >= options.max_rank) break;
     RaiseRank(smallest.vector, &blocks);
   }
-  // Matrices of the relaxation have the trace 3 n, so none costs less.
+  // All matrices of the relaxation have the trace 3 n, which bounds their cost.
   const double bound = BoundNegativeEigenvalue(
       CertificateMatrix(problem, blocks), std::max(0.0, -smallest.value));
   solution.lower_bound =
       std::max(0.0, solution.cost - 3.0 * blocks.size() * bound);
   solution.rotations = RoundToRotations(blocks);
-  // Of the rotations, not of the relaxation: rounding may cost.
+  // Of the rotations, not of the relaxation: rounding may increase the cost.
   solution.optimality =
       ComputeOptimality(edges, solution.rotations, solution.lower_bound);
   return solution;

@@ -29,21 +29,21 @@ struct RotationSdpSolution {
   double cost = 0.0;
   // No rotations cost less; proven by a factorisation (rotation_certificate.h).
   double lower_bound = 0.0;
-  // lower_bound over the cost of `rotations`, in [0, 1]; 1 when that is
+  // lower_bound over the cost of `rotations`, in [0, 1]; 1 when that cost is
   // round-off.
   double optimality = 0.0;
 };
 
 // min sum |R_j - R_ij R_i|^2 / (2 sigma^2) relaxed to matrices Y_i of 3 x rank
-// with orthonormal rows (Chen et al. 2021): block coordinate descent takes Y_i
-// to the polar factor of the weighted sum of what its neighbours say. While the
-// certificate matrix has a negative eigenvalue, the rank grows by one along its
-// eigenvector (the staircase). The result is rounded to rotations.
+// with orthonormal rows (Chen et al. 2021): block coordinate descent sets Y_i
+// to the polar factor of the weighted sum of its neighbours' predictions. While
+// the certificate matrix has a negative eigenvalue, the rank grows by one along
+// its eigenvector (the staircase). The result is rounded to rotations.
 RotationSdpSolution SolveRotationSdp(const RotationSdpOptions& options,
                                      const std::vector<RotationEdge>& edges,
                                      const std::vector<Eigen::Matrix3d>& start);
 
-// The bound over the cost of these rotations, in [0, 1]; 1 when that is
+// lower_bound over the cost of these rotations, in [0, 1]; 1 when that cost is
 // round-off.
 double ComputeOptimality(const std::vector<RotationEdge>& edges,
                          const std::vector<Eigen::Matrix3d>& rotations,

@@ -14,15 +14,15 @@
 namespace adasfm {
 namespace {
 
-// As matches of a verified pair.
+// As required of the matches of a verified pair.
 constexpr int kMinNumPoints = 15;
 constexpr size_t kMaxNumSamples = 2000;
-// The rotation to begin with errs by a degree or two.
+// In max_angle_rad: the rotation to begin with is wrong by a degree or two.
 constexpr double kStartBound = 4.0;
-// Chi-square with two degrees of freedom.
+// Median of a chi-square with two degrees of freedom.
 constexpr double kMedianOfTwo = 1.386;
 constexpr double kMinVariance = 1e-18;
-// Chi-square of a size that is not taken for the right one: five sigmas.
+// Least increase of chi-square at a wrong scale: five sigmas.
 constexpr double kMinWorse = 25.0;
 constexpr int kNumIterations = 30;
 
@@ -40,7 +40,7 @@ struct Residual {
 };
 
 Residual ComputeResidual(const SightAcross& sight, const Sim3d& a_from_b) {
-  const Eigen::Vector3d turned =  // what b has of it
+  const Eigen::Vector3d turned =  // part b's contribution
       a_from_b.scale *
       (a_from_b.rotation * (sight.is_point_of_a ? sight.center : sight.point));
   const double sign = sight.is_point_of_a ? -1.0 : 1.0;
@@ -71,8 +71,8 @@ class PartJoiner {
     weights_.assign(sights.size(), 1.0);
   }
 
-  // Place and size by two sights at a time, the rotation held; the best is the
-  // one of the least sum of errors, each bounded.
+  // Place and scale by two sights at a time, with the rotation held; the best
+  // have the least sum of errors, each bounded.
   bool Start() {
     const size_t n = sights_.size();
     const size_t stride = 1 + n * (n - 1) / 2 / kMaxNumSamples;
@@ -165,8 +165,8 @@ class PartJoiner {
     return true;
   }
 
-  // Where cameras turn on the spot a wrong size fits as well as the right one,
-  // and the slope at either says little of that.
+  // Where cameras rotate on the spot a wrong scale fits as well as the right
+  // one, which the covariance at the right one does not show.
   bool IsWorseAtOtherSize(double factor) const {
     PartJoiner other = *this;
     other.a_from_b_.scale *= factor;

@@ -10,7 +10,7 @@
 
 namespace adasfm {
 
-// A keypoint of one part of a drive that sees a point of the other one.
+// A keypoint of one part of a drive that observes a point of the other part.
 struct SightAcross {
   // Observations of one point err together.
   int point_id = 0;
@@ -19,11 +19,11 @@ struct SightAcross {
   Eigen::Vector3d point = Eigen::Vector3d::Zero();   // in its part's world
   Eigen::Vector3d center = Eigen::Vector3d::Zero();  // in the camera's part
   Eigen::Vector3d ray = Eigen::Vector3d::UnitZ();    // unit, in the same
-  // A point off the ray by more does not fit.
+  // Largest angle between the ray and the point that counts as a fit.
   double max_angle_rad = 0.01;
 };
 
-// How part b lies in the world of part a.
+// The similarity from part b to the world of part a.
 struct PartJoin {
   Sim3d a_from_b;
   // 1 sigma of log(a_from_b.scale).
@@ -33,16 +33,18 @@ struct PartJoin {
   int num_points = 0;
 };
 
-// What: place and size of two parts, each adjusted by itself, by the points
-// that both see. Pairs of images tell less: before an adjustment neither their
-// directions nor their depths are good enough where a camera turns.
-// Inputs: sights in either direction; the rotation a_from_b to a few degrees.
-// Method. Sines of the angles between rays and points. With the rotation held,
-// two sights tell place and size; of many such pairs the best begins. Then all
-// seven by Gauss-Newton, robust (Cauchy, at twice the median). The covariance
-// is the sandwich over points.
-// Returns nothing without 15 points that fit, where most sights do not, or
-// where the iterations diverge, as they do when no sight tells the size.
+// Estimates place and scale of two parts, each adjusted by itself, from the
+// points that both see. Image pairs constrain them less: before an adjustment
+// neither their directions nor their depths are good enough where a camera
+// rotates. sights: in either direction. a_from_b_rotation: right to a few
+// degrees.
+//
+// Residuals are sines of the angles between rays and points. With the rotation
+// held, two sights determine place and scale; the best of many such pairs is
+// the start. Gauss-Newton refines all seven, robustly (Cauchy, at twice the
+// median). Covariance: cluster-robust (sandwich) with points as clusters.
+// Returns nothing without 15 points that fit, where most sights do not fit, or
+// where twice or half the scale fits as well.
 std::optional<PartJoin> EstimatePartJoin(
     const std::vector<SightAcross>& sights,
     const Eigen::Quaterniond& a_from_b_rotation);

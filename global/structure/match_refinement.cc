@@ -29,14 +29,14 @@ double EpipolarError(const Bearing& bearing1, const Bearing& bearing2,
   const double error = std::abs(bearing2.direction.dot(n2));
   const double norm1 = (bearing1.jacobian.transpose() * n1).norm();
   const double norm2 = (bearing2.jacobian.transpose() * n2).norm();
-  // At the epipole itself every line passes.
+  // All epipolar lines pass through the epipole: distance zero.
   const double sum = (norm1 > 1e-15 ? error / norm1 : 0.0) +
                      (norm2 > 1e-15 ? error / norm2 : 0.0);
   double depth1, depth2, sin_parallax;
   if (ComputeRayDepths(bearing1.direction, bearing2.direction, rotation,
                        translation, &depth1, &depth2, &sin_parallax)) {
-    // A pixel of noise turns the depth's sign where the parallax is below what
-    // the allowed error subtends.
+    // Below a parallax of two pixels, a pixel of noise can change the depth's
+    // sign.
     const double pixel_rad =
         std::max(bearing1.jacobian.norm(), bearing2.jacobian.norm());
     const bool is_certain = sin_parallax > 2.0 * pixel_rad;
@@ -45,8 +45,9 @@ double EpipolarError(const Bearing& bearing1, const Bearing& bearing2,
   return sum;
 }
 
-// With their errors [px]; none without a baseline, since there are no epipolar
-// lines. The errors do not depend on its length.
+// Matches that agree, with their errors [px]; none without a baseline, since
+// there are no epipolar lines. The errors do not depend on the baseline's
+// length.
 std::vector<std::pair<double, FeatureMatch>> FindFittingMatches(
     double max_epipolar_error_px, const Rigid3d& cam2_from_cam1,
     const std::vector<Bearing>& bearings1,

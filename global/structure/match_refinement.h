@@ -27,7 +27,7 @@ struct RefinedPair {
   // Of the global poses; the translation has their unit.
   Rigid3d cam2_from_cam1;
   std::vector<FeatureMatch> matches;  // sorted
-  // Angle between the rays of a match, median of all.
+  // Median of the angles between the rays of a match.
   double median_parallax_rad = 0.0;
   int num_candidates = 0;
   bool removed = false;
@@ -41,11 +41,11 @@ struct MatchRefinementReport {
   size_t num_kept = 0;
 };
 
-// Of each pair's candidate matches (raw ones where there are, else its inliers)
-// those that agree with the global poses: the distances to the epipolar lines,
-// measured in the image through the bearings' Jacobians (any camera model), sum
-// to at most eps_M, and the point lies in front of both cameras (step
-// 2.8). A keypoint that is matched twice keeps its best match.
+// Keeps those candidate matches of each pair (raw ones where there are, else
+// its inliers) that agree with the global poses (step 2.8): the distances to
+// the epipolar lines, measured in the image through the bearings' Jacobians
+// (any camera model), sum to at most eps_M, and the point lies in front of both
+// cameras. A keypoint that is matched twice keeps its best match.
 MatchRefinementReport RefineMatches(
     const MatchRefinementOptions& options,
     const std::map<image_t, Rigid3d>& cams_from_world,

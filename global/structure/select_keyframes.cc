@@ -9,8 +9,8 @@
 namespace adasfm {
 namespace {
 
-// An image is passed over only if its neighbours have this many tracks in
-// common.
+// An image is passed over only if the last keyframe and the next image have
+// this many tracks in common.
 constexpr int kMinNumSharedTracks = 40;
 
 // The images one after the other, as far as complete priors tie them.
@@ -89,7 +89,8 @@ std::set<image_t> SelectKeyframes(
   }
   const Chain chain(images, priors);
   const SharedTracks shared(tracks);
-  // All but those that are passed over: priors in a circle have no first image.
+  // Starts with all images: a ring of priors has no first image and stays as it
+  // is.
   std::set<image_t> keyframes = images;
   for (const image_t first : images) {
     if (chain.HasPrevious(first)) continue;

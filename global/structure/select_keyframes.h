@@ -13,9 +13,9 @@ namespace adasfm {
 
 // Neighbouring images of a drive see nearly the same. The cost of solving the
 // reduced camera system grows with the square of the number of images that see
-// a point, and where a drive comes back with more than the number of images; so
-// the first rounds of a large adjustment see points in every few images only,
-// and the priors carry the others along.
+// a point and, where a drive revisits places, faster than the number of images.
+// The first rounds of a large adjustment therefore use points in every few
+// images only, and the priors constrain the other images.
 struct KeyframeOptions {
   // Smaller components keep all images: nothing is to be gained.
   int min_num_images = 600;
@@ -25,8 +25,8 @@ struct KeyframeOptions {
   bool IsValid(std::string* error) const;
 };
 
-// The images that see points. All others have priors of rotation, direction
-// and length from the image before and to the one after them.
+// The images that see points. All other images have priors of rotation,
+// direction and length from the image before and to the one after them.
 std::set<image_t> SelectKeyframes(const KeyframeOptions& options,
                                   const std::set<image_t>& images,
                                   const std::vector<Track>& tracks,

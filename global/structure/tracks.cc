@@ -57,8 +57,8 @@ class MatchedKeypoints {
   std::vector<TrackElement> keypoints_;
 };
 
-// Union-find whose sets know their images, so that no set holds two keypoints
-// of one image.
+// Union-find that stores the images of each set, so that no set contains two
+// keypoints of one image.
 class KeypointSets {
  public:
   explicit KeypointSets(const MatchedKeypoints& keypoints)
@@ -122,8 +122,8 @@ class KeypointSets {
   std::vector<std::vector<image_t>> images_;
 };
 
-// The first, the last, and evenly spread ones between them, which differ from
-// track to track so that no image always falls out.
+// The first, the last, and evenly spread elements between them. The phase
+// differs from track to track, so that no image is always left out.
 Track Shorten(const Track& track, size_t max_length) {
   if (track.size() <= max_length) return track;
   constexpr int kNumPhases = 16;
@@ -192,7 +192,7 @@ size_t EstimateTrackBytes(const Matches& matches) {
     num_keypoints += std::min(counts.first, counts.second);
     num_indices += counts.second;
   }
-  // Vectors that grow by doubling, while old and new are there.
+  // Vectors grow by doubling, while old and new memory coexist.
   const size_t numbering =
       3 * (num_indices * sizeof(int) + num_keypoints * sizeof(TrackElement));
   const size_t per_keypoint =
@@ -203,7 +203,7 @@ size_t EstimateTrackBytes(const Matches& matches) {
   return numbering + num_keypoints * per_keypoint;
 }
 
-std::vector<Track> JoinMatches(const TrackOptions& options,
+std::vector<Track> BuildTracks(const TrackOptions& options,
                                const Matches& matches) {
   const MatchedKeypoints keypoints(matches);
   KeypointSets sets(keypoints);

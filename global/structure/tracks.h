@@ -31,10 +31,10 @@ struct TrackOptions {
   int min_track_length = 3;
   // Longer tracks keep this many images, spread evenly from the first to the
   // last: the adjustment's cost grows with the square of a track's length, and
-  // more short tracks see an image as well as few long ones.
+  // many short tracks constrain an image as well as few long ones.
   int max_track_length = 12;
-  // Tracks are taken, longest first, while they help an image that has fewer
-  // than this many yet.
+  // Tracks are selected, longest first, while one of their images has fewer
+  // tracks than this.
   int min_num_tracks_per_image = 120;
 
   bool IsValid(std::string* error) const;
@@ -49,16 +49,15 @@ size_t EstimateTrackBytes(
 // matches would join two keypoints of one image, the later match (pairs by
 // number of matches, most first) is left out, so one wrong match does not cost
 // the whole track.
-std::vector<Track> JoinMatches(
+std::vector<Track> BuildTracks(
     const TrackOptions& options,
     const std::map<ImagePair, std::vector<FeatureMatch>>& matches);
 
-// What the options leave of the tracks: shortened, and only those that an image
-// needs.
+// Shortens the tracks and keeps those that an image needs, by the options.
 std::vector<Track> SelectTracks(const TrackOptions& options,
                                 std::vector<Track> tracks);
 
-// The tracks within these images, as far as min_track_length of them remain.
+// The tracks restricted to these images, if min_track_length elements remain.
 std::vector<Track> RestrictTracks(const TrackOptions& options,
                                   const std::vector<Track>& tracks,
                                   const std::set<image_t>& images);

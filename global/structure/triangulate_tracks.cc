@@ -91,8 +91,8 @@ std::vector<int> FindAgreeing(const std::vector<Ray>& rays,
   return agreeing;
 }
 
-// The point of two rays that most rays agree with. All pairs of short tracks,
-// an even subset of pairs of long ones.
+// The rays that agree with the best point of two rays. All pairs of short
+// tracks, an even subset of pairs of long ones.
 std::vector<int> FindConsensus(const std::vector<Ray>& rays,
                                double max_error_px) {
   constexpr size_t kMaxNumEnds = 8;
@@ -128,7 +128,7 @@ double MaxAngleRad(const std::vector<Ray>& rays, const std::vector<int>& set) {
   return max_angle_rad;
 }
 
-// Rays weigh by the inverse square of their length: angular errors.
+// Rays have weights of their inverse squared length, for angular errors.
 std::optional<Eigen::Vector3d> RefinePoint(const std::vector<Ray>& rays,
                                            const std::vector<int>& set) {
   auto point = IntersectRays(rays, set, std::vector<double>(set.size(), 1.0));
@@ -139,7 +139,7 @@ std::optional<Eigen::Vector3d> RefinePoint(const std::vector<Ray>& rays,
       weights.push_back(
           1.0 / std::max(1e-12, (*point - rays[k].origin).squaredNorm()));
     }
-    // Scale-free: ldlt sees weights of order one.
+    // Makes the largest weight one, for ldlt.
     const double sum = *std::max_element(weights.begin(), weights.end());
     for (double& weight : weights) weight /= sum;
     point = IntersectRays(rays, set, weights);

@@ -13,7 +13,7 @@
 namespace adasfm {
 
 struct TrackTriangulationOptions {
-  // Largest angle between two of a track's rays, at least.
+  // Least value of the largest angle between two of a track's rays.
   double min_triangulation_angle_deg = 5.0;
   // Largest reprojection error; generous, the poses are coarse.
   double max_reproj_error_px = 16.0;
@@ -31,9 +31,9 @@ struct TriangulatedTrack {
   double angle_deg = 0.0;
 };
 
-// Points of tracks under known poses: midpoint of the pairs of rays that
-// most others agree with, refined over all of those, in px through the
-// bearings' Jacobians. Tracks that fail are left out; order is kept.
+// Points of tracks under known poses: midpoint of the pair of rays that most
+// others agree with, refined over all agreeing rays. Errors are in px, through
+// the bearings' Jacobians. Tracks that fail are left out; order is kept.
 std::vector<TriangulatedTrack> TriangulateTracks(
     const TrackTriangulationOptions& options,
     const std::map<image_t, Rigid3d>& cams_from_world,

@@ -9,39 +9,32 @@
 namespace adasfm {
 namespace {
 
-bool FitsPositions(const PositionFilterOptions& options,
-                   const ViewGraphEdge& edge,
+// Directions may be off by this plus kNumSigmas of their own.
+constexpr double kMaxDirectionDiscrepancyRad = DegToRad(10.0);
+constexpr double kNumSigmas = 5.0;
+// Lengths known from shared points may be off by this factor, both ways.
+constexpr double kMaxLengthRatio = 3.0;
+
+bool FitsPositions(const ViewGraphEdge& edge,
                    const std::optional<EdgeLength>& length,
                    const Eigen::Vector3d& direction_in_world,
                    const Eigen::Vector3d& difference) {
   const double distance = difference.norm();
   if (length.has_value()) {
-    const double ratio = std::exp(options.max_num_sigmas * length->log_sigma) *
-                         options.max_length_ratio;
+    const double ratio =
+        std::exp(kNumSigmas * length->log_sigma) * kMaxLengthRatio;
     if (distance > ratio * length->length ||
         distance < length->length / ratio) {
       return false;
     }
   }
   return AngleBetweenRad(difference, direction_in_world) <=
-         DegToRad(options.max_direction_discrepancy_deg) +
-             options.max_num_sigmas * edge.direction_sigma_rad;
+         kMaxDirectionDiscrepancyRad + kNumSigmas * edge.direction_sigma_rad;
 }
 
 }  // namespace
 
-bool PositionFilterOptions::IsValid(std::string* error) const {
-  return OptionChecker(error)
-      .Positive(
-          {{"max_direction_discrepancy_deg", max_direction_discrepancy_deg}})
-      .NotNegative({{"max_num_sigmas", max_num_sigmas}})
-      .Require(max_length_ratio > 1.0, "max_length_ratio", max_length_ratio,
-               "must be above 1")
-      .AllHold();
-}
-
 int FilterEdgesByPosition(
-    const PositionFilterOptions& options,
     const std::map<image_t, Eigen::Quaterniond>& cams_from_world,
     const std::map<image_t, Eigen::Vector3d>& centers,
     const std::vector<std::optional<EdgeLength>>& lengths, ViewGraph* graph) {
@@ -56,8 +49,7 @@ int FilterEdgesByPosition(
     const Eigen::Vector3d difference =
         centers.at(edge.image_id2) - centers.at(edge.image_id1);
     if (!FitsPositions(
-            options, edge,
-            e < lengths.size() ? lengths[e] : std::optional<EdgeLength>(),
+            edge, e < lengths.size() ? lengths[e] : std::optional<EdgeLength>(),
             direction_in_world, difference)) {
       edge.removal = EdgeRemoval::kTranslation;
       ++num_removed;

@@ -19,19 +19,20 @@ struct EdgeTerm {
   Eigen::Vector3d target;
 };
 
-EdgeTerm ComputeTerm(const TranslationAveragingOptions& options,
-                     const PositionEdge& edge,
+EdgeTerm ComputeTerm(const PositionEdge& edge,
                      const Eigen::Vector3d& difference, double min_length) {
   // An edge without a length keeps the present one, with this relative sigma,
   // which damps the step and fixes the scale.
   constexpr double kFreeLengthSigma = 1.0;
+  // Where the Cauchy loss takes over, in sigmas.
+  constexpr double kLossScale = 2.0;
   const double along = edge.direction.dot(difference);
   const bool is_free = edge.kind == PositionEdge::kFree || edge.is_redundant;
   const double length =
       std::max(min_length, is_free ? std::abs(along) : edge.length);
   const double across_sigma = length * edge.direction_sigma;
   double along_sigma = is_free ? length * kFreeLengthSigma : edge.length_sigma;
-  along_sigma = std::max(along_sigma, options.min_sigma * length);
+  along_sigma = std::max(along_sigma, kMinPositionSigmaRatio * length);
   const Eigen::Matrix3d projection =
       edge.direction * edge.direction.transpose();
   EdgeTerm term;
@@ -41,12 +42,12 @@ EdgeTerm ComputeTerm(const TranslationAveragingOptions& options,
                      projection / (along_sigma * along_sigma);
   const Eigen::Vector3d residual = difference - term.target;
   const double squared = residual.dot(term.information * residual);
-  term.information /= 1.0 + squared / std::pow(options.refine_loss_scale, 2);
+  term.information /= 1.0 + squared / std::pow(kLossScale, 2);
   return term;
 }
 
-// Supernodal: of 30,000 images the factor has tens of millions of entries. It
-// prints nothing: the caller says what failed.
+// Supernodal: for 30,000 images the factor has tens of millions of entries.
+// Prints nothing: the caller reports failures.
 class QuietCholesky
     : public Eigen::CholmodSupernodalLLT<Eigen::SparseMatrix<double>> {
  public:
@@ -113,8 +114,7 @@ class RefinementSystem {
 
 }  // namespace
 
-bool RefinePositions(const TranslationAveragingOptions& options,
-                     const std::vector<PositionEdge>& edges, Vectors* centers,
+bool RefinePositions(const std::vector<PositionEdge>& edges, Vectors* centers,
                      GlobalPositions* result) {
   const int num_nodes = centers->rows();
   if (num_nodes < 2) return true;
@@ -125,13 +125,14 @@ bool RefinePositions(const TranslationAveragingOptions& options,
   const double unit = UpperMedian(&lengths);
   if (!(unit > 0.0)) return false;
 
+  constexpr int kMaxNumIterations = 100;
   RefinementSystem system(num_nodes);
-  for (int k = 0; k < options.max_num_refine_iterations; ++k) {
+  for (int k = 0; k < kMaxNumIterations; ++k) {
     system.Clear(edges.size());
     for (const PositionEdge& edge : edges) {
       const Eigen::Vector3d difference =
           (centers->row(edge.j) - centers->row(edge.i)).transpose();
-      system.Add(edge, ComputeTerm(options, edge, difference, 0.02 * unit));
+      system.Add(edge, ComputeTerm(edge, difference, 0.02 * unit));
     }
     Eigen::VectorXd solution;
     if (!system.Solve(&solution)) return false;
@@ -145,7 +146,7 @@ bool RefinePositions(const TranslationAveragingOptions& options,
         (next - (centers->rowwise() - origin)).rowwise().norm().mean() / unit;
     *centers = next;
     ++result->num_iterations;
-    if (result->last_change < options.convergence_ratio) return true;
+    if (result->last_change < kPositionConvergenceRatio) return true;
   }
   return false;
 }

@@ -9,7 +9,13 @@
 
 namespace adasfm {
 
-// What translation averaging knows of one edge between nodes i and j.
+// Iterations stop when the mean movement of the centres falls below this share
+// of the median edge length.
+inline constexpr double kPositionConvergenceRatio = 1e-4;
+// Sigmas of directions and of relative lengths below this are taken as this.
+inline constexpr double kMinPositionSigmaRatio = 2e-3;
+
+// The data of translation averaging for one edge between nodes i and j.
 struct PositionEdge {
   enum Kind {
     kFree,   // a direction
@@ -23,7 +29,7 @@ struct PositionEdge {
   double direction_sigma = 0.05;
   double length = 1.0;
   double length_sigma = 0.0;
-  // The length only helps to start; the refinement takes it for free.
+  // The length serves the start only; the refinement treats it as free.
   bool is_redundant = false;
 };
 
@@ -31,11 +37,10 @@ struct PositionEdge {
 //   | across(C_j - C_i) |^2 / (length direction_sigma)^2
 //   + (along(C_j - C_i) - length)^2 / length_sigma^2
 // over all edges: across and along the edge's direction; edges without a length
-// take the present one, loosely. Gauss-Newton with Cauchy weights, a sparse
-// system of three unknowns per node; the first node stays. False when it does
-// not converge; centres stay finite.
-bool RefinePositions(const TranslationAveragingOptions& options,
-                     const std::vector<PositionEdge>& edges,
+// keep the present one, loosely. Gauss-Newton with Cauchy weights, a sparse
+// system of three unknowns per node; the first node becomes the origin. False
+// when it does not converge; centres stay finite.
+bool RefinePositions(const std::vector<PositionEdge>& edges,
                      LaplacianSolver::Vectors* centers,
                      GlobalPositions* result);
 

@@ -15,11 +15,18 @@
 namespace adasfm {
 namespace {
 
+// L1 weights are bounded: residuals below this (relative to the edge's length)
+// weigh alike.
+constexpr double kMinResidual = 1e-3;
+// Least relative sigma of lengths from shared points in the refinement:
+// neighbouring edges share points, so their errors are not independent.
+constexpr double kMinSoftLengthSigma = 0.05;
+
 using Vectors = LaplacianSolver::Vectors;
 
-// Where sensors tie both ends of an edge together, its length from shared
-// points was derived from theirs: counting it again, with errors that all such
-// edges share, would let many weak lengths outvote the sensors' scale.
+// Where sensors connect both ends of an edge, its length from shared points
+// derives from the sensors' lengths. All such lengths share errors: counted
+// again, many weak ones would outvote the sensors' scale.
 void MarkRedundantLengths(int num_nodes, std::vector<PositionEdge>* edges) {
   DisjointSets sets(num_nodes);
   for (const PositionEdge& edge : *edges) {
@@ -32,7 +39,7 @@ void MarkRedundantLengths(int num_nodes, std::vector<PositionEdge>* edges) {
 }
 
 std::vector<PositionEdge> CollectEdges(
-    const TranslationAveragingOptions& options, const ViewGraph& graph,
+    const ViewGraph& graph,
     const std::map<image_t, Eigen::Quaterniond>& cams_from_world,
     const std::vector<std::optional<EdgeLength>>& soft_lengths) {
   std::vector<PositionEdge> edges;
@@ -49,7 +56,7 @@ std::vector<PositionEdge> CollectEdges(
     const double norm = translation_in_world.norm();
     if (norm > 0.0) collected.direction = translation_in_world / norm;
     collected.direction_sigma =
-        std::max(edge.direction_sigma_rad, options.min_sigma);
+        std::max(edge.direction_sigma_rad, kMinPositionSigmaRatio);
     if (edge.length_m.has_value()) {
       constexpr double kFallbackRatio = 0.05;
       collected.kind = PositionEdge::kFixed;
@@ -62,7 +69,7 @@ std::vector<PositionEdge> CollectEdges(
       collected.length = soft_lengths[e]->length;
       collected.length_sigma =
           collected.length *
-          std::max(soft_lengths[e]->log_sigma, options.min_soft_length_sigma);
+          std::max(soft_lengths[e]->log_sigma, kMinSoftLengthSigma);
     }
     edges.push_back(collected);
   }
@@ -106,12 +113,12 @@ class PositionSolver {
     if (!(unit_ > 0.0)) unit_ = 1.0;
   }
 
-  // IRLS until the centres rest, or nearly where the refinement follows.
-  // hold_soft: lengths of soft edges are fixed too. The number of iterations is
-  // added up in the result.
+  // IRLS until the centres converge, with a tenfold bound where the refinement,
+  // which moves the centres further, follows. hold_soft: lengths of soft edges
+  // are fixed too. Adds the number of iterations to the result.
   bool Run(bool hold_soft, Vectors* centers, GlobalPositions* result) {
     const double convergence_ratio =
-        options_.convergence_ratio * (options_.refine ? 10.0 : 1.0);
+        kPositionConvergenceRatio * (options_.refine ? 10.0 : 1.0);
     result->converged = false;
     for (int k = 0; k < options_.max_num_iterations; ++k) {
       Vectors next;
@@ -155,8 +162,8 @@ class PositionSolver {
       double length = edge.length;
       if (!is_held) length = FreeLength(edge, difference);
       differences.row(e) = length * edge.direction.transpose();
-      // s_ij = 0: the centres are the wrong way round, and the edge is silent
-      // but for a trace that keeps the system regular.
+      // s_ij = 0: the centres lie in the opposite direction. The edge keeps
+      // only a trace of its weight, so that the system stays regular.
       constexpr double kSilent = 1e-6;
       const double scale = std::max(length, 1e-2 * unit_);
       double residual = 1.0;
@@ -167,16 +174,15 @@ class PositionSolver {
           is_held ? std::max(edge.direction_sigma, edge.length_sigma / scale)
                   : edge.direction_sigma;
       const double weight =
-          1.0 /
-          (sigma * std::max(residual, options_.min_residual) * scale * scale);
+          1.0 / (sigma * std::max(residual, kMinResidual) * scale * scale);
       const bool is_silent = !is_held && length == 0.0;
       weights[e] = is_silent ? kSilent * weight : weight;
     }
     return solver_.Solve(weights, differences, next);
   }
 
-  // 1 / s_ij at the best s_ij >= 0 for the present centres: the length at which
-  // the unit direction is hit, |difference|^2 / (direction . difference).
+  // 1 / s_ij at the best s_ij >= 0 for the present centres, which minimises
+  // | s_ij difference - direction |: |difference|^2 / (direction . difference).
   double FreeLength(const PositionEdge& edge,
                     const Eigen::Vector3d& difference) const {
     const double along = edge.direction.dot(difference);
@@ -207,12 +213,6 @@ void NormalizeScale(const std::vector<PositionEdge>& edges, Vectors* centers) {
 bool TranslationAveragingOptions::IsValid(std::string* error) const {
   return OptionChecker(error)
       .AtLeast(1, "max_num_iterations", max_num_iterations)
-      .AtLeast(1, "max_num_refine_iterations", max_num_refine_iterations)
-      .Positive({{"convergence_ratio", convergence_ratio},
-                 {"min_sigma", min_sigma},
-                 {"min_residual", min_residual},
-                 {"refine_loss_scale", refine_loss_scale},
-                 {"min_soft_length_sigma", min_soft_length_sigma}})
       .AllHold();
 }
 
@@ -224,7 +224,7 @@ GlobalPositions EstimateGlobalPositions(
   GlobalPositions result;
   const int num_nodes = graph.images.size();
   const std::vector<PositionEdge> edges =
-      CollectEdges(options, graph, cams_from_world, soft_lengths);
+      CollectEdges(graph, cams_from_world, soft_lengths);
   if (num_nodes == 0 || !IsConnected(edges, num_nodes)) return result;
   result.metric = std::any_of(edges.begin(), edges.end(), [](const auto& edge) {
     return edge.kind == PositionEdge::kFixed;
@@ -242,13 +242,13 @@ GlobalPositions EstimateGlobalPositions(
     return result;
   }
   // Without metres, freeing all lengths at once lets weak parts of the graph
-  // shrink; the refinement frees them as far as their sigmas say.
+  // shrink; the refinement frees them within their sigmas.
   if ((result.metric || !options.refine) &&
       !solver.Run(false, &centers, &result)) {
     return result;
   }
   if (options.refine) {
-    const bool converged = RefinePositions(options, edges, &centers, &result);
+    const bool converged = RefinePositions(edges, &centers, &result);
     result.converged = converged;
   }
   if (!centers.allFinite()) return result;

@@ -16,23 +16,9 @@ namespace adasfm {
 
 struct TranslationAveragingOptions {
   int max_num_iterations = 100;
-  // Iterations stop when the mean movement of the centres falls below this
-  // share of the median edge length; those before the refinement below ten
-  // times as much, as it moves the centres further.
-  double convergence_ratio = 1e-4;
-  // Sigmas of directions and of relative lengths below this are taken as this.
-  double min_sigma = 2e-3;
-  // L1 weights are bounded: residuals below this (relative to the edge's
-  // length) weigh alike.
-  double min_residual = 1e-3;
   // Second stage: directions across and lengths along the edge weigh by their
-  // own sigmas, with a Cauchy loss that takes over at this many sigmas.
+  // own sigmas, with a Cauchy loss.
   bool refine = true;
-  double refine_loss_scale = 2.0;
-  int max_num_refine_iterations = 100;
-  // Least relative sigma of lengths from shared points in the second stage:
-  // neighbouring edges share points, so their errors are not independent.
-  double min_soft_length_sigma = 0.05;
 
   bool IsValid(std::string* error) const;
 };
@@ -44,7 +30,7 @@ struct GlobalPositions {
   bool metric = false;
   std::map<image_t, Eigen::Vector3d> centers;
   int num_iterations = 0;
-  // Largest movement of the last iteration over the median edge length.
+  // Mean movement in the last iteration over the median edge length.
   double last_change = 0.0;
 };
 
@@ -55,7 +41,7 @@ struct GlobalPositions {
 // Stages:
 //   1 without initial_centers (all images or none): soft_lengths (one per edge,
 //     may be empty) are held; convex
-//   2 all lengths but length_m free: bilinear
+//   2 with metres or without refine: all lengths but length_m free; bilinear
 //   3 refine: across and along the edges by their own sigmas
 // Gauge: the first image is at the origin; without metres the median edge
 // length is 1. The graph must be connected through edges with a translation.

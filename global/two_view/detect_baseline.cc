@@ -14,16 +14,16 @@
 namespace adasfm {
 namespace {
 
-// Of the absolute value of a normal variable, and of the length of two, in
-// sigmas.
+// In sigmas: of the absolute value of a normal variable, and of the length of a
+// vector of two.
 constexpr double kMedianOfAbsolute = 0.6745;
 constexpr double kMedianOfLength = 1.1774;
 // 1 sigma of the ratio of both medians, times the root of the number of
 // matches.
 constexpr double kRatioSigma = 1.37;
 
-// The median distance of the second keypoints, in px, from where the rotation
-// alone takes the first ones.
+// The median distance of the second keypoints, in px, from the first ones moved
+// by the rotation alone. improved: a better rotation.
 double MedianDisplacementPx(const EdgeBearings& bearings,
                             const Eigen::Matrix3d& rotation,
                             Eigen::Matrix3d* improved) {
@@ -42,7 +42,7 @@ double MedianDisplacementPx(const EdgeBearings& bearings,
         to_pixel * (bearings.bearings2[k]->direction - turned);
     const Eigen::Matrix<double, 2, 3> jacobian = to_pixel * Hat(turned);
     displacements.push_back(displacement.norm());
-    // Sum of distances, by reweighted squares: half may be anything.
+    // Sum of distances, by reweighted squares: up to half may be outliers.
     const double weight = 1.0 / std::max(kMinPx, displacements.back());
     matrix += weight * jacobian.transpose() * jacobian;
     right_side -= weight * jacobian.transpose() * displacement;
@@ -75,8 +75,8 @@ bool DetectBaseline(const EdgeBearings& bearings,
   const double expected_px = kMedianOfLength * std::sqrt(2.0) * sigma_px;
   const double tolerance =
       3.0 * kRatioSigma / std::sqrt(static_cast<double>(count));
-  // Without a baseline, turns along the epipolar lines cost nothing, so the
-  // rotation at hand may be any of them.
+  // Without a baseline, rotations along the epipolar lines cost nothing, so the
+  // given one may be any of them.
   constexpr int kMaxNumTurns = 3;
   Eigen::Matrix3d turned = rotation;
   double last_px = std::numeric_limits<double>::infinity();

@@ -7,16 +7,16 @@
 
 namespace adasfm {
 
-// Whether half of a pair's points move by more than the noise of the keypoints
-// would let them, whatever the rotation (the search for one starts at the given
-// one). At a standstill, and when turning on the
-// spot, they do not: then the few of grossest noise, or those on passing cars,
-// decide the direction alone, and agree with each other very well.
+// Whether at least half of a pair's points move by more than keypoint noise
+// explains under any rotation (the search for one starts at the given one).
+// When the camera is stationary or rotates on the spot, they do not: then the
+// few matches with the grossest noise, or those on passing cars, alone decide
+// the direction, and agree with each other very well.
 //
 // The noise is measured by the epipolar distances at (rotation, translation),
-// at least keypoint_sigma_px; medians of both, so that neither takes heed of
-// less than half of the matches. Three sigmas of the medians' own errors are
-// granted. bearings: matches of a pair; |translation| = 1.
+// at least keypoint_sigma_px. Noise and motion are medians, so that up to 50 %
+// outliers cannot decide, and three sigmas of the medians' own errors are
+// tolerated. bearings: matches of a pair; |translation| = 1.
 bool DetectBaseline(const EdgeBearings& bearings,
                     const Eigen::Matrix3d& rotation,
                     const Eigen::Vector3d& translation,

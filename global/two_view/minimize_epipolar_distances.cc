@@ -98,7 +98,7 @@ struct LossSums {
 
 LossSums AccumulateLoss(double loss_scale_px, const EdgeBearings& bearings,
                         const TwoViewPose& pose) {
-  // Where nearly all matches are far off, their slopes say nothing.
+  // Where nearly all matches are far off, their slopes mean nothing.
   constexpr double kMinSlope = 0.1;
   LossSums sums;
   for (size_t k = 0; k < bearings.bearings1.size(); ++k) {

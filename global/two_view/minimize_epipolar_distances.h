@@ -56,7 +56,7 @@ struct EpipolarNoise {
   int num_unknowns = kNumPoseUnknowns;
 };
 
-// What matches say about the pose at which their cost is least.
+// The information of the matches about the pose at which their cost is least.
 struct EpipolarInformation {
   // Inverse covariance by a rotation vector in camera 2's frame and the
   // direction in `basis`, its tangent plane; 1 / rad^2. May be singular.
@@ -69,8 +69,8 @@ struct EpipolarInformation {
 // The inverse of the M-estimator's sandwich covariance. With psi = w d the
 // distances after the loss, M = sum w J J^T and means over all matches,
 //   covariance = mean(psi^2) mean(w) / mean(psi')^2 M^-1.
-// The loss thus cuts nothing off the noise. Without a baseline the noise alone
-// makes up the directions' block (DetectBaseline tells).
+// The loss thus does not truncate the noise. Without a baseline
+// (DetectBaseline) the directions' block consists of noise alone.
 EpipolarInformation ComputeEpipolarInformation(const EpipolarNoise& noise,
                                                const EdgeBearings& bearings,
                                                const TwoViewPose& pose);

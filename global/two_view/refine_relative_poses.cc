@@ -29,7 +29,7 @@ void SetSigmas(const Eigen::Matrix<double, 5, 5>& information,
           1));
 }
 
-// Starts at the prediction, with the direction that suits it.
+// Starts at the prediction, with the best direction for its rotation.
 EpipolarMinimum MinimizeFromPrediction(const EpipolarMinimization& options,
                                        const EdgeBearings& bearings,
                                        const Eigen::Vector3d& direction) {
@@ -65,6 +65,10 @@ void RefineEdge(const RelativePoseRefinementOptions& options,
   TwoViewPose pose = own.pose;
   EpipolarInformation information = compute_information(pose);
   if (prediction.has_value()) {
+    // Largest cost of the pose with the prediction above the matches' own
+    // minimum, in units of the noise's variance. Beyond, prediction and matches
+    // contradict each other and the matches' own pose stays.
+    constexpr double kMaxPredictionCost = 25.0;
     const double variance = information.cost_variance;
     const Eigen::Matrix3d predicted_information =
         prediction->covariance.inverse();
@@ -72,7 +76,7 @@ void RefineEdge(const RelativePoseRefinementOptions& options,
                                variance * predicted_information};
     const EpipolarMinimum predicted =
         MinimizeFromPrediction(minimization, bearings, pose.translation);
-    if (predicted.cost < own.cost + options.max_prediction_cost * variance) {
+    if (predicted.cost < own.cost + kMaxPredictionCost * variance) {
       pose = predicted.pose;
       information = compute_information(pose);
       information.matrix.topLeftCorner<3, 3>() += predicted_information;

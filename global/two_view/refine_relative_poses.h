@@ -20,33 +20,28 @@ struct RelativePoseRefinementOptions {
   double keypoint_sigma_px = 0.5;
   // Where the Cauchy loss takes over, px of epipolar distance.
   double loss_scale_px = 1.5;
-  // How much more the pose that heeds the prediction may cost than the matches'
-  // own best, in units of the noise's variance: beyond, they contradict each
-  // other and the matches' own pose stays.
-  double max_prediction_cost = 25.0;
   int num_threads = -1;
 
   bool IsValid(std::string* error) const;
 };
 
-// What odometry or global rotations say of a pair's rotation.
+// A prediction of a pair's rotation, by odometry or global rotations.
 struct RotationPrediction {
   Eigen::Quaterniond cam2_from_cam1 = Eigen::Quaterniond::Identity();
   // Of a rotation vector in camera 2's frame, rad^2.
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Identity();
 };
 
-// Turns the poses that verification left (fit to few matches) into least-
-// squares ones: every kept visual edge's rotation and direction minimise the
+// Replaces the poses of verification (fit to few matches) by least-squares
+// ones: every kept visual edge's rotation and direction minimise the
 // first-order (Sampson) epipolar distances in px of its matches, robustly, and
 // their sigmas follow from the normal matrix. An edge without a useful pose
-// (fewer than 8 matches) keeps what it had.
+// (fewer than 8 matches) keeps what it had. Sets has_baseline too
+// (DetectBaseline).
 //
-// Sets has_baseline too (DetectBaseline).
-//
-// Nearly planar scenes leave a valley, or a second optimum, degrees away.
-// predictions (none, or one per edge where there is one) decide there: they
-// enter as a quadratic term, unless the matches contradict them clearly.
+// In nearly planar scenes the cost has a valley, or a second optimum, degrees
+// away. There predictions (none, or one per edge where there is one) decide:
+// they enter as a quadratic term, unless the matches contradict them clearly.
 void RefineRelativePoses(
     const RelativePoseRefinementOptions& options,
     const GlobalCorrespondences& correspondences,

@@ -16,14 +16,15 @@
 namespace adasfm {
 namespace {
 
-// The larger axis of the direction's covariance: noise of the keypoints, and
-// what an error of the rotation would turn it by.
+// 1 sigma along the larger axis of the direction's covariance, by the noise of
+// the keypoints and the errors of the rotation.
 double DirectionSigma(const RelativeTranslationOptions& options,
                       const EdgeBearings& bearings, const TwoViewPose& pose) {
   const EpipolarInformation information = ComputeEpipolarInformation(
       {options.loss_scale_px, options.keypoint_sigma_px, kNumDirectionUnknowns},
       bearings, pose);
-  // The ridge stands for a radian: what nothing determines.
+  // The identity as ridge limits undetermined directions to a sigma of a
+  // radian.
   const Eigen::Matrix2d by_matches =
       (information.matrix.bottomRightCorner<2, 2>() +
        Eigen::Matrix2d::Identity())
@@ -47,6 +48,8 @@ void RefineEdge(const RelativeTranslationOptions& options,
                                     : Eigen::Vector3d::Zero().eval();
   const Eigen::Vector3d direction =
       EstimateTranslationDirection(search, problem, start).direction;
+  // Edges whose direction is less certain than this lose their translation.
+  constexpr double kMaxDirectionSigmaRad = DegToRad(20.0);
   edge->has_translation = false;
   if (direction.norm() == 0.0) return;
   edge->cam2_from_cam1 = Rigid3d(problem.rotation, direction);
@@ -55,8 +58,7 @@ void RefineEdge(const RelativeTranslationOptions& options,
   edge->has_baseline = DetectBaseline(problem.bearings, problem.rotation,
                                       direction, options.keypoint_sigma_px);
   edge->has_translation =
-      edge->has_baseline &&
-      edge->direction_sigma_rad < DegToRad(options.max_direction_sigma_deg);
+      edge->has_baseline && edge->direction_sigma_rad < kMaxDirectionSigmaRad;
 }
 
 }  // namespace
@@ -66,8 +68,7 @@ bool RelativeTranslationOptions::IsValid(std::string* error) const {
       .AtLeast(1, "max_num_iterations", max_num_iterations)
       .AtLeast(8, "max_num_matches", max_num_matches)
       .Positive({{"keypoint_sigma_px", keypoint_sigma_px},
-                 {"loss_scale_px", loss_scale_px},
-                 {"max_direction_sigma_deg", max_direction_sigma_deg}})
+                 {"loss_scale_px", loss_scale_px}})
       .NotNegative({{"rotation_sigma_deg", rotation_sigma_deg}})
       .AllHold();
 }

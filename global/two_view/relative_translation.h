@@ -19,11 +19,9 @@ struct RelativeTranslationOptions {
   double keypoint_sigma_px = 0.5;
   // Where the robust loss takes over, px.
   double loss_scale_px = 1.0;
-  // 1 sigma of the global rotations' errors between two images, which turn
+  // 1 sigma of the global rotations' errors between two images, which rotate
   // directions by this times depth over baseline.
   double rotation_sigma_deg = 0.05;
-  // Edges whose direction is less certain than this lose their translation.
-  double max_direction_sigma_deg = 20.0;
   int num_threads = -1;
 
   bool IsValid(std::string* error) const;
@@ -38,8 +36,8 @@ struct RelativeTranslationReport {
 // rotations, for every kept visual edge (step 2.5). The residuals are divided
 // by their image Jacobian, so they are px on any camera. The sign puts points
 // in front of both cameras. Sets the edge's rotation to the global one, its
-// direction, and direction_sigma_rad (the larger axis) from the normal matrix;
-// an edge with (nearly) no baseline says nothing about direction and loses
+// direction, and direction_sigma_rad (the larger axis) from the normal matrix.
+// An edge with (nearly) no baseline does not constrain the direction and loses
 // has_translation.
 RelativeTranslationReport EstimateRelativeTranslations(
     const RelativeTranslationOptions& options,

@@ -30,8 +30,8 @@ Eigen::Matrix3d SumNormals(const TranslationProblem& problem,
 }
 
 // Least eigenvectors while the loss narrows from widest_factor times its scale.
-// They reach far, but the distances' roots are not held in what they minimise;
-// the minimum itself is found from there.
+// They converge from far away, but hold the distances' denominators fixed and
+// so miss the minimum, which is found from there.
 EpipolarMinimum Solve(const DirectionSearch& options,
                       const TranslationProblem& problem, double widest_factor,
                       Eigen::Vector3d translation) {
@@ -132,7 +132,7 @@ TranslationDirection EstimateTranslationDirection(
   TranslationDirection best;
   if (problem.normals.size() < 2) return best;
   best.cost = std::numeric_limits<double>::infinity();
-  // The searched start is near if right; the given one may be many pixels off.
+  // A right start of the search is near; the given one may be many pixels off.
   constexpr double kNear = 2.0;
   constexpr double kFar = 8.0;
   std::vector<std::pair<double, Eigen::Vector3d>> starts;

@@ -40,7 +40,7 @@ inline EpipolarResidual ComputeEpipolarResidual(
 
 // A distance with its derivatives by a rotation vector in camera 2's frame
 // (R -> Exp(w) R) and by t. Scaling t changes nothing, so the latter is
-// orthogonal to t. Zero where the distance has no root.
+// orthogonal to t. Zero where the root vanishes.
 struct EpipolarTerm {
   double distance_px = 0.0;
   Eigen::Matrix<double, 6, 1> jacobian = Eigen::Matrix<double, 6, 1>::Zero();
@@ -50,7 +50,7 @@ struct EpipolarTerm {
 // a = J J^T n of both images:
 //   N d(distance) = de - (e / N^2) (a1 . dn1 + a2 . dn2)
 //   de = x2 . dn2,   dn2 = t x (w x y) + dt x y,   dn1 = R^T (m x w + x2 x dt)
-// Descent with de / N alone ends elsewhere than at the least distances.
+// Descent with de / N alone does not end at the least distances.
 inline EpipolarTerm LinearizeEpipolarDistance(
     const Bearing& bearing1, const Bearing& bearing2,
     const Eigen::Matrix3d& rotation, const Eigen::Vector3d& translation) {
@@ -103,8 +103,8 @@ inline Eigen::Matrix<double, 3, 2> TangentBasis(const Eigen::Vector3d& v) {
   return basis;
 }
 
-// Whether more parallax speaks for points in front of both cameras than
-// behind.
+// Whether points lie in front of both cameras rather than behind, by a vote
+// weighted by parallax.
 inline bool IsInFrontByVote(const std::vector<const Bearing*>& bearings1,
                             const std::vector<const Bearing*>& bearings2,
                             const std::vector<double>& weights,

@@ -15,8 +15,6 @@ const char* EdgeRemovalName(EdgeRemoval removal) {
       return "kept";
     case EdgeRemoval::kFewInliers:
       return "few inliers";
-    case EdgeRemoval::kRelativePose:
-      return "no relative pose";
     case EdgeRemoval::kOdometryPose:
       return "pose contradicts odometry";
     case EdgeRemoval::kOdometry:

@@ -19,16 +19,15 @@ enum class EdgeSource {
   kAugmented,  // rotation from matches, translation from a prior
 };
 
-// Why an edge takes no part any more.
+// Why an edge was removed.
 enum class EdgeRemoval {
   kKept,
   kFewInliers,
-  kRelativePose,  // its own matches do not support one relative pose
   kOdometryPose,  // contradicts the odometry, but others at its place do not
   kOdometry,      // contradicts the odometry
   kFalseLoop,     // is inconsistent with other loops
   kUnconfirmedClosure,  // alone joins two parts of a drive, and may be wrong
-  kUnknownSize,         // joins parts whose relative size nothing tells
+  kUnknownSize,         // joins parts of unknown relative scale
   kRotation,            // off the global rotations
   kTranslation,         // off the global positions
   kDisconnected,        // one of its images has no pose
@@ -45,8 +44,8 @@ struct ViewGraphEdge {
   EdgeSource source = EdgeSource::kVisual;
   bool has_rotation = true;
   bool has_translation = true;
-  // False: both centres are one as far as vision can tell, and the direction
-  // says nothing.
+  // False: vision cannot distinguish both centres, and the direction means
+  // nothing.
   bool has_baseline = true;
   // Distance of the camera centres in metres, from sensors.
   std::optional<double> length_m;
@@ -65,8 +64,8 @@ struct ViewGraphEdge {
 struct ViewGraph {
   std::vector<image_t> images;       // sorted
   std::vector<ViewGraphEdge> edges;  // sorted by pair, one per pair
-  // Where each image stands in the order of capture, all different; empty:
-  // that of the ids.
+  // The position of each image in the order of capture, all different; empty:
+  // the order of the ids.
   std::vector<int64_t> capture_ranks;
 
   // The position of an image in images, -1 when absent.

@@ -115,7 +115,7 @@ def run_variant(variant, folder, args):
     with open(os.path.join(coarse, 'summary.json')) as file:
       model = json.load(file)['models'][0]
     record['unsuspected'] = (model['pairs_agree'] and
-                             not model['unverified_joins'])
+                             not model['unconfirmed_closures'])
     if variant == 'as it is' and args.compare_pairs:
       record['pairs'] = evaluate_pairs(database, os.path.join(coarse, '0'),
                                        folder, args, log_path)

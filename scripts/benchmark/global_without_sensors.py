@@ -44,7 +44,7 @@ def run_ours(folder, args, record):
   record['coarse'] = [measure(os.path.join(coarse, str(k)), folder, args,
                               log_path) for k in range(len(models))]
   record['suspected'] = [not model['pairs_agree'] or
-                         bool(model['unverified_joins']) for model in models]
+                         bool(model['unconfirmed_closures']) for model in models]
   output = os.path.join(folder, 'model')
   run([args.colmap, 'adasfm_mapper', '--database_path', database,
        '--input_path', os.path.join(coarse, '0'), '--output_path', output],

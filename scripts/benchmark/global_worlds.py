@@ -3,7 +3,7 @@
 """Other worlds and worse sensors: where does the coarse global stage end?
 
 Makes drives with look-alike places, blackouts and wheel slips, spoils their
-logs, calibration or database (clocks, mounting, noise, rates, holes, focal
+logs, calibration or database (clocks, extrinsics, noise, rates, holes, focal
 length), runs the importer, `adasfm_global` and `adasfm_mapper` on them, and
 writes docs/results/global_worlds.md and the figures behind it
 (benchmark/results/global_worlds.json). Needs only Python's standard library.
@@ -143,9 +143,9 @@ def run_commands(row, folder, args, record):
   with open(os.path.join(coarse, 'summary.json')) as file:
     summary = json.load(file)
   model = summary['models'][0]
-  record['joins_not_made'] = len(summary['joins']['not_made'])
+  record['joins_not_made'] = len(summary['segment_closures']['not_made'])
   record['converged'] = model['pairs_agree']
-  record['unverified_joins'] = len(model['unverified_joins'])
+  record['unconfirmed_closures'] = len(model['unconfirmed_closures'])
   record['coarse'] = measure(os.path.join(coarse, '0'), folder, args, log_path)
   if args.run_mapper:
     output = os.path.join(folder, 'model')
@@ -185,15 +185,15 @@ def describe(record):
     said.append(record['error'])
   if not record.get('converged', True):
     said.append('contradicts vision')
-  if record.get('unverified_joins'):
+  if record.get('unconfirmed_closures'):
     said.append('unverified joins')
   if record.get('joins_not_made'):
     said.append('joins not made')
   for key, word in (('contradict each other', 'sensors against vision'),
                     ('agree with a focal', 'focal length'),
-                    ('mount is', 'camera mount'),
+                    ('camera-IMU rotation is', 'camera-IMU rotation'),
                     ('images and IMU differ', 'time shift'),
-                    ('did not settle', 'smoother did not settle'),
+                    ('did not converge', 'smoother did not converge'),
                     ('gaps of more', 'hole in the log')):
     if any(key in warning for warning in record['warnings']):
       said.append(word)

@@ -27,7 +27,7 @@ from benchmarking.pair_counts import count_pairs
 from benchmarking.process import Failed, run
 from benchmarking.sets import camera_params
 
-NOT_ABOUT_A_MODEL = ('are in no model', 'fall apart', 'may join another',
+NOT_ABOUT_A_MODEL = ('are in no model', 'fall apart', 'may meet another',
                      'joins not made')
 
 
@@ -98,9 +98,9 @@ def read_outcome(folder, coarse, final, log_path, usage, args):
     summary = json.load(file)
   warnings = [text for text in read_warnings(log_path)
               if 'no sensor priors' not in text]
-  if summary['joins']['not_made']:
+  if summary['segment_closures']['not_made']:
     warnings.append('joins not made')
-  if any(model['unverified_joins'] for model in summary['models']):
+  if any(model['unconfirmed_closures'] for model in summary['models']):
     warnings.append('unverified joins')
   return {'images': sum(model['images'] for model in models),
           'models': len(models),

@@ -25,33 +25,33 @@ struct BagMessage {
   ByteSpan bytes;
 };
 
-// What is done with a message; an error ends the reading.
+// Called with each message; an error ends the reading.
 using BagVisitor = std::function<Status(const BagMessage&)>;
 
-// A recording of messages. Bytes of unknown origin: every length is checked
-// before it is used, and memory is taken only for bytes that are there.
+// A recording of messages. Its bytes are not trusted: every length is checked
+// before it is used, and memory is allocated only for bytes that exist.
 class BagReader {
  public:
   virtual ~BagReader() = default;
 
-  // Those that have messages, in the order of their names.
+  // Topics with messages, in the order of their names.
   virtual const std::vector<BagTopic>& Topics() const = 0;
 
   // Visits all messages of the named topics in the order of the file. A file
-  // that was cut short or is damaged is read as far as that is possible; a
-  // warning then says so.
+  // that was cut short or is damaged is read as far as possible, with a
+  // warning; for ROS 1 it is an error.
   virtual Status Read(const std::set<std::string>& topics,
                       const BagVisitor& visit,
                       std::vector<std::string>* warnings) = 0;
 };
 
 // Opens a recording: a ROS 2 .mcap or .db3 file, a rosbag2 folder, or a ROS 1
-// .bag (in builds with librosbag-storage). An error of one line says what else
-// the path is.
+// .bag (in builds with librosbag-storage). For other paths, an error of one
+// line states the cause.
 StatusOr<std::unique_ptr<BagReader>> OpenBag(const std::string& path);
 
-// Whether a path is one that OpenBag is for, by its name or, for a folder, by
-// the bag files in it.
+// Whether OpenBag accepts a path, by its name or, for a folder, by
+// metadata.yaml or the bag files in it.
 bool IsBag(const std::string& path);
 
 // "sensor_msgs/Imu" of "sensor_msgs/msg/Imu".

@@ -9,7 +9,7 @@
 
 namespace adasfm {
 
-// Bytes that belong to somebody else.
+// Bytes that are owned elsewhere.
 struct ByteSpan {
   const uint8_t* data = nullptr;
   size_t size = 0;
@@ -17,7 +17,7 @@ struct ByteSpan {
 
 // Reads numbers from bytes of unknown origin. A read beyond the end gives zero
 // and makes the reader fail for good, so that a caller checks once at the end.
-// The machine is little-endian, as everywhere in this project.
+// Assumes a little-endian machine, as everywhere in this project.
 class ByteReader {
  public:
   explicit ByteReader(const ByteSpan& bytes) : bytes_(bytes) {}

@@ -10,7 +10,7 @@
 namespace adasfm {
 namespace {
 
-// No message is near this; a larger one is damage.
+// Far above the size of any message; a larger one is damaged.
 constexpr uint64_t kMaxMessageBytes = 256u << 20;
 
 class Db3Bag : public BagReader {
@@ -56,7 +56,7 @@ Status Db3Bag::Read(const std::set<std::string>& topics,
                     std::vector<std::string>* warnings) {
   std::vector<uint8_t> decompressed;
   int num_bad = 0;
-  // No order but the file's: what there is of a damaged one is read.
+  // Without ORDER BY, so that a damaged file is read as far as possible.
   try {
     SqliteStatement statement(&database_,
                               "SELECT topic_id, data FROM messages");

@@ -11,12 +11,12 @@
 namespace adasfm {
 namespace {
 
-// Memory is taken in such steps, so that a claimed size costs nothing.
+// Memory is allocated in such steps, so that a false size costs no memory.
 constexpr size_t kStepBytes = 1 << 18;
 
-// Calls decode(input position, output, output capacity) until it is done. It
-// moves the position on and returns the bytes that it wrote; sets *is_done at
-// the frame's end and *error when the data are bad.
+// Calls decode(input position, output, output capacity) until the frame ends.
+// decode advances the position and returns the number of bytes written; it sets
+// *is_done at the end of the frame and *error when the data are bad.
 template <typename Decode>
 std::string DecodeAll(uint64_t max_size, const Decode& decode,
                       std::vector<uint8_t>* output) {

@@ -9,13 +9,13 @@
 
 namespace adasfm {
 
-// Decodes a frame of lz4 or zstd (`compression`) into *output, of at most
-// max_size bytes. Returns what is wrong, nothing when the frame was complete;
-// *output holds what could be decoded before that.
+// Decodes one lz4 or zstd frame (`compression`) into *output, of at most
+// max_size bytes. Returns the error, an empty text when the frame was complete;
+// *output contains what was decoded before an error.
 std::string Decompress(const std::string& compression, const ByteSpan& input,
                        uint64_t max_size, std::vector<uint8_t>* output);
 
-// Whether the bytes begin as a frame of zstd does.
+// Whether the bytes begin like a zstd frame.
 bool IsZstd(const ByteSpan& bytes);
 
 // The checksum CRC-32 (IEEE 802.3).

@@ -15,7 +15,7 @@ namespace {
 constexpr uint8_t kMagic[] = {0x89, 'M', 'C', 'A', 'P', '0', '\r', '\n'};
 constexpr size_t kRecordHeaderBytes = 9;  // opcode and length
 constexpr size_t kFooterBytes = 20;
-// No writer makes chunks near this; a larger claim is damage.
+// Far above the size of any chunk; a larger one is damaged.
 constexpr uint64_t kMaxChunkBytes = 256u << 20;
 
 enum Opcode : uint8_t {
@@ -33,8 +33,8 @@ struct Record {
   ByteSpan content;
 };
 
-// What the definitions seen so far say; nothing for channels that hold other
-// things than ROS messages.
+// The channels defined by the records read so far; only channels with ROS
+// messages.
 class Channels {
  public:
   void AddSchema(const ByteSpan& content) {
@@ -236,8 +236,8 @@ Status McapBag::VisitChunk(const ByteSpan& content, const MessageVisitor& visit,
   const uint32_t crc = reader.Read<uint32_t>();
   const std::string compression = reader.ReadString();
   const uint64_t stored_size = reader.Read<uint64_t>();
-  // A chunk that is cut short has fewer bytes than it says; what there is of
-  // it is read.
+  // A chunk that is cut short has fewer bytes than it states; the bytes that
+  // exist are read.
   const bool is_cut = stored_size > reader.num_left();
   ByteSpan records =
       reader.Take(std::min<uint64_t>(stored_size, reader.num_left()));
@@ -247,7 +247,7 @@ Status McapBag::VisitChunk(const ByteSpan& content, const MessageVisitor& visit,
   } else if (size > kMaxChunkBytes) {
     cause = "it claims " + std::to_string(size) + " bytes";
   } else if (!compression.empty()) {
-    // One byte more tells data that are longer than the chunk says.
+    // One byte more detects data that are longer than the chunk states.
     cause = Decompress(compression, records, size + 1, &chunk_);
     records = {chunk_.data(), chunk_.size()};
   }
@@ -287,9 +287,13 @@ Status McapBag::Scan(const MessageVisitor& visit, Damage* damage) {
       return Status::Ok();
     }
     const uint64_t num_stored = std::min(length, num_left);
-    if (is_needed && num_stored <= kMaxChunkBytes &&
-        ReadBytes(position, num_stored)) {
-      // The buffer is not touched before the record is done with.
+    if (is_needed && num_stored > kMaxChunkBytes) {
+      if (damage->num_bad_chunks++ == 0) {
+        damage->first_cause =
+            "a record of " + std::to_string(num_stored) + " bytes";
+      }
+    } else if (is_needed && ReadBytes(position, num_stored)) {
+      // The buffer must not change before the record has been visited.
       const Status status = VisitRecord(
           {opcode, {buffer_.data(), buffer_.size()}}, visit, damage);
       if (!status.ok()) return status;

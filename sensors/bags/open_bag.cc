@@ -124,7 +124,7 @@ StatusOr<std::unique_ptr<BagReader>> OpenBag(const std::string& path) {
 bool IsBag(const std::string& path) {
   std::error_code error;
   if (!fs::is_directory(path, error)) {
-    // A name that is all extension is none.
+    // A name such as ".bag" has no extension.
     return IsBagFile(path);
   }
   if (fs::exists(path + "/metadata.yaml", error)) return true;

@@ -39,7 +39,7 @@ class FieldReader {
 
   FieldReader& operator>>(std::string& text) {
     ByteSpan span = reader_.Take(Read<uint32_t>());
-    // CDR's strings end in a zero, which their length counts.
+    // CDR strings end in a zero, which is included in their length.
     if (is_cdr_ && span.size > 0) --span.size;
     text.assign(reinterpret_cast<const char*>(span.data), span.size);
     return *this;
@@ -75,7 +75,7 @@ class FieldReader {
   }
 
   FieldReader& operator>>(RosHeader& header) {
-    if (!is_cdr_) Read<uint32_t>();  // a number that ROS 2 has no more
+    if (!is_cdr_) Read<uint32_t>();  // a number that ROS 2 does not have
     const int64_t seconds =
         is_cdr_ ? Read<int32_t>() : static_cast<int64_t>(Read<uint32_t>());
     const int64_t nanoseconds = Read<uint32_t>();
@@ -87,8 +87,8 @@ class FieldReader {
     for (int i = 0; i < count; ++i) Read<double>();
   }
 
-  // The count of a sequence whose elements have at least so many bytes: never
-  // more than what is left can hold.
+  // The count of a sequence whose elements have at least min_bytes bytes each.
+  // The reader fails when the bytes left cannot contain so many.
   uint32_t ReadCount(size_t min_bytes) {
     const uint32_t count = Read<uint32_t>();
     if (count <= reader_.num_left() / min_bytes) return count;
@@ -97,7 +97,7 @@ class FieldReader {
   }
 
   bool ok() const { return reader_.ok() && is_known_; }
-  // Everything was there, and nothing else.
+  // All fields were there, and nothing but padding follows.
   bool IsComplete() const {
     return ok() && reader_.num_left() <= (is_cdr_ ? kMaxPadding : 0);
   }
@@ -217,7 +217,7 @@ bool ParseRosMessage(RosEncoding encoding, const ByteSpan& bytes,
 bool ParseRosMessage(RosEncoding encoding, const ByteSpan& bytes,
                      std::vector<RosTransform>* message) {
   FieldReader fields(encoding, bytes);
-  // Seven numbers of eight bytes, and more.
+  // A transform has at least seven numbers of eight bytes.
   message->resize(fields.ReadCount(7 * sizeof(double)));
   for (RosTransform& transform : *message) {
     RosHeader header;

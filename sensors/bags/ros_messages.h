@@ -13,8 +13,8 @@
 
 namespace adasfm {
 
-// What is read of the messages of ROS 1 and 2 (docs/reference/formats.md), in
-// their own units and frames.
+// The fields that are read from messages of ROS 1 and 2
+// (docs/reference/formats.md), in the units and frames of the messages.
 
 // How a bag's messages are serialised: ROS 2's CDR (either byte order, values
 // aligned to their size from the beginning of the body) or ROS 1's packed
@@ -107,6 +107,7 @@ struct RosTransform {
 
 // Each reads one message; false when the bytes are not such a message (too
 // short, too long, a length that does not fit), and then *message is undefined.
+// ParseRosHeader ignores what follows the header.
 bool ParseRosHeader(RosEncoding encoding, const ByteSpan& bytes,
                     RosHeader* message);
 bool ParseRosMessage(RosEncoding encoding, const ByteSpan& bytes,

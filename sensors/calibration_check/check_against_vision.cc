@@ -2,9 +2,7 @@
 #include "sensors/calibration_check/check_against_vision.h"
 
 #include <cmath>
-#include <stdexcept>
 
-#include "core/option_checker.h"
 #include "sensors/calibration_check/calibration_mistakes.h"
 #include "sensors/calibration_check/rotation_comparison.h"
 #include "sensors/calibration_check/shift_search.h"
@@ -15,15 +13,33 @@
 namespace adasfm {
 namespace {
 
-// Another explanation must fit this much better than the calibration, and one
-// listed later this much better than one listed earlier.
+// Cost ratios below which another explanation beats the calibration, and a
+// later explanation an earlier one.
 constexpr double kClearlyBetter = 0.7;
 constexpr double kTie = 0.9;
-// Cameras' rotations per gyroscope's that are tried: those nearer to 1 are
-// within what a poor focal length does.
+// Ratios of the cameras' to the gyroscope's rotation that are tried. A poor
+// focal length explains ratios nearer to 1.
 constexpr double kTurnScales[] = {0.1, 0.125, 0.167, 0.2,  0.25, 0.33,
                                   0.4, 0.5,   0.6,   0.67, 1.5,  1.75,
                                   2.0, 2.5,   3.0,   4.0,  5.0,  8.0};
+// Below this the cameras hardly rotate and the check is not conclusive.
+constexpr double kMinRotationRmsDeg = 0.15;
+// Cameras that rotate this much and fit no explanation contradict the
+// gyroscope; smaller rotations may be the noise of two-view geometries.
+constexpr double kMinContradictingRmsDeg = 1.0;
+// A time shift up to this may be a clock offset and may be corrected without
+// asking: exposure, readout and the driver's delay add up to tens of
+// milliseconds. For larger shifts another mistake is likelier.
+constexpr double kMaxCorrectedShiftS = 0.15;
+// Smaller shifts are not corrected: a filter in the gyroscope is as likely a
+// cause (of three KITTI drives on one clock, two seem to be off by 4 and 9 ms).
+constexpr double kMinCorrectedShiftS = 0.01;
+// Least unexplained share of the rotation for which gyroscope and pictures are
+// taken to show different motions.
+constexpr double kMaxUnexplainedRatio = 0.5;
+// Largest error of vision itself in that case, as a share of what is
+// unexplained.
+constexpr double kMaxVisualErrorRatio = 0.33;
 
 std::string Figures(const VisionCheck& check) {
   return FormatFigures(
@@ -35,30 +51,30 @@ class VisionComparer {
  public:
   VisionComparer(const std::vector<TimedRotation>& rotations,
                  const std::vector<ImuSample>& imu,
-                 const SensorCalibration& calibration,
-                 const VisionCheckOptions& options)
+                 const SensorCalibration& calibration)
       : rotations_(rotations),
-        search_(rotations, imu, calibration.timeshift_cam_imu_s, options),
+        search_(rotations, imu, calibration.timeshift_cam_imu_s),
         cam_from_imu_(calibration.cam_from_imu.rotation.toRotationMatrix()),
         timeshift_s_(calibration.timeshift_cam_imu_s),
-        gyroscope_noise_density_(calibration.imu_noise.gyroscope_noise_density),
-        options_(options) {}
+        gyroscope_noise_density_(
+            calibration.imu_noise.gyroscope_noise_density) {}
 
-  // Numbered steps; see there.
+  // The steps are numbered in the definition.
   VisionCheck Run();
 
  private:
   bool FindBestShifts();
   void CompareAsIs(VisionCheck* check);
-  // Whether there is one.
+  // Whether there is a mistake.
   bool NameMistake(VisionCheck* check) const;
-  // Whether there is one.
+  // Whether there is another motion.
   bool FindOtherMotion(VisionCheck* check) const;
   bool IsWorseThanNone() const;
   void CheckTurnScale(VisionCheck* check) const;
   void CheckTimeShift(VisionCheck* check) const;
   GyroscopeFilter FindFilter();
-  // The first of the best explanations that beat the calibrated one.
+  // The best explanation that beats the calibrated one, of nearly equal ones
+  // the first; else the calibrated one.
   const Explanation* FindBetter() const;
   const Explanation& calibrated() const { return explanations_[0]; }
 
@@ -67,18 +83,16 @@ class VisionComparer {
   Eigen::Matrix3d cam_from_imu_;
   double timeshift_s_;
   double gyroscope_noise_density_;
-  VisionCheckOptions options_;
   // Each at its best time shift; the first one is the calibrated one.
   std::vector<Explanation> explanations_;
   double turning_deg_ = 0.0;
-  // The calibrated one, without a shift where the log covers that.
+  // The calibrated explanation, without a time shift where the log covers that.
   Explanation as_is_;
   bool has_unshifted_ = false;
 };
 
 bool VisionComparer::FindBestShifts() {
-  const size_t min_num = options_.min_num_rotations;
-  if (search_.num_rotations() < min_num) return false;
+  if (search_.num_rotations() < kMinNumRotations) return false;
   for (const CalibrationMistake& mistake :
        ListCalibrationMistakes(cam_from_imu_)) {
     Explanation explanation;
@@ -89,22 +103,21 @@ bool VisionComparer::FindBestShifts() {
   if (!std::isfinite(calibrated().fit.cost)) return false;
   search_.RefineShift(&explanations_[0]);
   turning_deg_ = ComputeTurningDeg(search_.Compare(calibrated().shift_s));
-  return turning_deg_ >= options_.min_rotation_rms_deg;
+  return turning_deg_ >= kMinRotationRmsDeg;
 }
 
 void VisionComparer::CompareAsIs(VisionCheck* check) {
   check->is_conclusive = true;
   as_is_ = calibrated();
   const RotationComparison unshifted = search_.Compare(0.0);
-  has_unshifted_ = unshifted.visual.size() >=
-                   static_cast<size_t>(options_.min_num_rotations);
+  has_unshifted_ = unshifted.visual.size() >= kMinNumRotations;
   if (has_unshifted_) {
     as_is_.shift_s = 0.0;
     as_is_.fit = ComputeRotationFit(unshifted, cam_from_imu_);
-    check->total_correlation = ComputeRotationCorrelation(
-        unshifted, cam_from_imu_, &check->correlation);
+    check->total_correlation =
+        ComputeRotationCorrelation(unshifted, cam_from_imu_);
   }
-  // The rate is that of the cameras' rotation, which turns against the body.
+  // The rate is that of cam2_from_cam1, which rotates opposite to the body.
   const VisualBias bias =
       EstimateVisualBias(search_.Compare(calibrated().shift_s), cam_from_imu_);
   check->gyroscope_bias = cam_from_imu_.transpose() * bias.rate;
@@ -126,36 +139,33 @@ const Explanation* VisionComparer::FindBetter() const {
 bool VisionComparer::NameMistake(VisionCheck* check) const {
   const Explanation* best = FindBetter();
   check->shifted_correlation = ComputeRotationCorrelation(
-      search_.Compare(best->shift_s), best->mistake.map, nullptr);
+      search_.Compare(best->shift_s), best->mistake.map);
   if (best != &calibrated() &&
-      check->shifted_correlation >= options_.min_correlation) {
+      check->shifted_correlation >= kMinAgreeingCorrelation) {
     check->contradiction = DescribeMistake(best->mistake) + Figures(*check);
     return true;
   }
   check->shifted_correlation = ComputeRotationCorrelation(
-      search_.Compare(calibrated().shift_s), cam_from_imu_, nullptr);
+      search_.Compare(calibrated().shift_s), cam_from_imu_);
   return false;
 }
 
 bool VisionComparer::FindOtherMotion(VisionCheck* check) const {
-  const UnexplainedRotation found =
-      FindUnexplainedRotation(rotations_, search_, calibrated().shift_s,
-                              gyroscope_noise_density_, options_);
+  const UnexplainedRotation found = FindUnexplainedRotation(
+      rotations_, search_, calibrated().shift_s, gyroscope_noise_density_);
   check->unexplained = found;
-  if (!found.is_conclusive ||
-      found.turning_deg < options_.min_rotation_rms_deg ||
-      found.residual_deg < options_.max_unexplained_ratio * found.turning_deg ||
-      // Another scale is a mistake of its own, which is named.
+  if (!found.is_conclusive || found.turning_deg < kMinRotationRmsDeg ||
+      found.residual_deg < kMaxUnexplainedRatio * found.turning_deg ||
+      // A wrong scale is a mistake of its own, which CheckTurnScale names.
       found.scaled_residual_deg <
-          options_.max_unexplained_ratio * found.visual_turning_deg ||
-      found.visual_error_deg >
-          options_.max_visual_error_ratio * found.residual_deg) {
+          kMaxUnexplainedRatio * found.visual_turning_deg ||
+      found.visual_error_deg > kMaxVisualErrorRatio * found.residual_deg) {
     return false;
   }
   check->contradiction_is_motion = true;
   check->contradiction = FormatFigures(
       "gyroscope and pictures show different motions: of %.2f deg from photo "
-      "to photo %.2f are left at the best clock and mounting",
+      "to photo %.2f are left at the best time offset and extrinsic rotation",
       found.turning_deg, found.residual_deg);
   return true;
 }
@@ -165,12 +175,12 @@ bool VisionComparer::IsWorseThanNone() const {
   none.mistake.map.setZero();
   none.fit =
       ComputeRotationFit(search_.Compare(as_is_.shift_s), none.mistake.map);
-  return turning_deg_ >= options_.min_contradicting_rms_deg &&
+  return turning_deg_ >= kMinContradictingRmsDeg &&
          search_.Evidence(as_is_, none) >= kMinEvidence;
 }
 
-// Without a shift, too: rotations of another size fit a wrong clock better than
-// the right one where the drive is short.
+// Scales are also tried without a time shift: on a short drive rotations of a
+// wrong scale fit better at a wrong time shift.
 void VisionComparer::CheckTurnScale(VisionCheck* check) const {
   Explanation best = calibrated();
   double best_scale = 1.0;
@@ -191,7 +201,7 @@ void VisionComparer::CheckTurnScale(VisionCheck* check) const {
     return;
   }
   check->shifted_correlation = ComputeRotationCorrelation(
-      search_.Compare(best.shift_s), best.mistake.map, nullptr);
+      search_.Compare(best.shift_s), best.mistake.map);
   check->contradiction =
       FormatFigures(
           "the gyroscope turns %.2g times as much as the cameras: check the "
@@ -206,9 +216,9 @@ void VisionComparer::CheckTimeShift(VisionCheck* check) const {
                          search_.Evidence(as_is_, calibrated()) >= kMinEvidence;
   check->is_clock_shift =
       is_better && has_unshifted_ &&
-      std::abs(calibrated().shift_s) >= options_.min_clock_shift_s &&
-      std::abs(calibrated().shift_s) <= options_.max_clock_shift_s;
-  if (std::abs(calibrated().shift_s) > options_.max_accepted_shift_s &&
+      std::abs(calibrated().shift_s) >= kMinCorrectedShiftS &&
+      std::abs(calibrated().shift_s) <= kMaxCorrectedShiftS;
+  if (std::abs(calibrated().shift_s) > kMaxAcceptedShiftS &&
       (is_better || !has_unshifted_)) {
     check->contradiction =
         FormatFigures(
@@ -225,8 +235,8 @@ GyroscopeFilter VisionComparer::FindFilter() {
   search_.RefineLag(&filtered);
   GyroscopeFilter filter;
   if (search_.Evidence(calibrated(), filtered) < kMinEvidence) return filter;
-  // The best shift without the lag depends on the interval then; priors are
-  // made from frame to frame.
+  // With a lag, the best shift without it depends on the interval. Priors join
+  // successive frames, so the shortest interval counts.
   search_.RefineShiftOfOneFrame(&explanations_[0]);
   filter.lag_s = filtered.lag_s;
   filter.delay_s = filtered.shift_s - calibrated().shift_s;
@@ -241,10 +251,10 @@ VisionCheck VisionComparer::Run() {
   CompareAsIs(&check);
   // 3. A mistake that explains vision better.
   if (NameMistake(&check)) return check;
-  // 4. Pictures that turn otherwise than the camera.
+  // 4. Pictures that rotate differently from the camera.
   if (FindOtherMotion(&check)) return check;
-  if (check.shifted_correlation < options_.min_correlation) {
-    if (check.total_correlation >= options_.min_correlation) return check;
+  if (check.shifted_correlation < kMinAgreeingCorrelation) {
+    if (check.total_correlation >= kMinAgreeingCorrelation) return check;
     // 5. Nothing fits: is the gyroscope worse than none?
     if (!IsWorseThanNone()) return VisionCheck();
     check.contradiction =
@@ -256,7 +266,7 @@ VisionCheck VisionComparer::Run() {
   // 6. The gyroscope's scale.
   CheckTurnScale(&check);
   if (!check.contradiction.empty()) return check;
-  // 7. What no time shift explains.
+  // 7. A filter, which no time shift explains.
   check.filter = FindFilter();
   // 8. The time shift.
   CheckTimeShift(&check);
@@ -265,30 +275,11 @@ VisionCheck VisionComparer::Run() {
 
 }  // namespace
 
-bool VisionCheckOptions::IsValid(std::string* error) const {
-  return OptionChecker(error)
-      .Positive({{"max_time_shift_s", max_time_shift_s},
-                 {"min_rotation_rms_deg", min_rotation_rms_deg},
-                 {"min_contradicting_rms_deg", min_contradicting_rms_deg},
-                 {"max_accepted_shift_s", max_accepted_shift_s},
-                 {"max_unexplained_ratio", max_unexplained_ratio},
-                 {"max_visual_error_ratio", max_visual_error_ratio}})
-      .AtLeast(2, "min_num_rotations", min_num_rotations)
-      .Require(min_correlation > 0.0 && min_correlation < 1.0,
-               "min_correlation", min_correlation, "must be between 0 and 1")
-      .NotNegative({{"min_clock_shift_s", min_clock_shift_s}})
-      .AtLeast(min_clock_shift_s, "max_clock_shift_s", max_clock_shift_s)
-      .AllHold();
-}
-
 VisionCheck CheckAgainstVision(const std::vector<TimedRotation>& rotations,
                                const std::vector<ImuSample>& imu,
-                               const SensorCalibration& calibration,
-                               const VisionCheckOptions& options) {
-  std::string error;
-  if (!options.IsValid(&error)) throw std::invalid_argument(error);
+                               const SensorCalibration& calibration) {
   if (imu.size() < 2) return VisionCheck();
-  return VisionComparer(rotations, imu, calibration, options).Run();
+  return VisionComparer(rotations, imu, calibration).Run();
 }
 
 }  // namespace adasfm

@@ -16,34 +16,34 @@ namespace {
 // Clock errors looked for, and the smallest one that is named.
 constexpr double kMaxLogShiftS = 10.0;
 constexpr int kMinShiftBins = 2;
-// Logs of one drive fit best at their own clock; those of another drive fit
-// there no better than at any other. One of the 160 clocks that are further off
-// than kFarShiftS is by chance e^5 times likelier than most, and the log's own
-// must be likelier than that one by as much again.
+// Logs of one drive fit best at their own clock; logs of different drives fit
+// there no better than elsewhere. The best of the 160 shifts beyond kFarShiftS
+// is by chance e^5 times likelier than most; no shift must be likelier than
+// that one by the same factor.
 constexpr double kFarShiftS = 2.0;
 constexpr double kBelongingEvidence = 5.0;
 // Windows overlap: so many bins count as one observation.
 constexpr double kBinsPerObservation = 4.0;
-// Gravity further than this from the wheel frame's z is no tilt of a road or
-// mount.
+// Gravity further than this from the wheel frame's z is more than a tilted road
+// or inexact extrinsics.
 constexpr double kMaxTiltDeg = 40.0;
-// Figures count when they correlate this well ...
+// Figures count above this correlation ...
 constexpr double kMinCorrelation = 0.7;
-// ... and so much moves.
+// ... and above this rms of the motion.
 constexpr double kMinAcceleration = 0.3;  // m/s^2
 constexpr double kMinYawRate = 0.03;      // rad/s
 constexpr int kMinNumBins = 50;
-// Below it, where much moves, logs may not belong together; without a yaw rate
-// to compare only far below, since engines and rough ground shake. Wheels that
-// slip on loose ground correlate no better: then the clock decides.
+// Logs with enough motion and a correlation below this may not belong together.
+// Without a yaw rate the limit is lower, since engines and rough ground shake.
+// Wheels that slip on loose ground correlate no better, so the clock decides.
 constexpr double kNoCorrelation = 0.5;
 constexpr double kNoForceCorrelation = 0.2;
-// Wheel directions beyond this are more than a mount that was badly measured.
+// Wheel directions beyond this are more than badly measured extrinsics.
 constexpr double kMaxTurnDeg = 30.0;
 // Factors within this are right, or are found by the smoother.
 constexpr double kMaxFactor = 1.5;
-// Below it wheels may as well have spun while a straight drive gained speed: no
-// unit is that near to another.
+// Smaller factors may come from wheels that spun while a straight drive gained
+// speed: no two units are that close.
 constexpr double kMinUnitFactor = 1.9;
 
 class WheelChecker {
@@ -92,7 +92,7 @@ double WheelChecker::LogLikelihood(const WheelFit& fit) const {
     return -0.5 * fit.sum_of_weights / kBinsPerObservation *
            std::log(1.0 - 0.999 * correlation * correlation);
   };
-  // Acceleration has a sign; yaw may be that of exchanged wheels.
+  // Correlations are squared: wheels may count backwards or be exchanged.
   double sum = fit.acceleration_rms > kMinAcceleration
                    ? gain(fit.forward_correlation)
                    : 0.0;
@@ -117,7 +117,7 @@ std::string WheelChecker::NameAxes() const {
         RadToDeg(std::acos(std::clamp(force.z() / force.norm(), -1.0, 1.0)));
     if (tilt_deg > kMaxTiltDeg) continue;
     const WheelFit fit = FitWheels(bins_, axes, 0);
-    // The sign of the acceleration as well.
+    // The score includes the sign of the acceleration.
     const double score = std::cos(std::arg(fit.force)) * fit.force_correlation;
     if (score <= best + 0.02) continue;
     best = score;
@@ -212,7 +212,7 @@ std::string WheelChecker::CheckAxes(const WheelFit& fit) const {
       fit.mirrored_correlation < kMinCorrelation) {
     return "";
   }
-  // Of independent observations, as everywhere.
+  // Counts independent observations, as LogLikelihood does.
   const auto misfit = [](double correlation) {
     return std::log(1.0 - 0.999 * correlation * correlation);
   };
@@ -250,7 +250,7 @@ std::string WheelChecker::CheckDirection(const WheelFit& fit) const {
 std::string WheelChecker::CheckUnits(const WheelFit& fit,
                                      std::vector<std::string>* warnings) const {
   if (!ObservesForce(fit)) return "";
-  // Noise makes a factor too small only by the squared correlation.
+  // Noise reduces a factor, at most by the squared correlation.
   const double low = std::abs(fit.force);
   const double high = low / (fit.force_correlation * fit.force_correlation);
   if (high < 1.0 / kMaxFactor || low > kMaxFactor) {
@@ -287,7 +287,7 @@ WheelCheck WheelChecker::Run() {
   check.fit = FitWheels(bins_, Eigen::Matrix3d::Identity(), 0);
   if (check.fit.num_windows < kMinNumBins) return check;
   std::string& contradiction = check.contradiction;
-  // The one that would look like those after it comes first.
+  // A mistake that would also cause later contradictions comes first.
   contradiction = CheckGravity(check);
   const ClockScan scan = ScanClocks(check.fit);
   if (contradiction.empty()) contradiction = CheckClock(scan);

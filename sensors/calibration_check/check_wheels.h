@@ -14,7 +14,7 @@ namespace adasfm {
 // How the wheels' motion fits the IMU's over windows of 0.4 s.
 struct WheelFit {
   int num_windows = 0;
-  // Slipping windows count little (FitWheels).
+  // Slipping windows have low weights (FitWheels).
   double sum_of_weights = 0.0;
   // True horizontal acceleration per logged one, as a complex number in the
   // wheel frame's plane: 1 when all is right, 1 / 3.6 for km/h, -1 for wheels
@@ -27,11 +27,11 @@ struct WheelFit {
   // Logged yaw rate per gyroscope's, and its correlation.
   double yaw = 0.0;
   double yaw_correlation = 0.0;
-  // What tells them: rms of the logged acceleration, m/s^2, and of the
-  // gyroscope's yaw rate, rad/s.
+  // Excitation: rms of the logged acceleration, m/s^2, and of the gyroscope's
+  // yaw rate, rad/s.
   double acceleration_rms = 0.0;
   double yaw_rate_rms = 0.0;
-  // Of the forward acceleration alone.
+  // Correlation of the forward acceleration alone.
   double forward_correlation = 0.0;
 };
 
@@ -41,22 +41,23 @@ struct WheelCheck {
   Eigen::Vector3d mean_force = Eigen::Vector3d::Zero();
   // One line that names the mistake and what to do; empty when there is none.
   std::string contradiction;
-  // What the estimate can live with.
+  // Findings that do not prevent the estimate.
   std::vector<std::string> warnings;
 };
 
-// What: checks accelerometer, gyroscope and wheels against each other.
-// Inputs: logs in order of time on one clock, speeds of the wheel frame (x
-// forward, y left, z up), the calibration; has_yaw: the wheels tell the yaw.
-// Method: over windows the mean specific force must be gravity upwards plus
-// (dv/dt, v w_z) of the speeds v and the gyroscope's w_z, and the wheels' yaw
-// rate w_z. The mean force tells the accelerometer's sign and axes; one complex
-// regression of the horizontal force tells the wheels' unit, sign and
-// direction, correlations over shifts of up to 10 s tell the clock, and whether
-// the logs are of one drive at all: those of another fit no better at their own
-// clock than at others. A cause is named when the figures leave no doubt, units
-// first.
-// On failure: nothing is said when there is too little motion.
+// Checks accelerometer, gyroscope and wheels against each other. Inputs: logs
+// in order of time on one clock, speeds of the wheel frame (x forward, y left,
+// z up), the calibration; has_yaw: the wheels observe the yaw.
+//
+// Over windows the mean specific force must be gravity upwards plus (dv/dt, v
+// w_z) of the speeds v and the gyroscope's w_z, and the wheels' yaw rate must
+// be w_z. The mean force shows the accelerometer's sign and axes. One complex
+// regression of the horizontal force shows the wheels' unit, sign and
+// direction. Correlations over shifts of up to 10 s show the clock, and whether
+// the logs belong to one drive: logs of another drive fit no better at their
+// own clock than at others. The first cause without doubt is named, in the
+// order gravity, clock, drive, axes, direction, unit. Too little motion gives
+// an empty result.
 WheelCheck CheckWheels(const std::vector<ImuSample>& imu,
                        const std::vector<WheelSpeed>& speeds, bool has_yaw,
                        const SensorCalibration& calibration);

@@ -30,8 +30,7 @@ size_t FindLongestGap(const std::vector<ImuSample>& imu) {
 
 std::string FindClockJump(const std::vector<TimedRotation>& rotations,
                           const std::vector<ImuSample>& imu,
-                          const SensorCalibration& calibration,
-                          const VisionCheckOptions& options) {
+                          const SensorCalibration& calibration) {
   const size_t cut = FindLongestGap(imu);
   if (cut == 0) return "";
   const std::vector<ImuSample> parts[] = {{imu.begin(), imu.begin() + cut},
@@ -39,15 +38,15 @@ std::string FindClockJump(const std::vector<TimedRotation>& rotations,
   double shifts_s[2];
   for (int i = 0; i < 2; ++i) {
     const VisionCheck check =
-        CheckAgainstVision(rotations, parts[i], calibration, options);
+        CheckAgainstVision(rotations, parts[i], calibration);
     if (!check.is_conclusive ||
-        check.shifted_correlation < options.min_correlation) {
+        check.shifted_correlation < kMinAgreeingCorrelation) {
       return "";
     }
     shifts_s[i] = check.time_shift_correction_s;
   }
   const double jump_s = shifts_s[1] - shifts_s[0];
-  if (std::abs(jump_s) <= options.max_accepted_shift_s) return "";
+  if (std::abs(jump_s) <= kMaxAcceptedShiftS) return "";
   return "the IMU's clock jumps at the gap before the time " +
          std::to_string(imu[cut].timestamp_ns) +
          FormatFigures(

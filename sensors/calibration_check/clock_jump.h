@@ -10,15 +10,14 @@
 
 namespace adasfm {
 
-// What: tells a clock that jumped from one that is off by a constant.
-// Inputs: as CheckAgainstVision, which found a time shift.
-// Method: the log is cut at its longest gap (of more than three periods), and
-// both parts are compared with vision. Shifts that differ by more than
-// max_accepted_shift_s are a jump.
-// On failure: an empty line when there is no gap, or a part tells nothing.
+// Distinguishes a clock that jumped from a clock with a constant offset. Inputs
+// as for CheckAgainstVision, which found a time shift. The log is cut at its
+// longest gap (of more than three periods), and both parts are compared with
+// vision. Shifts that differ by more than kMaxAcceptedShiftS are a jump.
+// Returns one line about the jump; empty without a jump or a gap, or when a
+// part is not conclusive.
 std::string FindClockJump(const std::vector<TimedRotation>& rotations,
                           const std::vector<ImuSample>& imu,
-                          const SensorCalibration& calibration,
-                          const VisionCheckOptions& options);
+                          const SensorCalibration& calibration);
 
 }  // namespace adasfm

@@ -13,7 +13,7 @@ void UndoGyroscopeFilter(const GyroscopeFilter& filter,
   const timestamp_t delay_ns = NsFromSeconds(filter.delay_s);
   const std::vector<ImuSample> logged = *imu;
   size_t next = 1;
-  // Times are asked for in ascending order but for the steps to both sides.
+  // The queried times ascend, except for the steps to both sides.
   const auto rate_at = [&](timestamp_t time_ns) -> Eigen::Vector3d {
     while (next + 1 < logged.size() && logged[next].timestamp_ns < time_ns) {
       ++next;

@@ -15,21 +15,21 @@ using Complex = std::complex<double>;
 // A window of five bins; the outer two count half.
 constexpr int kReach = 2;
 constexpr double kWeights[] = {0.125, 0.25, 0.25, 0.25, 0.125};
-// Of longer drives the first hour tells enough.
+// Of longer drives the first hour is enough.
 constexpr double kMaxLengthS = 3600.0;
 
-// Errors beyond so many sigmas are slips; no error below this is one, m/s^2.
+// Errors beyond this many sigmas are slips; errors below this (m/s^2) are not.
 constexpr double kMaxSigmas = 3.0;
 constexpr double kMinSlip = 0.1;
-// Slips may fill more than half of a short log, but hardly three quarters: the
-// noise is that of the least quarter of the errors. Of plane vectors with unit
-// sigmas a quarter is shorter than this.
+// Slips may fill more than half of a short log, but hardly three quarters, so
+// the noise is found from the lowest quartile of the errors. A quarter of plane
+// vectors with unit sigmas is shorter than this.
 constexpr double kRayleighQuarter = 0.7585;
 constexpr int kNumReweightings = 10;
 
-// What both logs say of one window.
+// Means of both logs over one window.
 struct Window {
-  Complex acceleration;  // logged by the wheels, turned by the gyroscope
+  Complex acceleration;  // (dv/dt, v w_z), gyroscope's w_z
   Complex force;
   double wheel_yaw = 0.0;
   double gyroscope_yaw = 0.0;
@@ -71,7 +71,7 @@ std::vector<Window> MakeWindows(const MotionBins& bins,
   return windows;
 }
 
-// Biases, tilt and mounting are constants: only what varies is compared.
+// Biases, tilt and extrinsics add constants: only variations are compared.
 void SubtractMeans(std::vector<Window>* windows) {
   Window mean;
   double sum = 0.0;
@@ -91,11 +91,11 @@ void SubtractMeans(std::vector<Window>* windows) {
   }
 }
 
-// Slipping wheels accelerate where the drive does not, by so much that two
-// slips hide the rest of a short log. The logged acceleration is therefore
-// fitted to the force, which has no such outliers, by iteratively reweighted
-// least squares (Cauchy, noise from the least quarter): a window far off the
-// fit counts little.
+// Slipping wheels accelerate where the machine does not, by so much that two
+// slips dominate a short log. The logged acceleration is therefore fitted to
+// the force, which has no such outliers, by iteratively reweighted least
+// squares (Cauchy, noise from the lowest quartile): windows far from the fit
+// get low weights.
 void WeighSlips(std::vector<Window>* windows) {
   for (int i = 0; i < kNumReweightings; ++i) {
     SubtractMeans(windows);

@@ -39,9 +39,9 @@ class MotionBins {
   std::vector<Bin> bins_;
 };
 
-// The fit, in which slipping wheels count little, when the force's axes (in the
-// wheel frame) are read as axes * force, and the wheels' bins are taken as so
-// many bins later.
+// Fits the wheels to the IMU, with low weights for slipping wheels. The force
+// in the wheel frame is replaced by axes * force, and the wheels' bins are
+// moved later by `shift` bins.
 WheelFit FitWheels(const MotionBins& bins, const Eigen::Matrix3d& axes,
                    int shift);
 

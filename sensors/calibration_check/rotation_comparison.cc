@@ -129,8 +129,7 @@ double ComputeEvidence(const std::vector<double>& worse,
 }
 
 double ComputeRotationCorrelation(const RotationComparison& data,
-                                  const Eigen::Matrix3d& map,
-                                  Eigen::Vector3d* per_axis) {
+                                  const Eigen::Matrix3d& map) {
   Eigen::Vector3d mean_visual = Eigen::Vector3d::Zero();
   Eigen::Vector3d mean_gyro = Eigen::Vector3d::Zero();
   const double num = static_cast<double>(data.visual.size());
@@ -138,21 +137,16 @@ double ComputeRotationCorrelation(const RotationComparison& data,
     mean_visual += data.visual[i] / num;
     mean_gyro += map * data.gyro[i] / num;
   }
-  Eigen::Vector3d both = Eigen::Vector3d::Zero();
-  Eigen::Vector3d visual = both, gyro = both;
+  double both = 0.0, visual = 0.0, gyro = 0.0;
   for (size_t i = 0; i < data.visual.size(); ++i) {
     const Eigen::Vector3d a = data.visual[i] - mean_visual;
     const Eigen::Vector3d b = map * data.gyro[i] - mean_gyro;
-    both += a.cwiseProduct(b);
-    visual += a.cwiseAbs2();
-    gyro += b.cwiseAbs2();
+    both += a.dot(b);
+    visual += a.squaredNorm();
+    gyro += b.squaredNorm();
   }
   constexpr double kTiny = 1e-24;
-  if (per_axis != nullptr) {
-    *per_axis = both.cwiseQuotient(
-        (visual.cwiseProduct(gyro).cwiseSqrt().array() + kTiny).matrix());
-  }
-  return both.sum() / (std::sqrt(visual.sum() * gyro.sum()) + kTiny);
+  return both / (std::sqrt(visual * gyro) + kTiny);
 }
 
 }  // namespace adasfm

@@ -10,17 +10,17 @@
 
 namespace adasfm {
 
-// The integrals of the angular velocity, and of the turn, at any time. Keeps a
-// reference to the samples.
+// Integrals of the angular velocity, as a vector and as a rotation, at any
+// time. Keeps a reference to the samples.
 class RateIntegral {
  public:
   explicit RateIntegral(const std::vector<ImuSample>& imu);
 
   bool Covers(timestamp_t time_ns) const;
-  // Linear between samples; undefined outside of the log.
+  // Of rates that are linear between samples; undefined outside of the log.
   Eigen::Vector3d At(timestamp_t time_ns) const;
-  // The rotation vector of start_from_end, bodies at these times. The integral
-  // above differs from it where the axis changes.
+  // The rotation vector of start_from_end, bodies at these times. It differs
+  // from the integral above where the rotation axis changes.
   Eigen::Vector3d Turn(timestamp_t start_ns, timestamp_t end_ns) const;
   // Mean angular velocity over 20 ms about a time, as far as the log reaches.
   Eigen::Vector3d MeanRate(timestamp_t time_ns) const;
@@ -36,7 +36,7 @@ class RateIntegral {
   std::vector<Eigen::Quaterniond> first_from_body_;
 };
 
-// Rotation vectors of both sides over the same intervals.
+// Rotation vectors of vision and gyroscope over the same intervals.
 struct RotationComparison {
   std::vector<Eigen::Vector3d> visual;  // in the camera frame
   std::vector<Eigen::Vector3d> gyro;    // in the IMU frame
@@ -51,34 +51,33 @@ struct RotationFit {
   Eigen::Vector3d rate_offset = Eigen::Vector3d::Zero();  // rad/s, camera
 };
 
-// Mean distance between the mean rates of the visual rotations and the mapped
-// gyroscope's, less a constant (the bias). Rates, because what the model leaves
-// out (a slightly turned T_cam_imu) grows with the interval; medians and plain
+// Mean distance between the mean rates of the visual rotations and of the
+// mapped gyroscope, minus a constant (the bias). Rates, because model errors (a
+// small rotation error of T_cam_imu) grow with the interval; medians and plain
 // distances, so that a few wrong two-view geometries do not matter.
 RotationFit ComputeRotationFit(const RotationComparison& data,
                                const Eigen::Matrix3d& map);
 
-// The distances of which the fit's cost is the mean, one an interval.
+// The distances whose mean is the fit's cost, one per interval.
 std::vector<double> ComputeRateDistances(const RotationComparison& data,
                                          const Eigen::Matrix3d& map,
                                          const Eigen::Vector3d& rate_offset);
 
-// Logarithm of how much likelier one explanation makes the rotations than
-// another, from the distances of both. Errors are taken to have Student's
-// distribution with three degrees of freedom (two-view geometries have long
-// tails) and the worse explanation's median, which favours it. num_repeats is
-// how often the intervals cover the same time: that many count as one.
+// Log likelihood ratio of the better over the worse explanation, from the
+// distances of both. Errors follow Student's distribution with three degrees of
+// freedom (two-view geometries have long tails), scaled by the worse
+// explanation's median, which favours the worse one. num_repeats is how often
+// the intervals cover the same time: that many count as one.
 double ComputeEvidence(const std::vector<double>& worse,
                        const std::vector<double>& better, double num_repeats);
 
-// Evidence that another explanation needs before it is believed: the best of
-// some 10,000 wrong ones (50 at 200 shifts) is by chance e^9 times likelier
-// than the right one; twice that.
+// Minimum evidence for another explanation. The best of some 10,000 wrong ones
+// (50 at 200 shifts) is by chance e^9 times likelier than the right one; the
+// minimum is about twice that.
 inline constexpr double kMinEvidence = 20.0;
 
-// Correlation per axis and of all axes together, about the means.
+// Correlation of all axes together, about the means.
 double ComputeRotationCorrelation(const RotationComparison& data,
-                                  const Eigen::Matrix3d& map,
-                                  Eigen::Vector3d* per_axis);
+                                  const Eigen::Matrix3d& map);
 
 }  // namespace adasfm

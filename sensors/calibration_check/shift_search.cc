@@ -14,6 +14,8 @@ constexpr double kMaxIntervalS = 1.0;
 constexpr double kMaxAngleRad = 1.0;
 // That many suffice; more would only take time.
 constexpr size_t kMaxNumRotations = 500;
+// Time shifts up to this are tried, relative to the calibration's.
+constexpr double kMaxTimeShiftS = 2.0;
 constexpr double kCoarseStepS = 0.02;
 constexpr double kMaxLagS = 0.1;
 
@@ -66,7 +68,7 @@ void ShiftSearch::SelectRotations(const std::vector<TimedRotation>& rotations) {
   }
   std::sort(lengths.begin(), lengths.end());
   if (lengths.empty()) return;
-  // The tenth part of the lengths is one frame's, however far the matching
+  // The 10 % quantile of the lengths is one frame, however far the matching
   // reached.
   const timestamp_t frame_ns = lengths[lengths.size() / 10];
   for (const TimedRotation& rotation : usable) {
@@ -79,7 +81,7 @@ void ShiftSearch::SelectRotations(const std::vector<TimedRotation>& rotations) {
     add_up_to(frame_ns * 5 / 2, &short_rotations_);
     add_up_to(frame_ns * 3 / 2, &frame_rotations_);
   }
-  const size_t min_num = 2 * options_.min_num_rotations;
+  const size_t min_num = 2 * kMinNumRotations;
   if (short_rotations_.size() < min_num) short_rotations_ = rotations_;
   if (frame_rotations_.size() < min_num) frame_rotations_ = short_rotations_;
 }
@@ -114,7 +116,7 @@ RotationComparison ShiftSearch::Compare(
     const timestamp_t start = rotation.start_ns + shift;
     const timestamp_t end = rotation.end_ns + shift;
     data.visual.push_back(LogSo3(rotation.cam2_from_cam1));
-    // cam2_from_cam1 turns against the body's motion.
+    // cam2_from_cam1 rotates opposite to the body.
     data.gyro.push_back(-turn(start, end));
     data.start_s.push_back(SecondsFromNs(start));
     data.dt_s.push_back(SecondsFromNs(end - start));
@@ -124,20 +126,19 @@ RotationComparison ShiftSearch::Compare(
 
 void ShiftSearch::SearchShifts(std::vector<Explanation>* explanations) const {
   const int num_steps =
-      static_cast<int>(std::ceil(options_.max_time_shift_s / kCoarseStepS));
+      static_cast<int>(std::ceil(kMaxTimeShiftS / kCoarseStepS));
   const auto shift_at = [](int step) {
     const int magnitude = (step + 1) / 2;
     return kCoarseStepS * (step % 2 == 1 ? magnitude : -magnitude);
   };
-  // A shift must not win by what it leaves out. The log may cover a part of the
-  // images only.
+  // A shift must not win because the log covers fewer rotations there. The log
+  // may cover only a part of the images.
   size_t max_num = 0;
   for (int step = 0; step <= 2 * num_steps; ++step) {
     max_num = std::max(max_num, CountCovered(shift_at(step)));
   }
-  const size_t min_num =
-      std::max<size_t>(options_.min_num_rotations, max_num / 2);
-  // From no shift outwards: the nearest of equals wins.
+  const size_t min_num = std::max(kMinNumRotations, max_num / 2);
+  // From no shift outwards: of equal costs the shift nearest to zero wins.
   for (int step = 0; step <= 2 * num_steps; ++step) {
     const RotationComparison data = Compare(shift_at(step));
     if (data.visual.size() < min_num) continue;
@@ -184,7 +185,7 @@ void ShiftSearch::RefineShiftOfOneFrame(Explanation* explanation) const {
 }
 
 void ShiftSearch::RefineLag(Explanation* explanation) const {
-  // What lags by more is shifted by less.
+  // A larger lag needs a smaller shift.
   const auto with_lag = [&](double lag_s) {
     Explanation other = *explanation;
     other.lag_s = lag_s;

@@ -9,6 +9,9 @@
 
 namespace adasfm {
 
+// With fewer compared rotations the check is not conclusive.
+inline constexpr size_t kMinNumRotations = 10;
+
 // A mistake (or none) at its best time shift.
 struct Explanation {
   CalibrationMistake mistake;
@@ -18,25 +21,24 @@ struct Explanation {
   RotationFit fit;
 };
 
-// Vision and gyroscope over the same intervals, at any time shift about the
-// calibration's. Keeps a reference to the samples.
+// Compares vision and gyroscope over the same intervals, at time shifts
+// relative to the calibration's. Keeps a reference to the samples.
 class ShiftSearch {
  public:
   ShiftSearch(const std::vector<TimedRotation>& rotations,
-              const std::vector<ImuSample>& imu, double timeshift_s,
-              const VisionCheckOptions& options)
-      : integral_(imu), timeshift_s_(timeshift_s), options_(options) {
+              const std::vector<ImuSample>& imu, double timeshift_s)
+      : integral_(imu), timeshift_s_(timeshift_s) {
     SelectRotations(rotations);
   }
 
-  // Of those that are short enough to compare.
+  // Number of compared rotations, which are short enough and thinned out.
   size_t num_rotations() const { return rotations_.size(); }
 
   RotationComparison Compare(double shift_s) const {
     return Compare(rotations_, shift_s, 0.0);
   }
 
-  // Of up to two frames, where there are enough of them.
+  // Over intervals of up to two frames, where there are enough of them.
   RotationComparison CompareShortest(double shift_s) const {
     return Compare(short_rotations_, shift_s, 0.0);
   }
@@ -44,15 +46,15 @@ class ShiftSearch {
   // The best shift on a coarse grid for every explanation.
   void SearchShifts(std::vector<Explanation>* explanations) const;
 
-  // To a tenth of a millisecond, about the coarse one. What the model leaves
-  // out (a slightly turned T_cam_imu) grows with the interval and pulls on the
-  // shift, so the shortest intervals decide where there are enough of them: of
-  // up to two frames, or of one.
+  // Refines the coarse shift to a tenth of a millisecond. Model errors (a small
+  // rotation error of T_cam_imu) grow with the interval and bias the shift, so
+  // the shortest intervals decide where there are enough of them: of up to two
+  // frames, or of one.
   void RefineShift(Explanation* explanation) const;
   void RefineShiftOfOneFrame(Explanation* explanation) const;
 
-  // The filter's time constant, to a millisecond, and the shift that goes with
-  // it, about the refined one.
+  // Finds the filter's time constant to a millisecond, and the time shift for
+  // it, near the refined shift.
   void RefineLag(Explanation* explanation) const;
 
   // See ComputeEvidence; over the intervals that the log covers at both time
@@ -65,8 +67,8 @@ class ShiftSearch {
   size_t CountCovered(double shift_s) const;
   RotationComparison Compare(const std::vector<TimedRotation>& rotations,
                              double shift_s, double lag_s) const;
-  // The best shift and its cost for the explanation's lag, within a step of the
-  // coarse grid of its shift.
+  // The best shift for the explanation's lag and its cost, within a coarse grid
+  // step of the explanation's shift.
   double FindShift(const Explanation& explanation,
                    const std::vector<TimedRotation>& rotations,
                    double* cost) const;
@@ -75,14 +77,13 @@ class ShiftSearch {
 
   RateIntegral integral_;
   double timeshift_s_;
-  VisionCheckOptions options_;
   std::vector<TimedRotation> rotations_;
-  // All of them where there are too few short ones.
+  // All of rotations_ where too few are short.
   std::vector<TimedRotation> short_rotations_;
   std::vector<TimedRotation> frame_rotations_;
 };
 
-// How much the cameras turn about the mean: rms of the visual rotations.
+// Rms of the visual rotations about their mean, deg.
 double ComputeTurningDeg(const RotationComparison& data);
 
 }  // namespace adasfm

@@ -18,12 +18,12 @@ namespace {
 
 constexpr double kMaxCameraShiftS = 0.3;
 constexpr double kCameraStepS = 0.01;
-constexpr int kNumMountingRounds = 5;
+constexpr int kNumFitRounds = 5;
 
 using Rates = std::vector<Eigen::Vector3d>;
 
-// Takes the median of each axis off: the bias and what turns all the time say
-// nothing.
+// Subtracts the median of each axis: the bias and a constant rotation carry no
+// information.
 void Center(Rates* rates) {
   std::vector<double> values(rates->size());
   for (int axis = 0; axis < 3; ++axis) {
@@ -41,7 +41,7 @@ Rates CenterRates(const std::vector<Eigen::Vector3d>& turns,
   return rates;
 }
 
-// Centered once more: medians in two frames are those of two points.
+// Centered again: medians per axis are not the same point in both frames.
 Rates Residuals(const Rates& visual, const Rates& gyro,
                 const Eigen::Matrix3d& map) {
   Rates residuals(visual.size());
@@ -58,7 +58,7 @@ std::vector<double> Lengths(const Rates& rates) {
   return lengths;
 }
 
-// Weights that bound the pull of each interval.
+// Weights that bound the influence of each interval.
 std::vector<double> BoundedWeights(const std::vector<double>& distances) {
   const double least = 0.1 * Median(distances) + 1e-9;
   std::vector<double> weights(distances.size());
@@ -68,8 +68,8 @@ std::vector<double> BoundedWeights(const std::vector<double>& distances) {
   return weights;
 }
 
-Eigen::Matrix3d FitRotation(const Rates& visual, const Rates& gyro,
-                            const std::vector<double>& weights) {
+Eigen::Matrix3d FitMeanRotation(const Rates& visual, const Rates& gyro,
+                                const std::vector<double>& weights) {
   Eigen::Matrix3d sum = Eigen::Matrix3d::Zero();
   for (size_t i = 0; i < visual.size(); ++i) {
     sum += weights[i] * visual[i] * gyro[i].transpose();
@@ -92,20 +92,20 @@ double FitScale(const Rates& visual, const Rates& gyro,
   return square > 0.0 ? both / square : 0.0;
 }
 
-// The least median distances, rad/s, that a rotation of the gyroscope's rates
-// leaves, and one that may scale them too.
-struct MountingFit {
+// The least median distances, rad/s, after a rotation of the gyroscope's rates,
+// without and with a scale.
+struct MeanRotationFit {
   double residual = std::numeric_limits<double>::infinity();
   double scaled_residual = std::numeric_limits<double>::infinity();
   Rates residuals;  // without scale
 };
 
-MountingFit FitMounting(const Rates& visual, const Rates& gyro) {
-  MountingFit fit;
+MeanRotationFit FitMeanRotation(const Rates& visual, const Rates& gyro) {
+  MeanRotationFit fit;
   std::vector<double> weights(visual.size(), 1.0);
   std::vector<double> scaled_weights = weights;
-  for (int round = 0; round < kNumMountingRounds; ++round) {
-    const Eigen::Matrix3d map = FitRotation(visual, gyro, weights);
+  for (int round = 0; round < kNumFitRounds; ++round) {
+    const Eigen::Matrix3d map = FitMeanRotation(visual, gyro, weights);
     Rates residuals = Residuals(visual, gyro, map);
     const std::vector<double> distances = Lengths(residuals);
     const double residual = Median(distances);
@@ -124,15 +124,15 @@ MountingFit FitMounting(const Rates& visual, const Rates& gyro) {
   return fit;
 }
 
-// Of one rotation, rad.
+// The error of one two-view rotation, rad.
 struct VisualError {
-  double length = 0.0;  // median of a vector's
-  double along = 0.0;   // about the axis of the turn, median
+  double length = 0.0;  // median of the error vector's length
+  double along = 0.0;   // median about the rotation axis
 };
 
-// How far three images are from closing; none without enough triangles.
+// Closure errors of triangles of images; none without enough triangles.
 std::optional<VisualError> MeasureVisualError(
-    const std::vector<TimedRotation>& rotations, size_t min_num) {
+    const std::vector<TimedRotation>& rotations) {
   std::map<timestamp_t, std::map<timestamp_t, Eigen::Quaterniond>> by_time;
   for (const TimedRotation& rotation : rotations) {
     by_time[rotation.start_ns][rotation.end_ns] = rotation.cam2_from_cam1;
@@ -153,25 +153,25 @@ std::optional<VisualError> MeasureVisualError(
       }
     }
   }
-  if (lengths.size() < min_num) return std::nullopt;
+  if (lengths.size() < kMinNumRotations) return std::nullopt;
   return VisualError{Median(std::move(lengths)), Median(std::move(along))};
 }
 
-// Of intervals: what is left of their rotations about the axis of the turn,
-// their turning rates, and the sigmas of vision and gyroscope together.
+// For each interval: the residual rotation about the rotation axis, the angular
+// rate, and the joint sigma of vision and gyroscope.
 struct RotationRest {
   std::vector<double> angles;
   std::vector<double> rates;
   std::vector<double> sigmas;
 };
 
-// The median of angle^2 / (sigma^2 + (time sigma * rate)^2) would be that of a
-// chi-square with one degree of freedom.
+// The sigma at which the median of angle^2 / (sigma^2 + (time sigma * rate)^2)
+// is that of a chi-square with one degree of freedom.
 double FindIntervalTimeSigma(const RotationRest& rest) {
-  // Readout and exposure last no longer: more is not a matter of times.
+  // Readout and exposure last no longer: a larger sigma has another cause.
   constexpr double kMaxSigmaS = 0.03;
-  constexpr double kNormalMedian = 0.455;
-  // Noise figures and errors of the mounting leave less than this.
+  constexpr double kChiSquareMedian = 0.455;
+  // Noise figures and errors of the extrinsics leave less than this.
   constexpr double kMinExcess = 2.0;
   std::vector<double> ratios(rest.angles.size());
   const auto median_ratio = [&](double sigma_s) {
@@ -182,12 +182,12 @@ double FindIntervalTimeSigma(const RotationRest& rest) {
     }
     return Median(ratios);
   };
-  if (median_ratio(0.0) < kMinExcess * kNormalMedian) return 0.0;
-  if (median_ratio(kMaxSigmaS) > kNormalMedian) return 0.0;
+  if (median_ratio(0.0) < kMinExcess * kChiSquareMedian) return 0.0;
+  if (median_ratio(kMaxSigmaS) > kChiSquareMedian) return 0.0;
   double low = 0.0, high = kMaxSigmaS;
   for (int i = 0; i < 30; ++i) {
     const double middle = 0.5 * (low + high);
-    (median_ratio(middle) > kNormalMedian ? low : high) = middle;
+    (median_ratio(middle) > kChiSquareMedian ? low : high) = middle;
   }
   return high;
 }
@@ -196,12 +196,9 @@ double FindIntervalTimeSigma(const RotationRest& rest) {
 
 UnexplainedRotation FindUnexplainedRotation(
     const std::vector<TimedRotation>& rotations, const ShiftSearch& search,
-    double shift_s, double gyroscope_noise_density,
-    const VisionCheckOptions& options) {
+    double shift_s, double gyroscope_noise_density) {
   UnexplainedRotation result;
-  const size_t min_num = options.min_num_rotations;
-  const std::optional<VisualError> visual_error =
-      MeasureVisualError(rotations, min_num);
+  const std::optional<VisualError> visual_error = MeasureVisualError(rotations);
   if (!visual_error) return result;
   result.visual_error_deg = RadToDeg(visual_error->length);
   double least = std::numeric_limits<double>::infinity();
@@ -212,10 +209,10 @@ UnexplainedRotation FindUnexplainedRotation(
   RotationRest rest;
   const auto compare_at = [&](double shift) {
     const RotationComparison data = search.CompareShortest(shift);
-    if (data.visual.size() < min_num) return;
+    if (data.visual.size() < kMinNumRotations) return;
     const Rates gyro = CenterRates(data.gyro, data.dt_s);
     const Rates visual = CenterRates(data.visual, data.dt_s);
-    const MountingFit fit = FitMounting(visual, gyro);
+    const MeanRotationFit fit = FitMeanRotation(visual, gyro);
     if (fit.residual >= least) return;
     least = fit.residual;
     rest = RotationRest();

@@ -12,9 +12,10 @@
 namespace adasfm {
 namespace {
 
-// What two-view rotations of one recording have in common, 1 sigma, rad.
+// Prior of the offset that two-view rotations of one recording share, 1 sigma,
+// rad.
 constexpr double kOffsetSigma = 0.0035;
-// No scatter of two-view rotations is smaller, rad.
+// Least scatter of two-view rotations, rad.
 constexpr double kMinScale = 1e-6;
 constexpr double kBlockS = 2.0;
 constexpr int kNumRounds = 20;
@@ -70,7 +71,7 @@ class VisualBiasFit {
     }
   }
 
-  // Of the offset's prior, where an interval has weight 1.
+  // The weight of the offset's prior, where an interval has weight 1.
   double OffsetWeight() const {
     return scale_ * scale_ / (kOffsetSigma * kOffsetSigma);
   }

@@ -23,7 +23,7 @@ constexpr size_t kMinNumWindows = 50;
 constexpr double kMinYawRateRms = 0.02;  // rad/s
 constexpr double kMaxCostRatio = 0.9;
 
-// One turn of the wheels, rad.
+// The wheels' rotation over one window, rad.
 struct TurnWindow {
   timestamp_t start_ns = 0;
   timestamp_t end_ns = 0;
@@ -64,7 +64,7 @@ class ClockSearch {
               const std::vector<WheelSpeed>& speeds,
               const Eigen::Vector3d& up_in_imu)
       : integral_(imu), up_in_imu_(up_in_imu) {
-    // Covered at every shift, so that none wins by what it leaves out.
+    // Covered at every shift, so that no shift has fewer windows.
     const timestamp_t margin_ns = NsFromSeconds(kMaxClockShiftS);
     for (const TurnWindow& window : ListWindows(speeds)) {
       if (!integral_.Covers(window.start_ns - margin_ns) ||
@@ -89,7 +89,7 @@ class ClockSearch {
       least = cost;
       best_s = step * kClockStepS;
     }
-    // At the end of the range the right one lies beyond.
+    // At the end of the range the right shift lies beyond.
     if (least > kMaxCostRatio * Mean(unshifted) ||
         std::abs(best_s) > kMaxClockShiftS - 1.5 * kClockStepS ||
         ComputeEvidence(unshifted, Distances(best_s), 1.0) < kMinEvidence) {
@@ -115,7 +115,7 @@ class ClockSearch {
     return std::sqrt(sum / windows_.size());
   }
 
-  // Of the turning rates, about their median.
+  // Of the yaw rates, about their median.
   std::vector<double> Distances(double shift_s) const {
     const timestamp_t shift_ns = NsFromSeconds(shift_s);
     std::vector<double> gyro, wheel;

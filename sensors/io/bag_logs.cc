@@ -11,14 +11,15 @@ namespace adasfm {
 namespace {
 
 constexpr char kStaticTransforms[] = "/tf_static";
-// What is no more than rounding in a quaternion.
+// Largest rounding error of the length of a quaternion.
 constexpr double kMaxNormError = 0.01;
 
 std::string WithoutSlash(const std::string& frame) {
   return !frame.empty() && frame[0] == '/' ? frame.substr(1) : frame;
 }
 
-// Each says what is wrong with the message, nothing when the sample is good.
+// Each returns what is wrong with the message, an empty text when the sample is
+// good.
 
 std::string Convert(const RosImu& message, ImuSample* sample) {
   sample->angular_velocity = message.angular_velocity;
@@ -29,7 +30,7 @@ std::string Convert(const RosImu& message, ImuSample* sample) {
 }
 
 std::string Convert(const RosOdometry& message, OdometryPose* pose) {
-  // Also false for what is not a number.
+  // Also false for NaN.
   const bool is_unit = std::abs(message.rotation.norm() - 1.0) < kMaxNormError;
   if (!is_unit) return "the length of its quaternion is not 1";
   if (!message.position.allFinite()) return "its position is not finite";
@@ -47,7 +48,8 @@ std::string Convert(const Eigen::Vector3d& linear,
   return is_finite ? "" : "its velocity is not finite";
 }
 
-// The one joint whose name has the word; -1 when there is none, or several.
+// The one joint whose name contains the word; -1 when there is none, or
+// several.
 int FindJoint(const std::vector<std::string>& names, const std::string& word) {
   int found = -1;
   for (size_t i = 0; i < names.size(); ++i) {
@@ -87,7 +89,7 @@ class LogCollector {
   LogCollector(const BagTopics& topics, WheelType wheel_type, BagLogs* logs)
       : topics_(topics), wheel_type_(wheel_type), logs_(logs) {}
 
-  // What is wrong with the message.
+  // Returns what is wrong with the message, or nothing.
   std::string Add(const BagMessage& message) {
     if (message.topic->name == kStaticTransforms) return AddTransforms(message);
     if (Is(topics_.imu, message)) return AddImu(message);
@@ -293,7 +295,7 @@ std::optional<Rigid3d> FindTransform(
     const std::vector<RosTransform>& transforms, const std::string& target,
     const std::string& source) {
   if (target.empty() || source.empty()) return std::nullopt;
-  // All that can be reached from the source; what was sent last counts.
+  // All frames connected with the source; the transforms sent last are used.
   std::map<std::string, Rigid3d> frame_from_source = {{source, Rigid3d()}};
   for (bool has_grown = true; has_grown;) {
     has_grown = false;

@@ -13,23 +13,24 @@
 
 namespace adasfm {
 
-// What a bag holds of a drive, in one pass. Logs are in the order of their
-// headers' stamps (bags are in the order of arrival); values are finite and
-// every message has a stamp, all else is unchecked.
+// The logs of a drive, read from a bag in one pass. Logs are in the order of
+// the header stamps (bags are in the order of arrival). Values are finite,
+// quaternions have unit length and every message has a stamp; nothing else is
+// checked.
 struct BagLogs {
   std::vector<ImuSample> imu;
   WheelType wheel_type = WheelType::kOdometry;  // of the two below
   std::vector<WheelSample> wheel;
   std::vector<OdometryPose> odometry;
-  // Those with a position.
+  // Only messages with a position.
   std::vector<RosNavSatFix> gnss;
   // Stamps of the photos, ascending, each once.
   std::vector<timestamp_t> image_times_ns;
   std::optional<RosCameraInfo> camera_info;
   // Of /tf_static.
   std::vector<RosTransform> static_transforms;
-  // In which the messages are given, without a leading slash; of wheels the
-  // frame that moves.
+  // Frames of the messages, without a leading slash; for wheels the moving
+  // frame.
   std::string imu_frame;
   std::string wheel_frame;
   std::string image_frame;
@@ -43,8 +44,8 @@ StatusOr<BagLogs> ReadBagLogs(const std::string& path, BagReader* bag,
                               const std::optional<WheelType>& wheel_type,
                               std::vector<std::string>* warnings);
 
-// Poses of target frame from source frame by the transforms, in either
-// direction; nothing when they are not connected.
+// The pose target_from_source by the transforms, each used in either direction;
+// nothing when the frames are not connected.
 std::optional<Rigid3d> FindTransform(
     const std::vector<RosTransform>& transforms, const std::string& target,
     const std::string& source);

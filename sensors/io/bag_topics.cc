@@ -118,7 +118,8 @@ StatusOr<std::optional<BagTopic>> FindWheelTopic(
     return FindBagTopic(bag_path, topics, WheelMessageTypes(*wheel_type), name,
                         option);
   }
-  // Joint states may be those of an arm: only where nothing else is there.
+  // Joint states may be those of an arm: used only where there is no other
+  // type.
   const Types motions = WheelMessageTypes(WheelType::kVelocity);
   const Types joints = WheelMessageTypes(WheelType::kTicks);
   if (!name.empty()) {

@@ -33,12 +33,13 @@ struct BagTopics {
 
 // The message types of a wheel log: nav_msgs/Odometry for kOdometry, its twist
 // or a stamped twist for kVelocity and kSpeed, sensor_msgs/JointState for
-// kTicks. Empty for kDifferential, which no message is.
+// kTicks. Empty for the other types, which no message carries.
 std::vector<std::string> WheelMessageTypes(WheelType type);
 
-// The one topic of these types, or the named one. Nothing when the bag has none
-// and no name was given; an error, with a list, when the named one is not there
-// or several are: `option` is the one that chooses.
+// The only topic of these types, or the named one. Nothing when the bag has
+// none and no name was given, or for kNoBagTopic. An error with a list of
+// topics when the named one is missing, or when several fit: `option` is the
+// option that chooses one.
 StatusOr<std::optional<BagTopic>> FindBagTopic(
     const std::string& bag_path, const std::vector<BagTopic>& topics,
     const std::vector<std::string>& types, const std::string& name,

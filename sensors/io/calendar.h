@@ -7,8 +7,8 @@ namespace adasfm {
 
 inline constexpr int64_t kSecondNs = 1'000'000'000;
 
-// Days since 1970-01-01 in the Gregorian calendar, from the day count of whole
-// years that begin in March, so that a leap day ends its year.
+// Days since 1970-01-01 in the Gregorian calendar. Years are counted from
+// March, so that a leap day ends its year.
 inline int64_t DaysSinceEpoch(int64_t year, int64_t month, int64_t day) {
   const int64_t march_year = month <= 2 ? year - 1 : year;
   const int64_t march_month = (month + 9) % 12;

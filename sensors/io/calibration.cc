@@ -28,8 +28,8 @@ std::string OneLine(std::string text) {
   return text;
 }
 
-// Reads keys of one YAML file; what is wrong is thrown as one line and becomes
-// a Status in ReadSensorCalibration.
+// Reads keys of one YAML file. Errors are thrown as one line;
+// ReadSensorCalibration converts them to a Status.
 class CalibrationReader {
  public:
   explicit CalibrationReader(const std::string& path) : path_(path) {}
@@ -38,7 +38,7 @@ class CalibrationReader {
     throw std::runtime_error(path_ + ": " + key + " " + why);
   }
 
-  // A finite number. Parsed by us: yaml-cpp's own follow the global locale.
+  // A finite number. Not parsed by yaml-cpp, which follows the global locale.
   double Number(const YAML::Node& section, const std::string& name) const {
     const YAML::Node node = section[name];
     if (!node) Fail(name, "is missing; add it (docs/reference/sensors.md)");
@@ -54,8 +54,8 @@ class CalibrationReader {
     return section[name] ? Number(section, name) : fallback;
   }
 
-  // A number in a range of all sensible sizes: where it stands for "none" or
-  // the unit is wrong, the estimate would overflow or be nonsense.
+  // A number in the range of sensible values. A number that stands for "none"
+  // or has a wrong unit would make the estimate overflow or useless.
   double InRange(const YAML::Node& section, const std::string& name, double min,
                  double max, const char* unit) const {
     const double value = Number(section, name);
@@ -140,7 +140,7 @@ void ReadOtherCameras(const CalibrationReader& reader, const YAML::Node& root,
     const std::string name = "cam" + std::to_string(k);
     const YAML::Node camera = root[name];
     if (!camera || !camera.IsMap()) return;
-    // Without a mount of its own it is somebody else's camera.
+    // A camera without extrinsics is not part of the rig.
     if (!camera["T_cam_imu"]) return;
     calibration->other_cams_from_imu.push_back(
         reader.Transform(camera, "T_cam_imu"));

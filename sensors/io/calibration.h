@@ -11,8 +11,8 @@
 
 namespace adasfm {
 
-// Where the sensors sit and how noisy they are (docs/reference/sensors.md).
-// Body frame = IMU frame; wheel frame: x forward, y left, z up.
+// Extrinsics and noise of the sensors (docs/reference/sensors.md). Body frame =
+// IMU frame; wheel frame: x forward, y left, z up.
 struct SensorCalibration {
   Rigid3d cam_from_imu;
   // cam1, cam2, ... of a rig; their clock is cam0's.
@@ -35,7 +35,7 @@ struct SensorCalibration {
 
   bool has_gnss = false;
   GnssNoise gnss_noise;
-  // Where the antenna's phase centre is, in the IMU frame, m.
+  // The antenna's phase centre in the IMU frame, m.
   Eigen::Vector3d antenna_in_imu = Eigen::Vector3d::Zero();
   // t_imu = t_gnss + shift.
   double timeshift_gnss_imu_s = 0.0;

@@ -9,10 +9,10 @@
 namespace adasfm {
 namespace {
 
-// No receiver is more exact, and no position with a larger error helps.
+// No receiver has a smaller error, and positions with a larger one are useless.
 constexpr double kMinSigmaM = 1e-3;
 constexpr double kMaxSigmaM = 1e3;
-// Above it no camera drives or flies; receivers log mm or garbage then.
+// No camera drives or flies higher; larger heights are in mm or garbage.
 constexpr double kMaxHeightM = 1e5;
 constexpr char kNotANumber[] = "not a number";
 constexpr char kNoFix[] = "no fix (0, 0)";
@@ -62,7 +62,7 @@ Status FixCollector::Add(const RawFix& raw, size_t number) {
     LeaveOut(kNotANumber);
     return Status::Ok();
   }
-  // What receivers write before they know.
+  // Receivers write 0, 0 before they have a fix.
   if (std::abs(raw.latitude_deg) < 1e-6 && std::abs(raw.longitude_deg) < 1e-6) {
     LeaveOut(kNoFix);
     return Status::Ok();

@@ -9,7 +9,7 @@
 
 namespace adasfm {
 
-// What a log says of one position; values that are absent are not finite.
+// One position as a log states it; absent values are not finite.
 struct RawFix {
   timestamp_t timestamp_ns = 0;
   double latitude_deg = 0.0;
@@ -17,14 +17,15 @@ struct RawFix {
   double height_m = 0.0;
   // East, north, up; 0 and less: not stated.
   Eigen::Vector3d sigma_m = Eigen::Vector3d::Zero();
-  // In place of the sigmas; 0: not stated.
+  // Replaces absent sigmas; 0: not stated.
   double hdop = 0.0;
-  // In place of both.
+  // Replaces sigmas and hdop.
   std::optional<Eigen::Matrix3d> covariance;
 };
 
-// Collects the usable fixes of a log: counts what is left out (not a number; no
-// fix, at 0, 0), turns swapped columns into an error, and completes sigmas.
+// Collects the usable fixes of a log. Unusable fixes (NaN; no fix, at 0, 0; a
+// sigma beyond 1 km) are left out and counted; swapped columns are an error;
+// absent sigmas are completed.
 class FixCollector {
  public:
   FixCollector(const std::string& path, const char* unit,

@@ -13,12 +13,12 @@ namespace {
 
 constexpr double kGravity = 9.81;
 constexpr double kGapPeriods = 3.0;
-// |a| of a machine that drives stays near gravity on average: between these
-// lie the planets' factor 9.81 to a log in g and none that is right.
+// The median of |a| of a driving machine stays near gravity; a larger median
+// means a wrong unit.
 constexpr double kMaxMeanForceInG = 4.0;
 constexpr double kRestTolerance = 0.05;
-// Gyroscopes of machines saturate near 2000 deg/s = 35 rad/s; an rms above
-// this (290 deg/s over the whole log) is a log in degrees.
+// An rms above this (290 deg/s over the whole log) means a log in degrees:
+// gyroscopes of machines saturate near 2000 deg/s = 35 rad/s.
 constexpr double kMaxRateRms = 5.0;
 
 // Samples in windows of about one second.
@@ -62,8 +62,9 @@ std::vector<Window> ComputeWindows(const std::vector<ImuSample>& samples) {
   return windows;
 }
 
-// Of all but the fastest twentieth, so that a few bad samples are no unit; with
-// the index of the fastest one.
+// The rms rate of all but the fastest twentieth of the samples, so that a few
+// bad samples do not look like a wrong unit. fastest: the index of the fastest
+// sample.
 double ComputeRateRms(const std::vector<ImuSample>& samples, size_t* fastest) {
   std::vector<double> squares;
   for (const ImuSample& sample : samples) {

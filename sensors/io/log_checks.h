@@ -9,13 +9,13 @@
 
 namespace adasfm {
 
-// Where samples came from: the data line of each, for messages.
+// The origin of samples: the data line of each, for messages.
 struct LogOrigin {
   std::string path;
   std::vector<size_t> line_numbers;
   const char* unit = "line";  // what is counted
 
-  // Number 1, 2, ... of a log that is not made of lines.
+  // Numbers 1, 2, ... for a log that does not consist of lines.
   static LogOrigin Numbered(const std::string& path, size_t num_samples,
                             const char* unit) {
     LogOrigin origin{path, {}, unit};

@@ -26,7 +26,7 @@ std::string_view LineAt(std::string_view text, size_t begin) {
   return Trim(text.substr(begin, end - begin));
 }
 
-// "nan" and "inf" begin with letters but are (bad) data.
+// A line of (bad) data may begin with "nan" or "inf", but contains digits.
 bool IsHeader(std::string_view line) {
   return std::isalpha(static_cast<unsigned char>(line.front())) &&
          line.find_first_of("0123456789") == std::string_view::npos;
@@ -146,7 +146,8 @@ bool ParseSeconds(std::string_view field, timestamp_t* timestamp_ns) {
   const size_t point = field.find('.');
   const std::string_view whole = field.substr(0, point);
   int64_t seconds = 0;
-  // An exponent (or a sign) is rare: the plain way is good enough there.
+  // An exponent (or a sign) is rare: there a conversion from double is good
+  // enough.
   if (field.find_first_of("eE-+") != std::string_view::npos) {
     double value = 0.0;
     if (!ParseDouble(field, &value) || !(value >= 0.0 && value <= 9e9)) {

@@ -18,13 +18,14 @@ struct LogLine {
   std::vector<std::string_view> fields;
 };
 
-// Past the mark that editors of Windows begin a text with, if it is there; the
-// stream is at its begin.
+// Skips the byte order mark with which editors of Windows begin a text, if
+// there is one. The stream is at its begin.
 void SkipByteOrderMark(std::istream* stream);
 
 // A text log in memory. Fields are separated by commas when the first data line
-// has any, else by white space; '#' begins a comment line, and so does a first
-// line that begins with a letter (a header). Both line endings are read.
+// has any, else by white space. '#' begins a comment line; lines before the
+// data that begin with a letter and have no digit are headers. Lines may end in
+// LF or CR LF.
 class LogFile {
  public:
   // An error for a missing, unreadable or empty file (no data line).
@@ -65,7 +66,7 @@ bool ParseNanoseconds(std::string_view field, timestamp_t* timestamp_ns);
 // keeps all its digits. False when negative or beyond the range of int64.
 bool ParseSeconds(std::string_view field, timestamp_t* timestamp_ns);
 
-// An error for a wrong number of fields, naming both.
+// An error when the number of fields is wrong, with both numbers.
 Status CheckNumFields(const LogFile& file, const LogLine& line,
                       size_t num_fields, const std::string& meaning);
 
@@ -73,7 +74,7 @@ Status CheckNumFields(const LogFile& file, const LogLine& line,
 Status ParseTime(const LogFile& file, const LogLine& line,
                  timestamp_t* timestamp_ns);
 
-// All fields from first on as numbers; an error names the field.
+// Parses count fields from first on as numbers; an error names the field.
 Status ParseNumbers(const LogFile& file, const LogLine& line, size_t first,
                     size_t count, double* values);
 

@@ -40,7 +40,7 @@ StatusOr<BagLogs> ReadOneLog(const std::string& text, const Find& find,
                      warnings == nullptr ? &ignored : warnings);
 }
 
-// A topic's messages may all lie where the file is damaged.
+// All messages of a topic may lie in the damaged part of the file.
 template <typename Sample>
 StatusOr<std::vector<Sample>> RequireSamples(const std::string& path,
                                              std::vector<Sample> samples) {
@@ -65,10 +65,10 @@ StatusOr<BagLogs> ReadWheelLog(const std::string& path, WheelType type,
                                std::vector<std::string>* warnings) {
   const std::vector<std::string> types = WheelMessageTypes(type);
   if (types.empty()) {
-    return Status::Error(path +
-                         ": a bag holds no speeds of two wheels; set "
-                         "wheel0/type to odometry, velocity or ticks in the "
-                         "calibration");
+    return Status::Error(
+        path +
+        ": no message of a bag has wheels of the calibration's "
+        "wheel0/type; set it to odometry, velocity or ticks");
   }
   return ReadOneLog(
       path,

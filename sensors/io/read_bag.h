@@ -10,18 +10,18 @@
 
 namespace adasfm {
 
-// Where a log's path names a bag: "drive.mcap", or "drive.mcap:/imu/data" where
-// the bag holds several topics of the log's type.
+// Whether a log's path names a bag: "drive.mcap", or "drive.mcap:/imu/data"
+// where the bag has several topics of the log's type.
 bool IsBagPath(const std::string& path);
 
-// One log of a bag named so. Values are not checked beyond ReadBagLogs.
+// Each reads one log of a bag. Values are not checked beyond ReadBagLogs.
 StatusOr<std::vector<ImuSample>> ReadBagImu(const std::string& path,
                                             std::vector<std::string>* warnings);
 StatusOr<std::vector<OdometryPose>> ReadBagOdometry(
     const std::string& path, std::vector<std::string>* warnings);
 StatusOr<std::vector<RosNavSatFix>> ReadBagGnss(
     const std::string& path, std::vector<std::string>* warnings);
-// Of every type but kOdometry.
+// For kVelocity, kSpeed and kTicks; an error for other types.
 StatusOr<std::vector<WheelSample>> ReadBagWheel(
     const std::string& path, WheelType type,
     std::vector<std::string>* warnings);

@@ -102,7 +102,7 @@ StatusOr<ColumnFields> FindColumns(const LogFile& file, size_t* num_fields) {
   return fields;
 }
 
-// Not a number where the log says so, or says nothing.
+// NaN for an empty field, "nan" and "null".
 bool ParseFieldOrNan(std::string_view field, double* value) {
   std::string word;
   for (const char c : field)

@@ -23,15 +23,15 @@ struct GnssLog {
   std::map<std::string, int> num_left_out;
 };
 
-// Reads a log of positions, told apart by its content
+// Reads a log of positions; its format is recognised by path and content
 // (docs/reference/sensors.md):
 //   a CSV file whose header names the columns,
 //   NMEA 0183 sentences (GGA or RMC, with RMC or ZDA for the date, and GST),
 //   a KITTI raw "oxts" folder,
 //   a bag with sensor_msgs/NavSatFix ("drive.mcap" or "drive.mcap:/fix").
-// Longitudes may be 0 to 360. An error names the line: columns that are missing
-// or not numbers, latitudes beyond 90 degrees (swapped columns), times that go
-// back; or says that no line has a position.
+// Longitudes may be 0 to 360. Errors name the line: columns that are missing or
+// not numbers, latitudes beyond 90 degrees (swapped columns), times that go
+// back. A log without any position is an error, too.
 StatusOr<GnssLog> ReadGnss(const std::string& path, const GnssNoise& noise,
                            std::vector<std::string>* warnings);
 

@@ -63,7 +63,7 @@ StatusOr<std::vector<ImageTime>> ReadImageTimes(const std::string& path) {
       return file.Error(line.number, "image '" + time.name +
                                          "' has a time already; remove one");
     }
-    // Cameras of a rig take their images at one time.
+    // Equal times are allowed: cameras of a rig take their images at one time.
     if (!times.empty() && time.timestamp_ns < times.back().timestamp_ns) {
       return file.Error(line.number,
                         "times must increase, and this one is before the line "

@@ -9,10 +9,10 @@
 
 namespace adasfm {
 
-// Reads image times in order of time, those of a rig's frame equal: EuRoC
-// data.csv ("ns,filename"), 4Seasons times.txt ("id seconds exposure"; the name
-// is "<id>.png") or TUM rgb.txt
-// ("seconds filename"; the name is without its folder).
+// Reads image times, which must not decrease; images of one frame of a rig have
+// equal times. Formats: EuRoC data.csv ("ns,filename"), 4Seasons times.txt ("id
+// seconds exposure"; the name is "<id>.png") or TUM rgb.txt ("seconds
+// filename"; the name is without its folder).
 StatusOr<std::vector<ImageTime>> ReadImageTimes(const std::string& path);
 
 // The time in an image's name when its digits are nanoseconds

@@ -10,7 +10,7 @@
 namespace adasfm {
 namespace {
 
-// The least number of columns that holds both triples; later columns vary.
+// The smallest number of columns with both triples; later columns vary.
 constexpr size_t kMinNumFields = 20;
 constexpr size_t kForceField = 11;
 constexpr size_t kRateField = 17;

@@ -11,11 +11,11 @@ namespace adasfm {
 namespace {
 
 constexpr int64_t kDayNs = 86'400 * kSecondNs;
-// Of a height that nobody has told.
+// Sigma of a height that the log does not state.
 constexpr double kUnknownHeightSigmaM = 500.0;
 
-// "$GPGGA,...*5B": the checksum is the exclusive or of all between $ and *.
-// A sentence without one is taken as it is.
+// "$GPGGA,...*5B": the checksum is the exclusive or of all between $ and *. A
+// sentence without a checksum is accepted.
 bool HasValidChecksum(std::string_view sentence) {
   const size_t star = sentence.rfind('*');
   if (star == std::string_view::npos) return true;
@@ -60,7 +60,7 @@ bool ParseAngle(std::string_view field, std::string_view hemisphere,
   return true;
 }
 
-// "ddmmyy"; a century that has receivers.
+// "ddmmyy"; years from 1980 to 2079.
 bool ParseDate(std::string_view field, int64_t* days) {
   int64_t day, month, year;
   if (field.size() != 6 || !ParseInt64(field.substr(0, 2), &day) ||
@@ -89,7 +89,7 @@ std::vector<std::string_view> SplitFields(std::string_view sentence) {
   }
 }
 
-// Puts the sentences of an epoch together.
+// Combines the sentences of an epoch.
 class EpochReader {
  public:
   explicit EpochReader(FixCollector* collector) : collector_(collector) {}
@@ -213,7 +213,11 @@ StatusOr<GnssLog> ReadNmea(const LogFile& file, const GnssNoise& noise,
   EpochReader reader(&collector);
   for (size_t i = 0; i < file.num_lines(); ++i) {
     const std::string_view sentence = file.Text(i);
-    if (sentence.empty() || sentence[0] != '$' || !HasValidChecksum(sentence)) {
+    if (sentence.empty() || sentence[0] != '$') {
+      collector.LeaveOut("no sentence");
+      continue;
+    }
+    if (!HasValidChecksum(sentence)) {
       collector.LeaveOut("wrong checksum");
       continue;
     }

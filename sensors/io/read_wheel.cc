@@ -75,10 +75,11 @@ StatusOr<WheelType> FindType(const LogFile& file) {
       "'...,ticks'; nor is the file a TUM trajectory");
 }
 
-// Faster than any machine with photos to match: km/h or mm/s were logged.
+// Faster than any machine with photos to match: larger values are in km/h or
+// mm/s.
 constexpr double kMaxSpeed = 120.0;
 constexpr double kMaxYawRate = 20.0;
-// Beyond it no front wheel turns.
+// No front wheel is steered by a larger angle.
 constexpr double kMaxSteeringRad = 1.3;
 
 // 4Seasons' times are whole nanoseconds, TUM's are decimal seconds.
@@ -162,7 +163,7 @@ StatusOr<WheelType> ReadWheelType(const std::string& path) {
 
 namespace {
 
-// Units are left to who takes the origin along (CheckWheelUnits).
+// Units are not checked with origin_out: its owner calls CheckWheelUnits.
 Status CheckSamples(const std::vector<WheelSample>& samples, WheelType type,
                     LogOrigin origin, std::vector<std::string>* warnings,
                     LogOrigin* origin_out) {

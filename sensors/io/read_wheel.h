@@ -10,19 +10,19 @@
 
 namespace adasfm {
 
-// What the log says it is: by its header line (docs/reference/sensors.md), or
+// The type of a log by its header line (docs/reference/sensors.md), or
 // kOdometry for eight columns separated by spaces.
 StatusOr<WheelType> ReadWheelType(const std::string& path);
 
-// Reads a log of every type but kOdometry. When expected_type is not what the
-// header says, that is an error. Errors and warnings as for ReadImu. origin
-// (may be null) receives where the samples come from; then speeds are not
-// checked (CheckWheelUnits), so that bad samples can be left out before.
+// Reads a log of every type but kOdometry. A header that states another type
+// than expected_type is an error. Other errors and warnings as for ReadImu.
+// origin (may be null) receives where the samples come from; then speeds are
+// not checked, so that bad samples can be left out before CheckWheelUnits.
 StatusOr<std::vector<WheelSample>> ReadWheel(
     const std::string& path, WheelType expected_type,
     std::vector<std::string>* warnings = nullptr, LogOrigin* origin = nullptr);
 
-// An error for speeds and yaw rates that no machine has.
+// An error for speeds, yaw rates and steering angles that no machine has.
 Status CheckWheelUnits(const std::vector<WheelSample>& samples, WheelType type,
                        const LogOrigin& origin);
 

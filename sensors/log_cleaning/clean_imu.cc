@@ -15,8 +15,8 @@ namespace {
 // accelerometer for crash tests (200 g).
 constexpr double kMaxRate = 70.0;     // rad/s
 constexpr double kMaxForce = 2000.0;  // m/s^2
-// Spikes below these (over 5 ms) turn by 0.1 deg, or change the speed by 0.03
-// m/s: less than the noise over a link.
+// Smaller spikes (over 5 ms) change the rotation by less than 0.1 deg or the
+// speed by less than 0.03 m/s: less than the noise over a link.
 constexpr double kMinRateSpike = 0.3;   // rad/s
 constexpr double kMinForceSpike = 5.0;  // m/s^2
 constexpr size_t kMinFrozen = 6;        // all six axes
@@ -93,7 +93,7 @@ Status ImuCleaner::CheckAlive() const {
   for (int i = 0; i < 2; ++i) {
     is_dead[i] = LongestRun(readings, 3 * i, 3) > kDeadShare * samples_.size();
   }
-  // A simulation at rest repeats both; it is no use, but not dead.
+  // A simulation at rest repeats both: useless, but not dead.
   if (is_dead[0] == is_dead[1] && !readings.front().isZero(0.0)) {
     return Status::Ok();
   }

@@ -13,22 +13,21 @@ namespace adasfm {
 
 template <typename Sample>
 struct CleanedLog {
-  std::vector<Sample> samples;  // those that are left
-  LogOrigin origin;             // theirs
+  std::vector<Sample> samples;  // without the bad ones
+  LogOrigin origin;             // of samples
   std::vector<LogFault> faults;
-  // One line each: the faults, and samples that are missing.
+  // One line for each kind of fault, and one for missing samples.
   std::vector<std::string> warnings;
 };
 
-// What: leaves bad samples out of an IMU log.
-// Inputs: samples in order of time and where they come from.
-// Method: in this order all-zero samples, frozen sensors, stretches that came
-// before, values beyond any sensor's range, saturation and spikes
-// (find_repeats.h, find_spikes.h). The holes are bridged, or become gaps, where
-// the samples are used (sensors/bridged_holes.h).
-// On failure: an error of one line when a sensor is dead (the same reading in
-// half of the log), when more than a fifth of the samples is bad, or when the
-// clock's unit is wrong.
+// Leaves bad samples out of an IMU log. samples are in order of time; origin is
+// where they come from. The checks, in this order: samples of zero specific
+// force, frozen sensors, repeated stretches, values beyond any sensor's range,
+// saturation and spikes (find_repeats.h, find_spikes.h). The holes are bridged,
+// or become gaps, where the samples are used (sensors/bridged_holes.h). An
+// error of one line when a sensor is dead (the same reading in half of the
+// log), when more than a fifth of the samples is bad, or when the clock's unit
+// is wrong.
 StatusOr<CleanedLog<ImuSample>> CleanImu(const std::vector<ImuSample>& samples,
                                          const LogOrigin& origin);
 

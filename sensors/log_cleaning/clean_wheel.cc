@@ -9,12 +9,12 @@
 namespace adasfm {
 namespace {
 
-// m/s: spikes below it weigh as little as a wheel that slips for a moment.
+// m/s: smaller spikes have as little effect as a wheel that slips for a moment.
 constexpr double kMinSpike = 2.0;
 // No wheel of a machine stops from this speed within one sample, m/s.
 constexpr double kMinDrop = 0.5;
-// Speeds that repeat in all digits for this long are not measured (and five
-// times as many as usual: encoders are coarse).
+// Speeds that repeat in all digits for longer than this, and for five times as
+// many samples as usual (encoders are coarse), are not measured.
 constexpr double kMinFrozenS = 0.3;
 constexpr double kUsualRunsOfSpeeds = 5.0;
 constexpr double kMaxBadWheelShare = 0.5;
@@ -63,7 +63,7 @@ void MarkRuns(const std::vector<WheelSample>& samples, WheelType type,
   }
 }
 
-// From full speed to zero and back, both in one step.
+// From at least kMinDrop to zero and back, both in one step.
 void MarkDropOuts(const std::vector<WheelSample>& samples,
                   double WheelSample::*reading,
                   std::vector<LogFaultKind>* kinds) {

@@ -9,15 +9,13 @@
 
 namespace adasfm {
 
-// What: leaves bad samples out of a wheel log.
-// Inputs: samples in order of time, their type (not kOdometry), and where they
-// come from.
-// Method: spikes (find_spikes.h); speeds that drop to zero, or begin to repeat
-// themselves in all digits, in one step and come back in one: an encoder or a
-// bus that failed. Wheels that slip or brake take longer. Counters (kTicks) are
-// cumulative: what a reading misses, the next one has; only their clock and
-// missing samples are looked at.
-// On failure: as CleanImu.
+// Leaves bad samples out of a wheel log in order of time, of a type other than
+// kOdometry: spikes (find_spikes.h); speeds that drop to zero in one step and
+// come back in one, from a failed encoder or bus (wheels that slip or brake
+// take longer); speeds that repeat in all digits for too long. Counters
+// (CountsTicks) are cumulative, so that the next reading contains what one
+// misses: only their clock and missing samples are checked. An error when more
+// than half of the samples is bad, or the clock's unit is wrong.
 StatusOr<CleanedLog<WheelSample>> CleanWheel(
     const std::vector<WheelSample>& samples, WheelType type,
     const LogOrigin& origin);

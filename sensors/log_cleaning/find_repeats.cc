@@ -16,12 +16,12 @@ constexpr size_t kMinDuplicated = 10;
 constexpr int kMinSaturated = 6;
 constexpr int kMinSaturatedInARow = 3;
 // An axis whose readings repeat the one before less often than this is not
-// quantised; of others saturation lies so many robust standard deviations from
-// the median.
+// quantised. On other axes saturation is at least so many robust standard
+// deviations from the median.
 constexpr double kMaxRepeatShare = 0.01;
 constexpr double kSaturationRatio = 6.0;
-// Of white noise second differences are 1.7 times the first ones; of KITTI's
-// filtered log 0.6 times; of smooth motion a hundredth.
+// Second differences divided by first differences: 1.7 for white noise, 0.6 for
+// KITTI's filtered log, a hundredth for smooth motion.
 constexpr double kMinNoiseRatio = 0.1;
 
 bool IsEqual(const ImuReading& a, const ImuReading& b, int first_axis,
@@ -43,9 +43,9 @@ std::vector<size_t> RunLengths(const std::vector<ImuReading>& readings,
   return lengths;
 }
 
-// Whether the axis has values at its end (the largest of sign * reading) that
-// no noise explains: many, several in a row, where other values hardly ever
-// come twice or are far off.
+// Whether the values at the end of the axis (the largest of sign * reading)
+// cannot be noise: there are many, several in a row, and either other values
+// hardly ever repeat or the end is far from the median.
 bool IsSaturated(const std::vector<double>& values, double end) {
   int num_at_end = 0, run = 0, longest = 0, num_repeats = 0;
   for (size_t i = 0; i < values.size(); ++i) {
@@ -90,8 +90,8 @@ std::vector<bool> FindFrozen(const std::vector<ImuReading>& readings,
   std::vector<bool> is_frozen(readings.size(), false);
   size_t begin = 0;
   for (const size_t length : lengths) {
-    // The first one was measured; but in which of them the log stopped, and
-    // whether in time, is not known.
+    // The first reading of a run was measured, but at which of them the log
+    // froze, and whether in time, is unknown: all are marked.
     if (length >= limit) {
       std::fill(is_frozen.begin() + begin, is_frozen.begin() + begin + length,
                 true);
@@ -115,7 +115,7 @@ std::vector<bool> FindDuplicated(const std::vector<ImuReading>& readings) {
     for (int axis = 0; axis < 6; ++axis) key[axis] = reading[axis];
     return key;
   };
-  // Where each reading came first.
+  // The first occurrence of each reading.
   std::map<std::array<double, 6>, size_t> first_seen;
   std::vector<size_t> origins(readings.size());
   for (size_t i = 0; i < readings.size(); ++i) {

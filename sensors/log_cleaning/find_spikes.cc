@@ -13,19 +13,19 @@ namespace {
 constexpr size_t kMinNumSamples = 50;
 constexpr double kHalfWindowS = 0.05;
 constexpr size_t kMinHalfWindow = 5;
-// Real logs of cars and phones (bumps, engines) reach 20.
+// Bumps and engines in real logs of cars and phones reach 20.
 constexpr double kMinRatio = 30.0;
-// The deviations are measured at no more places than these.
+// The deviations are measured at about this many places at most.
 constexpr size_t kMaxNumMeasured = 20000;
-// Samples looked at on each side of a spike. Of both sides together two may be
-// spikes as well; the third largest deviation must be no more than noise, or
-// next to nothing beside the spike's.
+// Samples examined on each side of a spike. Two of all these may be spikes as
+// well; the third largest deviation must be within the noise, or negligible
+// beside that of the spike.
 constexpr size_t kNumNeighbours = 6;
 constexpr size_t kNumExcused = 2;
 constexpr double kQuietRatio = 8.0;
 constexpr double kQuietShare = 0.02;
-// A spike's first and last sample are reached and left in one step of at least
-// this share of their deviation; bumps fade.
+// The first sample of a spike is reached, and the last one left, in one step of
+// at least this share of its deviation; bumps fade.
 constexpr double kEdgeShare = 0.7;
 
 class SpikeFinder {
@@ -41,8 +41,8 @@ class SpikeFinder {
  private:
   double Deviation(size_t index) const;
   double MeasureSigma() const;
-  // Samples near a jump of more than half the threshold; only their deviations
-  // need to be known.
+  // Deviations of samples near a jump of more than half the threshold; those of
+  // other samples are not needed, and -1.
   std::vector<double> DeviationsNearJumps(double threshold) const;
   bool HasEdges(size_t begin, size_t end) const;
   bool IsQuietAround(size_t begin, size_t end, double peak) const;
@@ -128,7 +128,7 @@ std::vector<bool> SpikeFinder::Run(double min_deviation) {
     while (end < readings_.size() && deviations[end] >= threshold) {
       peak = std::max(peak, deviations[end++]);
     }
-    // Of longer runs the medians would be wrong.
+    // For longer runs the medians would be wrong.
     if (end - begin <= half_window_ && HasEdges(begin, end) &&
         IsQuietAround(begin, end, peak)) {
       std::fill(is_spike.begin() + begin, is_spike.begin() + end, true);

@@ -8,15 +8,15 @@
 
 namespace adasfm {
 
-// What: marks samples that motion cannot explain.
-// Inputs: readings of one sensor in order of time (unused axes zero), the
-// median period of the log, and the smallest deviation worth a name (the
-// readings' unit). Method: a reading's deviation is its distance from the
-// median of the 0.05 s (at least five samples) before and after. Of a spike it
+// Marks samples that motion cannot explain. readings: of one sensor in order of
+// time (unused axes zero); period_s: the median period of the log;
+// min_deviation: the smallest deviation that counts, in the unit of the
+// readings. The deviation of a reading is its distance from the median of the
+// 0.05 s (at least five samples) before and after. For a spike the deviation
 // exceeds min_deviation and 30 times the log's robust standard deviation
 // (1.4826 medians), and the samples around the spike are quiet: a machine that
-// hits a kerb rings, a bit that flips does not. On failure: nothing is marked
-// in logs too short to tell (fewer than 50).
+// hits a kerb rings, a flipped bit does not. Nothing is marked in logs that are
+// too short (fewer than 50 samples).
 std::vector<bool> FindSpikes(const std::vector<Eigen::Vector3d>& readings,
                              double period_s, double min_deviation);
 

@@ -14,7 +14,7 @@ std::string Place(const LogFault& fault) {
                                    : first + "-" + std::to_string(fault.last);
 }
 
-// What is wrong, after "7 samples".
+// The text after "7 samples".
 const char* Cause(LogFaultKind kind, bool is_one) {
   switch (kind) {
     case LogFaultKind::kNone:

@@ -14,7 +14,7 @@ enum class LogFaultKind {
   kNone,
   kSpike,       // far from the samples around it
   kFrozen,      // repeats the reading before it
-  kZero,        // all zero where the sensor cannot read that
+  kZero,        // zero where the sensor cannot read zero
   kSaturated,   // at the end of the sensor's range
   kDuplicated,  // repeats a stretch of readings that came before
   kImpossible,  // beyond what any such sensor measures
@@ -31,7 +31,7 @@ struct LogFault {
   double duration_s = 0.0;
 };
 
-// The faults of a log of which every sample has a kind, in order of time.
+// The faults of a log in order of time, from the kind of each sample.
 std::vector<LogFault> CollectFaults(const std::vector<LogFaultKind>& kinds,
                                     const std::vector<timestamp_t>& times_ns,
                                     const LogOrigin& origin);

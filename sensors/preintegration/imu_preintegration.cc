@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "sensors/preintegration/imu_preintegration.h"
 
-#include <algorithm>
 #include <stdexcept>
 
 #include "core/so3.h"
@@ -9,17 +8,8 @@
 namespace adasfm {
 namespace {
 
-// The first sample later than the time.
-size_t UpperBound(const std::vector<ImuSample>& samples, timestamp_t time_ns) {
-  return std::upper_bound(samples.begin(), samples.end(), time_ns,
-                          [](timestamp_t time, const ImuSample& sample) {
-                            return time < sample.timestamp_ns;
-                          }) -
-         samples.begin();
-}
-
-// What a step of constant rate and force turns and accelerates by, and how that
-// depends on its first attitude.
+// Rotation and acceleration over a step of constant rate and force, and their
+// derivatives by the attitude at its start.
 struct ImuStep {
   ImuStep(const Eigen::Vector3d& angular_velocity,
           const Eigen::Vector3d& specific_force, double step_s,
@@ -28,8 +18,8 @@ struct ImuStep {
     const Eigen::Vector3d turn = angular_velocity * dt;
     rotation = ExpSo3(turn);
     right_jacobian = RightJacobianSo3(turn);
-    // The force turns with the body: its mean over the step, in the frame at
-    // the step's start, is close to that at the middle.
+    // The force rotates with the body: its mean over the step, in the frame at
+    // the start of the interval, is close to its value in the middle.
     middle = (delta_rotation * ExpSo3(0.5 * turn)).toRotationMatrix();
     acceleration = middle * specific_force;
     // d (middle f) = -middle [f]x (dtheta at the middle).
@@ -46,7 +36,7 @@ struct ImuStep {
   Eigen::Matrix3d force_by_middle;
 };
 
-// From the last row up: each uses the old ones.
+// Position first, rotation last: each update uses the old values.
 void IntegrateBiasJacobians(const ImuStep& step, ImuPreintegration* sum) {
   const Eigen::Matrix3d middle_by_gyroscope =
       step.half_transposed * sum->rotation_by_gyroscope -
@@ -88,8 +78,9 @@ void IntegrateCovariance(const ImuStep& step, const ImuNoise& noise,
   sum->covariance = transition * sum->covariance * transition.transpose() +
                     input * variance.asDiagonal() * input.transpose();
 
-  // Noise varies within the step too: the position's own share, without which
-  // one step's velocity and position would be the same knowledge twice.
+  // Noise varies within the step, too: the independent share of the position,
+  // without which velocity and position of one step would be perfectly
+  // correlated.
   sum->covariance.bottomRightCorner<3, 3>().diagonal().array() +=
       noise.accelerometer_noise_density * noise.accelerometer_noise_density *
       dt * dt * dt / 12.0;
@@ -135,29 +126,13 @@ Eigen::Vector3d ImuPreintegration::CorrectedPosition(
              (new_bias.accelerometer - bias.accelerometer);
 }
 
-bool CoversInterval(const std::vector<ImuSample>& samples, timestamp_t start_ns,
-                    timestamp_t end_ns, double max_gap_s) {
-  if (samples.empty() || start_ns > end_ns ||
-      start_ns < samples.front().timestamp_ns ||
-      end_ns > samples.back().timestamp_ns) {
-    return false;
-  }
-  for (size_t i = std::max<size_t>(UpperBound(samples, start_ns), 1);
-       i < samples.size() && samples[i - 1].timestamp_ns < end_ns; ++i) {
-    const timestamp_t gap =
-        samples[i].timestamp_ns - samples[i - 1].timestamp_ns;
-    if (SecondsFromNs(gap) > max_gap_s) return false;
-  }
-  return true;
-}
-
 ImuSample InterpolateImu(const std::vector<ImuSample>& samples,
                          timestamp_t timestamp_ns) {
   if (samples.empty() || timestamp_ns < samples.front().timestamp_ns ||
       timestamp_ns > samples.back().timestamp_ns) {
     throw std::invalid_argument("InterpolateImu: time outside the log");
   }
-  const size_t next = UpperBound(samples, timestamp_ns);
+  const size_t next = IndexAfter(samples, timestamp_ns);
   if (next == samples.size()) return samples.back();
   const ImuSample& a = samples[next - 1];
   const ImuSample& b = samples[next];
@@ -184,7 +159,7 @@ ImuPreintegration PreintegrateImu(const std::vector<ImuSample>& samples,
   if (profile != nullptr) *profile = {{start_ns, sum.delta_rotation}};
   ImuSample last = InterpolateImu(samples, start_ns);
   const ImuSample end = InterpolateImu(samples, end_ns);
-  for (size_t i = UpperBound(samples, start_ns); last.timestamp_ns < end_ns;
+  for (size_t i = IndexAfter(samples, start_ns); last.timestamp_ns < end_ns;
        ++i) {
     const ImuSample& next = samples[i].timestamp_ns < end_ns ? samples[i] : end;
     const double dt = SecondsFromNs(next.timestamp_ns - last.timestamp_ns);

@@ -21,9 +21,10 @@ struct RotationAtTime {
   Eigen::Quaterniond start_from_body = Eigen::Quaterniond::Identity();
 };
 
-// The motion over [start, end] as an IMU with known bias saw it, free of the
-// state at the start (Forster 2015, eqs. 33-38; docs/reference/sensors.md).
-// With R, v, p of the body in a world with gravity g:
+// The motion over [start, end] as an IMU with known bias measured it,
+// independent of the state at the start (Forster 2015, eqs. 33-38;
+// docs/reference/sensors.md). With R, v, p of the body in a world with gravity
+// g:
 //   R2 = R1 dR,  v2 = v1 + g dt + R1 dv,  p2 = p1 + v1 dt + g dt^2 / 2 + R1 dp.
 struct ImuPreintegration {
   double dt_s = 0.0;
@@ -34,7 +35,7 @@ struct ImuPreintegration {
   // Of (rotation, velocity, position): true dR = dR Exp(e), true dv = dv + e.
   // White noise only; the biases' random walk is a factor of its own.
   Eigen::Matrix<double, 9, 9> covariance = Eigen::Matrix<double, 9, 9>::Zero();
-  // Derivatives by the biases; that of the rotation is of Log(dR^T dR(b + db)).
+  // Derivatives by the biases; for the rotation, of Log(dR^T dR(b + db)).
   Eigen::Matrix3d rotation_by_gyroscope = Eigen::Matrix3d::Zero();
   Eigen::Matrix3d velocity_by_gyroscope = Eigen::Matrix3d::Zero();
   Eigen::Matrix3d velocity_by_accelerometer = Eigen::Matrix3d::Zero();
@@ -47,19 +48,13 @@ struct ImuPreintegration {
   Eigen::Vector3d CorrectedPosition(const ImuBias& new_bias) const;
 };
 
-// Whether the samples (in order of time) reach over [start, end] with no gap
-// longer than max_gap_s in it.
-bool CoversInterval(const std::vector<ImuSample>& samples, timestamp_t start_ns,
-                    timestamp_t end_ns, double max_gap_s);
-
-// The sample at a time inside the log, linear between its neighbours.
+// The sample at a time inside the log, interpolated linearly.
 ImuSample InterpolateImu(const std::vector<ImuSample>& samples,
                          timestamp_t timestamp_ns);
 
 // Integrates by the midpoint rule, interpolating at both ends. Throws
-// std::invalid_argument when the log does not reach over [start, end]. When
-// profile is given it receives the rotation at every step's end, the start
-// included.
+// std::invalid_argument when the log does not cover [start, end]. profile (may
+// be null) receives the rotation at the start and at the end of every step.
 ImuPreintegration PreintegrateImu(
     const std::vector<ImuSample>& samples, timestamp_t start_ns,
     timestamp_t end_ns, const ImuBias& bias, const ImuNoise& noise,

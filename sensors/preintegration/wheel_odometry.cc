@@ -10,21 +10,13 @@
 namespace adasfm {
 namespace {
 
-size_t UpperBound(const std::vector<WheelSpeed>& speeds, timestamp_t time_ns) {
-  return std::upper_bound(speeds.begin(), speeds.end(), time_ns,
-                          [](timestamp_t time, const WheelSpeed& speed) {
-                            return time < speed.timestamp_ns;
-                          }) -
-         speeds.begin();
-}
-
 WheelSpeed Interpolate(const std::vector<WheelSpeed>& speeds,
                        timestamp_t time_ns) {
   if (speeds.empty() || time_ns < speeds.front().timestamp_ns ||
       time_ns > speeds.back().timestamp_ns) {
     throw std::invalid_argument("PreintegrateWheel: time outside the log");
   }
-  const size_t next = UpperBound(speeds, time_ns);
+  const size_t next = IndexAfter(speeds, time_ns);
   if (next == speeds.size()) return speeds.back();
   const WheelSpeed& a = speeds[next - 1];
   const WheelSpeed& b = speeds[next];
@@ -34,7 +26,7 @@ WheelSpeed Interpolate(const std::vector<WheelSpeed>& speeds,
           a.yaw_rate + ratio * (b.yaw_rate - a.yaw_rate)};
 }
 
-// Speeds between counts, stamped in the middle between them.
+// Speeds between successive counts, stamped in the middle.
 std::vector<WheelSpeed> SpeedsFromTicks(const std::vector<WheelSample>& samples,
                                         const SensorCalibration& calibration) {
   const bool is_one_wheel = calibration.wheel_type == WheelType::kEncoder;
@@ -56,13 +48,13 @@ std::vector<WheelSpeed> SpeedsFromTicks(const std::vector<WheelSample>& samples,
   return speeds;
 }
 
-// All times at which the integrand bends: the ends, wheel samples and the
-// profile's.
+// All times at which the integrand may have a kink: the ends, wheel samples and
+// entries of the profile.
 std::vector<timestamp_t> MergeTimes(
     const std::vector<WheelSpeed>& speeds, timestamp_t start_ns,
     timestamp_t end_ns, const std::vector<RotationAtTime>& profile) {
   std::vector<timestamp_t> times = {start_ns, end_ns};
-  for (size_t i = UpperBound(speeds, start_ns);
+  for (size_t i = IndexAfter(speeds, start_ns);
        i < speeds.size() && speeds[i].timestamp_ns < end_ns; ++i) {
     times.push_back(speeds[i].timestamp_ns);
   }
@@ -76,7 +68,8 @@ std::vector<timestamp_t> MergeTimes(
   return times;
 }
 
-// The profile's rotation at a time, along the shortest turn between entries.
+// The profile's rotation at a time, along the shortest rotation between
+// entries.
 Eigen::Quaterniond InterpolateProfile(
     const std::vector<RotationAtTime>& profile, timestamp_t time_ns,
     size_t* cursor) {
@@ -115,29 +108,14 @@ std::vector<WheelSpeed> ComputeWheelSpeeds(
     } else if (calibration.wheel_type == WheelType::kVelocity) {
       speed.yaw_rate = sample.second;
     } else if (calibration.wheel_type == WheelType::kSteering) {
-      // The bicycle model: the rear axle turns about where its line meets that
-      // of the steered front axle.
+      // The bicycle model: the vehicle turns about the point where the lines of
+      // both axles meet.
       speed.yaw_rate =
           sample.first * std::tan(sample.second) / calibration.wheelbase_m;
     }
     speeds.push_back(speed);
   }
   return speeds;
-}
-
-bool CoversInterval(const std::vector<WheelSpeed>& speeds, timestamp_t start_ns,
-                    timestamp_t end_ns, double max_gap_s) {
-  if (speeds.empty() || start_ns > end_ns ||
-      start_ns < speeds.front().timestamp_ns ||
-      end_ns > speeds.back().timestamp_ns) {
-    return false;
-  }
-  for (size_t i = std::max<size_t>(UpperBound(speeds, start_ns), 1);
-       i < speeds.size() && speeds[i - 1].timestamp_ns < end_ns; ++i) {
-    const timestamp_t gap = speeds[i].timestamp_ns - speeds[i - 1].timestamp_ns;
-    if (SecondsFromNs(gap) > max_gap_s) return false;
-  }
-  return true;
 }
 
 WheelMotion PreintegrateWheel(const std::vector<WheelSpeed>& speeds,

@@ -3,7 +3,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
+#include "core/interpolate_pose.h"
 #include "core/sensor_log.h"
 #include "core/so3.h"
 #include "sensors/io/log_checks.h"
@@ -38,46 +40,16 @@ void AppendFilled(timestamp_t end_ns, timestamp_t max_step_ns,
   times->push_back(end_ns);
 }
 
-// The pose of a trajectory at a time within it.
-Rigid3d InterpolatePose(const std::vector<OdometryPose>& poses,
-                        timestamp_t time_ns) {
-  auto next = FirstNotBefore(poses, time_ns);
-  if (next->timestamp_ns == time_ns) return next->world_from_body;
-  const OdometryPose& a = *(next - 1);
-  const OdometryPose& b = *next;
-  const double ratio = static_cast<double>(time_ns - a.timestamp_ns) /
-                       (b.timestamp_ns - a.timestamp_ns);
-  const Rigid3d& pose_a = a.world_from_body;
-  const Rigid3d& pose_b = b.world_from_body;
-  return Rigid3d(
-      pose_a.rotation.slerp(ratio, pose_b.rotation),
-      pose_a.translation + ratio * (pose_b.translation - pose_a.translation));
-}
-
-bool CoversInterval(const std::vector<OdometryPose>& poses,
-                    timestamp_t start_ns, timestamp_t end_ns,
-                    double max_gap_s) {
-  if (poses.empty() || start_ns < poses.front().timestamp_ns ||
-      end_ns > poses.back().timestamp_ns) {
-    return false;
-  }
-  auto it = FirstNotBefore(poses, start_ns);
-  if (it == poses.begin()) ++it;
-  for (; it != poses.end() && (it - 1)->timestamp_ns < end_ns; ++it) {
-    const timestamp_t gap = it->timestamp_ns - (it - 1)->timestamp_ns;
-    if (SecondsFromNs(gap) > max_gap_s) return false;
-  }
-  return true;
-}
-
 // A trajectory's motion over one link: a displacement that does not depend on
-// the state (its map has rank one, along the forward direction), and a turn.
+// the state (its map has rank one, along the forward direction), and a
+// rotation.
 WheelMotion ComputeOdometryMotion(const std::vector<OdometryPose>& poses,
                                   timestamp_t start_ns, timestamp_t end_ns,
                                   const SensorCalibration& calibration,
                                   double period_s) {
-  const Rigid3d first = InterpolatePose(poses, start_ns);
-  const Rigid3d second = InterpolatePose(poses, end_ns);
+  constexpr double kAnyGap = std::numeric_limits<double>::infinity();
+  const Rigid3d first = InterpolatePose(poses, start_ns, kAnyGap).value();
+  const Rigid3d second = InterpolatePose(poses, end_ns, kAnyGap).value();
   const Rigid3d first_from_second = first.Inverse() * second;
   const Eigen::Quaterniond& imu_from_wheel =
       calibration.imu_from_wheel.rotation;
@@ -117,7 +89,7 @@ WheelNoise ComputeWheelNoise(const SensorCalibration& calibration,
                        ? std::sqrt(2.0) * speed / calibration.track_width_m
                        : calibration.wheel_yaw_rate_noise * root_period;
   if (calibration.wheel_type == WheelType::kTicks) {
-    // Each count is off by up to a tick, evenly: q^2 / 12 at both ends.
+    // Rounding is uniform over a tick: variance q^2 / 12 at both ends.
     const double wheel = calibration.metres_per_tick / std::sqrt(6.0);
     noise.distance_rounding = wheel / std::sqrt(2.0);
     noise.yaw_rounding = std::sqrt(2.0) * wheel / calibration.track_width_m;

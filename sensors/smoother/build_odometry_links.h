@@ -22,12 +22,12 @@ struct OdometryLinkOptions {
 // States in order of time; those of the images and others between.
 struct OdometryTimeline {
   std::vector<timestamp_t> times_ns;
-  // Of the given times, their index in times_ns.
+  // For each given time its index in times_ns.
   std::vector<size_t> indices;
 };
 
 // The times of the states: the given ones (in order, within the logs), and
-// enough between and around them.
+// others between and around them for max_link_s (not in gaps above 10 min).
 OdometryTimeline BuildTimeline(const std::vector<timestamp_t>& times_ns,
                                const MotionLogs& logs,
                                const OdometryLinkOptions& options);

@@ -18,7 +18,7 @@ struct Substitution {
   Eigen::Matrix<double, kState, 1> offset;
 };
 
-// Adds what is known of (state k, globals) to a link's equations.
+// Adds the message about (state k, globals) to a link's equations.
 void AddToFirst(const ChainMessage& message, LinkEquations* link) {
   constexpr int kGlobals = ChainGlobals::kSize;
   link->h.topLeftCorner<kState, kState>() +=
@@ -60,7 +60,8 @@ ChainMessage EliminateFirst(const LinkEquations& link, double damping,
   return message;
 }
 
-// Removes state k + 1: what the chain behind it says of (state k, globals).
+// Removes state k + 1: the message of link k and all later ones about (state k,
+// globals).
 ChainMessage EliminateSecond(const LinkEquations& link) {
   LinkEquations swapped;
   Eigen::Matrix<int, kLinkSize, 1> order;
@@ -126,7 +127,7 @@ void ComputeChainCovariances(
     LinkCovariance covariance = all.h.llt().solve(LinkCovariance::Identity());
     covariance(kHeading, kHeading) = 0.0;
     receive(k, 0.5 * (covariance + covariance.transpose()));
-    // The backward message leaves the last state's block regular only because
+    // The last state has no backward message; its block is regular only because
     // a link constrains its own second state.
     backward = EliminateSecond(link);
   }

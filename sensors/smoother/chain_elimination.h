@@ -16,7 +16,7 @@ struct LinkEquations {
   Eigen::Matrix<double, kLinkSize, 1> g;
 };
 
-// What one end of the chain knows of (state, globals).
+// Normal equations of one end of the chain, reduced to (state, globals).
 struct ChainMessage {
   static constexpr int kSize = ChainState::kSize + ChainGlobals::kSize;
   Eigen::Matrix<double, kSize, kSize> h =
@@ -29,18 +29,18 @@ struct ChainSolution {
   ChainGlobals::Vector globals;
 };
 
-// The equations of link k; called once per pass and link, in order.
+// The equations of link k; called once per pass and link, in the pass's order.
 using LinkEquationsFunction = std::function<LinkEquations(size_t)>;
 
 // Solves the chain of num_links + 1 states: eliminates states from the front,
-// then substitutes back. first holds the priors of state 0 and the globals.
-// damping is added to each state's diagonal, in proportion to it.
+// then substitutes back. `first` contains the priors of state 0 and the
+// globals. Each state's diagonal is multiplied by 1 + damping.
 ChainSolution SolveChain(size_t num_links, const ChainMessage& first,
                          const LinkEquationsFunction& equations,
                          double damping);
 
-// The marginal covariance of each link's coordinates given all others. The
-// heading of state k is held fixed, as nothing observes it: the rest is
+// The marginal covariance of each link's coordinates in the whole chain. The
+// heading of state k is fixed, since no residual observes it; the covariance is
 // relative to it.
 using LinkCovariance = Eigen::Matrix<double, kLinkSize, kLinkSize>;
 void ComputeChainCovariances(

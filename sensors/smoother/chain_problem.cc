@@ -7,7 +7,7 @@
 namespace adasfm {
 namespace {
 
-// Priors of the first state: the heading is free to choose, the rest is open.
+// Wide priors of the first state; its heading is arbitrary.
 constexpr double kFirstTiltSigma = 1.0;    // rad
 constexpr double kFirstSpeedSigma = 50.0;  // m/s
 

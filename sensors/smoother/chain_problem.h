@@ -8,10 +8,10 @@
 
 namespace adasfm {
 
-// The smoother's least-squares problem with the present values of its unknowns
-// (states, globals) and what each link's sensors count for.
+// The smoother's least-squares problem with the current values of its unknowns
+// (states, globals) and the weights of the links' wheels.
 struct ChainProblem {
-  // Begins with the problem's initial states. Keeps references to both.
+  // Starts at the problem's initial states. Keeps references to both arguments.
   ChainProblem(const OdometryFusionProblem& problem,
                const OdometryFusionOptions& options);
 
@@ -19,15 +19,15 @@ struct ChainProblem {
   LinkResiduals Residuals(size_t k) const;
   // The normal equations of link k.
   LinkEquations Equations(size_t k) const;
-  // Those of the priors of the first state and of the globals.
+  // The normal equations of the priors of the first state and of the globals.
   ChainMessage FirstMessage() const;
-  // Half of the squares of all residuals.
+  // Half of the sum of squares of all residuals.
   double Cost() const;
 
   const OdometryFusionProblem& problem;
   const OdometryFusionOptions& options;
-  std::vector<double> wheel_weights;  // one a link
-  std::vector<ChainState> states;     // one more
+  std::vector<double> wheel_weights;  // one per link
+  std::vector<ChainState> states;     // one more than links
   ChainGlobals globals;
 
  private:

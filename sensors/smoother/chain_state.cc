@@ -23,20 +23,21 @@ ChainGlobals::Vector ChainGlobals::PriorSigmas(
     const OdometryFusionOptions& options) {
   // Zero means exactly known: a sigma too small to move anything.
   constexpr double kFixed = 1e-7;
-  const double mount = DegToRad(options.wheel_mount_sigma_deg);
+  const double driving = DegToRad(options.driving_direction_sigma_deg);
   Vector sigmas;
   sigmas << options.wheel_scale_sigma, options.wheel_track_sigma,
-      options.wheel_curvature_sigma, mount, mount, options.wheel_delay_sigma_s;
+      options.wheel_curvature_sigma, driving, driving,
+      options.wheel_delay_sigma_s;
   return sigmas.cwiseMax(kFixed);
 }
 
 Eigen::Vector3d ChainGlobals::Forward(
     const Eigen::Quaterniond& imu_from_wheel,
     Eigen::Matrix<double, 3, 2>* jacobian) const {
-  const double cy = std::cos(values[kMountYaw]);
-  const double sy = std::sin(values[kMountYaw]);
-  const double cp = std::cos(values[kMountPitch]);
-  const double sp = std::sin(values[kMountPitch]);
+  const double cy = std::cos(values[kDrivingYaw]);
+  const double sy = std::sin(values[kDrivingYaw]);
+  const double cp = std::cos(values[kDrivingPitch]);
+  const double sp = std::sin(values[kDrivingPitch]);
   const Eigen::Matrix3d rotation = imu_from_wheel.toRotationMatrix();
   if (jacobian != nullptr) {
     jacobian->col(0) = rotation * Eigen::Vector3d(-cp * sy, cp * cy, 0.0);

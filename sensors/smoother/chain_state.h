@@ -7,9 +7,9 @@
 
 namespace adasfm {
 
-// The unknowns of one time, in the order of their 15 tangent coordinates.
-// Everything but the heading is local to the machine, so that a drift of
-// kilometres or turns never enters the equations (docs/reference/sensors.md).
+// The unknowns of one time, in the order of their 15 tangent coordinates. All
+// but the heading are local to the machine, so that a drift of kilometres or of
+// full rotations never enters the equations (docs/reference/sensors.md).
 struct ChainState {
   enum Offset {
     kRotation = 0,
@@ -24,29 +24,30 @@ struct ChainState {
   // From the previous state's position to this one's, in the previous frame.
   Eigen::Vector3d step_in_previous = Eigen::Vector3d::Zero();
 
-  // R <- Exp_z(d_z) Exp((d_x, d_y, 0)) R; the rest is added.
+  // R <- Exp_z(d_z) Exp((d_x, d_y, 0)) R; all other coordinates are added.
   void Retract(const Eigen::Matrix<double, kSize, 1>& delta);
 };
 
-// The unknowns of all times.
+// The unknowns that all states share.
 struct ChainGlobals {
   enum Offset {
     kLoggedLength = 0,
     kLoggedYaw,
-    kCurvature,  // follows kLoggedYaw: they have a covariance
-    kMountYaw,
-    kMountPitch,
+    kCurvature,  // after kLoggedYaw: joint prior
+    kDrivingYaw,
+    kDrivingPitch,
     kWheelDelay
   };
   static constexpr int kSize = 6;
   using Vector = Eigen::Matrix<double, kSize, 1>;
 
-  // Logged length = first * true length, logged yaw = second * true yaw -
-  // third * distance; the forward direction is turned by the mount angles;
-  // wheel readings tell what was this long ago, s (a speed is the mean
-  // since the reading before, and takes its time on the way).
-  // Factors stand with what is estimated, not with what was logged: a factor
-  // of noisy readings would come out too small, the smaller the noise is then.
+  // Logged length = first * true length, logged yaw = second * true yaw - third
+  // * distance; the forward direction is rotated by the driving angles. A wheel
+  // reading describes the motion kWheelDelay (s) before its time stamp: a speed
+  // is the mean since the previous reading, and transmission takes time.
+  // Factors multiply the estimated quantities, not the logged ones: a factor of
+  // noisy readings would be biased low, since a smaller factor also makes the
+  // noise smaller.
   Vector values = (Vector() << 1.0, 1.0, 0.0, 0.0, 0.0, 0.0).finished();
 
   static Vector PriorMeans() { return ChainGlobals().values; }

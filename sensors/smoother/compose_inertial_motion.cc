@@ -16,7 +16,7 @@ std::optional<InertialMotion> ComposeInertialMotion(
     ImuBias bias;
     bias.gyroscope = fused.states[k].bias.gyroscope;
     const Eigen::Matrix3d first_from_link = rotation.toRotationMatrix();
-    // From the last row up: each uses the old ones.
+    // In this order each update uses the old values of the others.
     motion.delta_position += motion.delta_velocity * imu.dt_s +
                              first_from_link * imu.CorrectedPosition(bias);
     motion.position_by_bias += motion.velocity_by_bias * imu.dt_s +
@@ -27,7 +27,7 @@ std::optional<InertialMotion> ComposeInertialMotion(
     motion.dt_s += imu.dt_s;
   }
   motion.camera_from_imu_origin = cam_from_imu.Inverse().translation;
-  TurnInertialMotion(cam_from_imu.rotation, &motion);
+  RotateInertialMotion(cam_from_imu.rotation, &motion);
   return motion;
 }
 

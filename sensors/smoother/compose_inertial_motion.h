@@ -8,9 +8,9 @@
 
 namespace adasfm {
 
-// What the IMU integrated over links first, ..., last - 1, less the fused
-// gyroscope bias, in the axes of the camera at the first; images are left open.
-// None when a link has no IMU.
+// The integrals of the IMU over links first, ..., last - 1, minus the fused
+// gyroscope bias, in the axes of the camera at the first state. Images and
+// by_wheels are not set. None when a link has no IMU.
 std::optional<InertialMotion> ComposeInertialMotion(
     const OdometryFusionProblem& problem, const OdometryFusionResult& fused,
     size_t first, size_t last, const Rigid3d& cam_from_imu);

@@ -16,7 +16,7 @@ OdometryMotion ComposeMotions(const OdometryFusionResult& fused, size_t first,
   Matrix6 covariance = Matrix6::Zero();
   for (size_t k = first; k < last; ++k) {
     const OdometryMotion& motion = fused.motions[k];
-    // An error before this link is seen from behind it.
+    // Expresses earlier errors in the frame at this link's end.
     Matrix6 carry = Matrix6::Identity();
     const Eigen::Matrix3d rotation =
         motion.body2_from_body1.rotation.toRotationMatrix();

@@ -6,10 +6,10 @@
 
 namespace adasfm {
 
-// The cameras' motion over links first, ..., last - 1, with its covariance and
-// the flags of what the links' sensors observe; images and dt are left open.
-// The links' errors are alike (one speed, one bias), so n of them count n times
-// the sum of their covariances.
+// The camera's motion over links first, ..., last - 1, with its covariance and
+// the flags of what the links' sensors observe; images and dt are not set. The
+// errors of successive links are correlated (one speed, one bias), so the sum
+// of n covariances is multiplied by n.
 RelativePosePrior ComposePrior(const OdometryFusionProblem& problem,
                                const OdometryFusionResult& fused, size_t first,
                                size_t last, const Rigid3d& cam_from_imu);

@@ -15,7 +15,8 @@ using Step = MeasuredTranslation;
 ChainGlobals GlobalsOf(const OdometryFusionResult& fused) {
   ChainGlobals globals;
   globals.values[ChainGlobals::kLoggedLength] = 1.0 / fused.wheel_scale;
-  globals.values.segment<2>(ChainGlobals::kMountYaw) = fused.wheel_mount;
+  globals.values.segment<2>(ChainGlobals::kDrivingYaw) =
+      fused.driving_direction;
   globals.values[ChainGlobals::kWheelDelay] = fused.wheel_delay_s;
   return globals;
 }

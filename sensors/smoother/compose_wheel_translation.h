@@ -8,12 +8,12 @@
 
 namespace adasfm {
 
-// What the wheels say of the camera's translation over links first, ...,
-// last - 1, by the fused rotations, wheel scale, mounting and delay, but
-// without the accelerometer: the equation of wheel_factors.cc, solved for the
-// step. The errors of the links are independent, those of what is shared are
-// not in the covariance. At rest it is zero. None where a link has no wheels or
-// they slip.
+// The camera's translation over links first, ..., last - 1 by the wheels, with
+// the fused rotations, wheel scale, driving direction and delay, but without
+// the accelerometer: the equation of wheel_factors.cc, solved for the step. The
+// covariance takes the links' errors as independent and excludes those of
+// shared parameters. A link at rest has zero translation. None where a link has
+// no wheels or its wheels slip.
 std::optional<MeasuredTranslation> ComposeWheelTranslation(
     const OdometryFusionProblem& problem, const OdometryFusionOptions& options,
     const OdometryFusionResult& fused, size_t first, size_t last,

@@ -13,19 +13,19 @@ namespace {
 
 using Shared = SharedUncertainty;
 
-// A machine stays upright: whatever all links tilt by alike is this small.
+// Tilt rate that all links may share: a machine stays upright.
 constexpr double kTiltRateSigma = 1e-4;  // rad/s
 
-// What the marginals of the links add up to.
+// Sums over the marginals of the links.
 struct Marginals {
   Shared shared;
   NoiseChecks noise;
-  // How a motion moves with one sigma of each shared coordinate.
+  // Change of each link's motion for one sigma of each shared coordinate.
   std::vector<Eigen::Matrix<double, 6, Shared::kSize>> by_shared;
-  // Of the last link, as any link's would do.
+  // Of the globals, the same in every link.
   double length_variance = 0.0, delay_variance = 0.0;
   Eigen::Matrix2d wheel_yaw_covariance = Eigen::Matrix2d::Zero();
-  Eigen::Array2d mount_variance = Eigen::Array2d::Zero();
+  Eigen::Array2d driving_variance = Eigen::Array2d::Zero();
 };
 
 // The motion over a link, without its covariance.
@@ -40,7 +40,7 @@ OdometryMotion Motion(const ChainProblem& chain, size_t k) {
   return motion;
 }
 
-// Its derivative by the coordinates of the link.
+// The derivative of Motion by the coordinates of the link.
 Eigen::Matrix<double, 6, kLinkSize> MotionMap(const ChainProblem& chain,
                                               size_t k) {
   const Eigen::Matrix3d r2_transposed =
@@ -63,7 +63,7 @@ Eigen::Matrix<double, 6, kLinkSize> MotionMap(const ChainProblem& chain,
 
 Marginals CollectMarginals(const ChainProblem& chain,
                            OdometryFusionResult* result) {
-  constexpr int kMount = 2 * ChainState::kSize + ChainGlobals::kMountYaw;
+  constexpr int kDriving = 2 * ChainState::kSize + ChainGlobals::kDrivingYaw;
   constexpr int kYaw = 2 * ChainState::kSize + ChainGlobals::kLoggedYaw;
   constexpr int kDelay = 2 * ChainState::kSize + ChainGlobals::kWheelDelay;
   const size_t num_links = chain.NumLinks();
@@ -93,22 +93,23 @@ Marginals CollectMarginals(const ChainProblem& chain,
         sums.length_variance = covariance(Shared::Column(Shared::kScale),
                                           Shared::Column(Shared::kScale));
         sums.wheel_yaw_covariance = covariance.block<2, 2>(kYaw, kYaw);
-        sums.mount_variance = covariance.diagonal().segment<2>(kMount);
+        sums.driving_variance = covariance.diagonal().segment<2>(kDriving);
         sums.delay_variance = covariance(kDelay, kDelay);
       });
   result->accelerometer_bias_sigma = std::sqrt(accel_variance / num_links);
   return sums;
 }
 
-// What the errors of track and curvature make all links turn by, as a rate: the
-// mean over the links of its covariance; zero where no wheels tell a turn.
+// Covariance of the rate error that the errors of track and curvature cause in
+// all links: the mean over the links; zero where no wheels observe the yaw.
 Eigen::Matrix3d WheelYawRateCovariance(
     const ChainProblem& chain, const Eigen::Matrix2d& wheel_yaw_covariance) {
   double variance = 0.0;
   int num_links = 0;
   for (const OdometryLink& link : chain.problem.links) {
     if (!link.has_wheel_yaw || link.dt_s <= 0.0) continue;
-    // Of (logged yaw + curvature * distance) / logged per true.
+    // Derivative of (logged yaw + curvature * distance) / logged per true, at
+    // (1, 0).
     const Eigen::Vector2d by_unknowns =
         Eigen::Vector2d(-link.wheel.yaw_rad, link.wheel.distance_m) / link.dt_s;
     variance += by_unknowns.dot(wheel_yaw_covariance * by_unknowns);
@@ -152,8 +153,8 @@ void FillCovariances(const ChainProblem& chain, OdometryFusionResult* result) {
   result->wheel_scale_sigma =
       std::sqrt(sums.length_variance * (1.0 + growth[Shared::kScale])) /
       (length * length);
-  result->wheel_mount_sigma =
-      (sums.mount_variance * (1.0 + growth.segment<2>(Shared::kMountYaw)))
+  result->driving_direction_sigma =
+      (sums.driving_variance * (1.0 + growth.segment<2>(Shared::kDrivingYaw)))
           .sqrt()
           .matrix();
 }

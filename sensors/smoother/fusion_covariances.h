@@ -7,8 +7,8 @@ namespace adasfm {
 
 // Fills the result's motions and sigmas, and its comparison of residuals with
 // the stated noise, at the solution. The covariances are the exact marginals of
-// the linearised problem, widened by what the residuals of neighbours have in
-// common (sensors/smoother/shared_uncertainty.h). There must be a link.
+// the linearised problem, widened where residuals of neighbouring links are
+// correlated (sensors/smoother/shared_uncertainty.h). There must be a link.
 void FillCovariances(const ChainProblem& chain, OdometryFusionResult* result);
 
 }  // namespace adasfm

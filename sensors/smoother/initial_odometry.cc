@@ -9,13 +9,13 @@
 namespace adasfm {
 namespace {
 
-// The attitude of the first state comes from this much time: accelerations
+// Time from which the attitude of the first state is found: accelerations
 // average out, a gyroscope's drift is still small.
 constexpr double kFirstGravityS = 10.0;
-// Time constant of the pull towards gravity: long against a bend, short
-// against a gyroscope's drift of a degree.
+// Time constant of the correction towards gravity: long against a bend, short
+// against the time in which a gyroscope drifts by a degree.
 constexpr double kGravityTimeS = 20.0;
-// A link whose unexplained force is this far from gravity says nothing.
+// A link whose unexplained force is further from gravity is not used.
 constexpr double kMaxGravityError = 2.0;  // m/s^2
 
 Eigen::Quaterniond LinkRotation(const OdometryLink& link) {
@@ -50,7 +50,8 @@ std::vector<Eigen::Vector3d> ComputeVelocities(
     if (!links[k].has_wheel) continue;
     const Eigen::Quaterniond rotation = LinkRotation(links[k]);
     const Eigen::Vector3d in_first = MeanVelocity(links[k], imu_from_wheel);
-    // Seen at half of the turn, the velocity is that of the middle.
+    // In the frame at half of the rotation, the mean is the velocity at the
+    // middle.
     const Eigen::Quaterniond half =
         Eigen::Quaterniond::Identity().slerp(0.5, rotation);
     const Eigen::Vector3d in_body = half.conjugate() * in_first;

@@ -7,10 +7,10 @@
 
 namespace adasfm {
 
-// First values of the smoother's states by dead reckoning: speeds from the
+// Initial values of the smoother's states by dead reckoning: speeds from the
 // wheels, gravity from the force that these speeds leave unexplained (so no
-// standstill is needed), attitude by the gyroscope with a slow pull towards
-// that gravity. One state more than links.
+// standstill is needed), attitude from the gyroscope with a slow correction
+// towards that gravity. One state more than links.
 std::vector<OdometryState> EstimateInitialOdometry(
     const std::vector<OdometryLink>& links, const Rigid3d& imu_from_wheel,
     double gravity_m_s2, const ImuBias& bias);

@@ -8,7 +8,7 @@
 
 namespace adasfm {
 
-// Collects the whitened rows of one link: what ComputeLinkResiduals is made of.
+// Collects the whitened rows of one link for ComputeLinkResiduals.
 class LinkBuilder {
  public:
   // First columns of the link's tangent coordinates.
@@ -36,7 +36,7 @@ class LinkBuilder {
 
   void AddImu();
   void AddBiasWalk();
-  // The weights divide the covariance; both must be positive.
+  // The weight divides the covariance and must be positive.
   void AddWheel(double weight);
   void AddVision();
   void AddStandstill();
@@ -51,21 +51,21 @@ class LinkBuilder {
   }
 
  private:
-  // No link has more residuals: IMU 9, biases 6, wheels 3, rotation 3, rest 12,
-  // planar 2, vision 3, weak priors 9.
+  // No link has more residuals: IMU 9, biases 6, wheels 3, rotation 3,
+  // standstill 12, planar 2, vision 3, weak priors 9.
   static constexpr int kMaxResiduals = 48;
 
-  // d v(A) where dA = A Exp(x), x = R2^T (d2 - d1): writes the derivative of a
-  // row block by the two rotations.
+  // Adds the derivative of a row block v(A) by both rotations, from its
+  // derivative by x, where dA = A Exp(x), x = R2^T (d2 - d1).
   template <int N>
   void AddRelativeRotation(int row,
-                           const Eigen::Matrix<double, N, 3>& by_turn) {
-    const Eigen::Matrix<double, N, 3> by_world = by_turn * r2_.transpose();
+                           const Eigen::Matrix<double, N, 3>& by_rotation) {
+    const Eigen::Matrix<double, N, 3> by_world = by_rotation * r2_.transpose();
     jacobian_.block<N, 3>(row, kSecond + ChainState::kRotation) += by_world;
     jacobian_.block<N, 3>(row, kFirst + ChainState::kRotation) -= by_world;
   }
 
-  // A vector residual of the relative rotation alone, sigma per axis.
+  // A vector residual of the relative rotation alone.
   void AddRotationResidual(const Eigen::Quaterniond& measured,
                            const Eigen::Matrix3d& covariance) {
     const Eigen::Vector3d error = LogSo3(measured.conjugate() * a_rotation_);
@@ -85,7 +85,8 @@ class LinkBuilder {
     for (int i = 0; i < 3; ++i) AddScalar(column + i, error[i], sigma);
   }
 
-  // Multiplies the last N rows by the inverse root of their covariance.
+  // Multiplies the next N rows by the inverse root of their covariance and
+  // counts them.
   template <int N>
   void Whiten(const Eigen::Matrix<double, N, N>& covariance) {
     const Eigen::LLT<Eigen::Matrix<double, N, N>> llt(covariance);
@@ -110,7 +111,7 @@ class LinkBuilder {
   const Eigen::Quaterniond a_rotation_;
   const Eigen::Matrix3d a_;
   int num_rows_ = 0;
-  LinkResiduals rows_;  // only which rows are whose
+  LinkResiduals rows_;  // only the row ranges
   double wheel_chi2_ = 0.0;
   Eigen::Matrix<double, kMaxResiduals, 1> values_;
   Eigen::Matrix<double, kMaxResiduals, kLinkSize> jacobian_;

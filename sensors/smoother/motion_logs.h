@@ -9,13 +9,12 @@
 
 namespace adasfm {
 
-// All that moves the machine, on the IMU's clock.
+// All motion logs, on the IMU's clock.
 struct MotionLogs {
   std::vector<ImuSample> imu;
   std::vector<WheelSpeed> wheel;
   std::vector<OdometryPose> odometry;
-  // From and to when cameras saw that the machine did not stand still, one
-  // after the other.
+  // Intervals in which cameras saw the machine move, in order of time.
   std::vector<std::pair<timestamp_t, timestamp_t>> seen_moving_ns;
 
   bool IsEmpty() const {

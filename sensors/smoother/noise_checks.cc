@@ -10,10 +10,10 @@
 namespace adasfm {
 namespace {
 
-// Slower machines have no speed that could err by a share, m/s.
+// Least speed in the ratio, m/s: slower machines have no relative error.
 constexpr double kMinSpeed = 0.05;
 
-// 1 sigma of the speed at a link's end as a ratio, the wheels' scale known.
+// 1 sigma of the speed at a link's end as a ratio, given the wheels' scale.
 double SpeedSigmaRatio(const OdometryState& end,
                        const LinkCovariance& covariance) {
   constexpr int kVelocity = ChainState::kSize + ChainState::kVelocity;
@@ -84,7 +84,8 @@ void NoiseChecks::Fill(double problem_persistence,
   result->accelerometer_check = accelerometer_;
   result->wheel_speed_check = wheel_speed_.Check();
   result->wheel_yaw_check = wheel_yaw_.Check();
-  // The less the smoother follows the wheels, the more of it residuals show.
+  // Residuals show more of the persistence the less the smoother follows the
+  // wheels.
   result->wheel_persistence = problem_persistence * wheel_persistence_.Ratio();
   result->speed_sigma_ratio = UpperMedian(&speed_sigma_ratios_);
 }

@@ -11,9 +11,9 @@ namespace adasfm {
 // Compares the residuals of wheels and accelerometer at the solution with their
 // stated noise.
 //
-// Inputs: each link in order, with its whitened residuals and the marginal
-// covariance of its coordinates. Links at rest or without one of the two
-// sensors do not count.
+// Links are added in sequence, each with its whitened residuals and the
+// marginal covariance of its coordinates. Links at rest or without one of the
+// two sensors do not count.
 class NoiseChecks {
  public:
   void Add(const ChainProblem& chain, size_t k, const LinkResiduals& residuals,
@@ -23,9 +23,9 @@ class NoiseChecks {
   void Fill(double problem_persistence, OdometryFusionResult* result);
 
  private:
-  // Squares of residuals over their redundancy. Their median is that of the
-  // noise as long as most links do not slip, also when the stated noise is so
-  // small that most of them seem to.
+  // Squares of residuals divided by their redundancy. Their median is that of
+  // the noise as long as most links do not slip, even if the stated noise is so
+  // small that most links seem to slip.
   struct RowRatios {
     std::vector<double> values;
     double redundancy = 0.0;

@@ -14,7 +14,7 @@ namespace {
 constexpr double kWeakSpeedSigma = 50.0;  // m/s
 constexpr double kWeakStepSigma = 100.0;  // m
 constexpr double kWeakAngleSigma = 1.0;   // rad
-// Over this time an unaided machine's speed forgets its past, seconds.
+// Correlation time of an unaided machine's speed, s.
 constexpr double kSpeedMemoryS = 10.0;
 
 }  // namespace
@@ -63,7 +63,8 @@ void LinkBuilder::AddImu() {
   block(6, kFirst + ChainState::kGyro) = -imu.position_by_gyroscope;
   block(6, kFirst + ChainState::kAccel) = -imu.position_by_accelerometer;
   Whiten<9>(imu.covariance);
-  // The rotation comes first, so that its rows hold the gyroscope's noise only.
+  // The rotation comes first, so that its whitened rows depend on the
+  // gyroscope's noise only.
   rows_.accelerometer = {row + 3, 6};
 }
 
@@ -94,8 +95,8 @@ void LinkBuilder::AddVision() {
 void LinkBuilder::AddStandstill() {
   const OdometryFusionOptions& options = *context_.options;
   const double dt = std::max(link_.dt_s, 1e-3);
-  // The mean over all links of the standstill has the variance density^2 / time
-  // + sigma^2: the second part as a density, too.
+  // The mean rate over all links of the standstill has the variance density^2 /
+  // time + sigma^2. The second part is made a density, too.
   const Eigen::Array3d density =
       link_.standstill_rate_density.array().square() +
       options.standstill_rate_sigma * options.standstill_rate_sigma *
@@ -117,7 +118,8 @@ void LinkBuilder::AddWeakPriors() {
   if (!link_.has_imu) {
     AddVector(kSecond + ChainState::kVelocity, velocity, kWeakSpeedSigma);
   } else if (!link_.has_wheel) {
-    // Independent at every state, hence spread over the speed's memory.
+    // The prior is independent at every state, so its information is spread
+    // over the correlation time.
     const double memory = 2.0 * kSpeedMemoryS / std::max(link_.dt_s, 1e-3);
     AddVector(kSecond + ChainState::kVelocity, velocity,
               context_.options->unaided_speed_sigma *

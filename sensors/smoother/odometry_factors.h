@@ -20,15 +20,18 @@ inline constexpr int kLinkSize = 2 * ChainState::kSize + ChainGlobals::kSize;
 //   wheels    q (u + A l - l) - (M d + N (phi x d)) - D s f   (3x3 / weight),
 //             along the direction of driving first
 //   yaw       q' z . (Log(A) - D w) - curvature * distance - yaw
+//   planar    x . Log(A), y . Log(A)                  (wheels without IMU)
 //   vision    Log(V^T A)                              (sigma)
-//   rest      Log(A), u, v_k, v_k+1                   (at a standstill)
-// with D the wheels' delay, s and w the changes of the wheel frame's speed and
-// of the body's rate over the link, f forward in the middle of the turn, plus
-// weak priors where a link has no sensor for a coordinate.
+//   at rest   Log(A), u, v_k, v_k+1                   (at a standstill)
+// with u the step, l the lever arm and x, y, z the axes of the wheel frame, D
+// the wheels' delay, s and w the changes of the wheel frame's speed and of the
+// body's rate over the link, f forward in the middle of the rotation; M, N,
+// phi, d, q as in WheelMotion. Weak priors are added where no sensor of a link
+// observes a coordinate.
 struct LinkResiduals {
   Eigen::VectorXd values;
   Eigen::Matrix<double, Eigen::Dynamic, kLinkSize> jacobian;
-  // Squared norm of the wheels' residuals, before their weight.
+  // Squared norm of the wheels' residuals, without their weight.
   double wheel_chi2 = 0.0;
   // First row and number of the rows that depend on the accelerometer's noise,
   // the wheels' speed and the wheels' yaw. Each is whitened.
@@ -44,7 +47,7 @@ struct LinkContext {
   const OdometryFusionOptions* options = nullptr;
 };
 
-// wheel_weight: 1, less where the wheels contradict the rest.
+// wheel_weight: 1, or less where the wheels contradict the other sensors.
 LinkResiduals ComputeLinkResiduals(const LinkContext& context,
                                    const OdometryLink& link,
                                    const ChainState& first,

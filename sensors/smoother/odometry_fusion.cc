@@ -15,7 +15,7 @@ namespace {
 // Slip thresholds start high and come down, so that links are judged by a
 // solution that is nearly right already.
 constexpr double kFirstThresholdFactor = 8.0;
-// What wheels that are slipping or stuck at the start begin with.
+// Initial weight of wheels that FindOutlierWheels finds.
 constexpr double kFirstSlipWeight = 1e-4;
 // Converged: a step of all unknowns together by this share of a sigma.
 constexpr double kConvergedStep = 0.01;
@@ -42,7 +42,7 @@ class Smoother {
   // One damped Gauss-Newton step.
   struct Change {
     double largest = 0.0;  // of a coordinate
-    // By how many sigmas all coordinates together: sqrt(2 (old - new cost)).
+    // All coordinates together, in sigmas: sqrt(2 (old - new cost)).
     double num_sigmas = 0.0;
   };
   Change Step();
@@ -62,14 +62,14 @@ Smoother::Change Smoother::Step() {
   const std::vector<ChainState> old_states = chain_.states;
   const ChainGlobals old_globals = chain_.globals;
   // A failed step is repeated with more damping; eight decades are enough to
-  // tell that there is nothing to gain.
+  // see that no step lowers the cost.
   for (int attempt = 0; attempt < 8; ++attempt) {
     const ChainSolution solution = SolveChain(
         chain_.NumLinks(), chain_.FirstMessage(),
         [this](size_t k) { return chain_.Equations(k); }, damping_);
     double largest = solution.globals.cwiseAbs().maxCoeff();
     for (size_t k = 0; k < chain_.states.size(); ++k) {
-      // The heading has no bearing on anything: it may drift freely.
+      // No residual depends on the heading: it may drift freely.
       Eigen::Matrix<double, ChainState::kSize, 1> local = solution.states[k];
       local[ChainState::kRotation + 2] = 0.0;
       largest = std::max(largest, local.cwiseAbs().maxCoeff());
@@ -92,7 +92,7 @@ void Smoother::UpdateWeights(double factor) {
   const double wheel_threshold = factor * options_.slip_threshold_sigma;
   for (size_t k = 0; k < chain_.NumLinks(); ++k) {
     const OdometryLink& link = problem_.links[k];
-    // Without the IMU there is nothing that they could contradict.
+    // Without the IMU the wheels have nothing to contradict.
     if (!link.has_imu || !link.has_wheel) continue;
     chain_.wheel_weights[k] =
         RobustWeight(chain_.Residuals(k).wheel_chi2, wheel_threshold);
@@ -121,8 +121,8 @@ void Smoother::FillResult(OdometryFusionResult* result) const {
   result->wheel_scale =
       1.0 / chain_.globals.values[ChainGlobals::kLoggedLength];
   result->wheel_delay_s = chain_.globals.values[ChainGlobals::kWheelDelay];
-  result->wheel_mount =
-      chain_.globals.values.segment<2>(ChainGlobals::kMountYaw);
+  result->driving_direction =
+      chain_.globals.values.segment<2>(ChainGlobals::kDrivingYaw);
   if (!problem_.links.empty()) FillCovariances(chain_, result);
   result->slipping_links = FindSlippingLinks();
 }
@@ -130,7 +130,7 @@ void Smoother::FillResult(OdometryFusionResult* result) const {
 OdometryFusionResult Smoother::Run() {
   OdometryFusionResult result;
   double factor = kFirstThresholdFactor;
-  for (const size_t k : FindSuspectWheels(problem_, options_.gravity_m_s2)) {
+  for (const size_t k : FindOutlierWheels(problem_, options_.gravity_m_s2)) {
     chain_.wheel_weights[k] = kFirstSlipWeight;
   }
   while (result.num_iterations < options_.max_num_iterations) {
@@ -140,7 +140,7 @@ OdometryFusionResult Smoother::Run() {
       result.converged = true;
       break;
     }
-    // The threshold comes down once the solution has settled at it.
+    // The threshold comes down once the solution has converged at it.
     if (change.largest < kThresholdStep) factor = std::max(1.0, 0.5 * factor);
     UpdateWeights(factor);
   }

@@ -14,41 +14,43 @@
 namespace adasfm {
 
 struct OdometryFusionOptions {
-  // The Earth's pull varies by 0.5 %; the accelerometer bias takes the rest.
+  // Gravity varies by 0.5 %; the accelerometer bias absorbs the difference.
   double gravity_m_s2 = 9.81;
-  // What is believed of biases before any data: MEMS with a factory
-  // calibration.
+  // Prior sigmas of the biases: MEMS with a factory calibration.
   double gyroscope_bias_sigma = 0.005;    // rad/s
   double accelerometer_bias_sigma = 0.3;  // m/s^2
-  // Tyres wear, loads change: the wheels' scale before any data.
+  // Prior sigma of the wheels' scale: tyres wear, loads change.
   double wheel_scale_sigma = 0.01;
-  // The same for the effective track width (skid steering changes it much)
-  // and for the difference of the wheels, as a curvature in 1/m.
+  // Prior sigmas of the effective track width, as a ratio (skid steering
+  // changes it much), and of the difference of the wheels, as a curvature in
+  // 1/m.
   double wheel_track_sigma = 0.1;
   double wheel_curvature_sigma = 0.01;
-  // The direction of driving against T_imu_wheel: mounts are rarely measured
-  // better. 0 trusts T_imu_wheel.
-  double wheel_mount_sigma_deg = 2.0;
-  // How long the wheels' readings lie behind their times, s: half of the log's
-  // period where a speed is a difference of counts, and the way over a bus.
+  // Prior sigma of the driving direction relative to T_imu_wheel: extrinsics
+  // are rarely measured better. 0 trusts T_imu_wheel.
+  double driving_direction_sigma_deg = 2.0;
+  // Prior sigma of the delay of the wheels' readings behind the motion, s: half
+  // of the log's period where a speed is a difference of counts, and the time
+  // on a bus.
   double wheel_delay_sigma_s = 0.03;
-  // Sideways and vertical speed of the wheel frame, m/s/sqrt(Hz).
-  // (vertical is larger: springs, and slopes that T_imu_wheel does not follow).
+  // Noise of the lateral and vertical speed of the wheel frame, m/s/sqrt(Hz).
+  // Vertical is larger: springs, and slopes that T_imu_wheel does not follow.
   double lateral_speed_noise = 0.05;
   double vertical_speed_noise = 0.2;
   // Roll and pitch of a machine without IMU, rad/sqrt(s).
   double planar_rotation_noise = 0.03;
-  // A wheel interval further than this from the IMU (in sigmas) loses weight.
+  // A link whose wheels differ from the IMU by more sigmas than this loses
+  // weight.
   double slip_threshold_sigma = 4.0;
-  // Reported as slip when also the speed is off by more than this.
+  // Reported as a slip when the speed error also exceeds this.
   double slip_min_speed_m_s = 0.2;
-  // A machine at rest moves no more than this. The rate is one unknown of a
-  // whole standstill: it does not get smaller with its length.
+  // Sigmas of the motion of a machine at rest. The rate is one unknown of a
+  // whole standstill, so its sigma does not shrink with the duration.
   double standstill_speed_sigma = 0.005;  // m/s
   double standstill_rate_sigma = 1e-4;    // rad/s
-  // Speeds of an IMU without wheels stay within this: all that is known.
+  // Sigma of the speed of an IMU without wheels: its only bound.
   double unaided_speed_sigma = 15.0;  // m/s
-  // A slipping wheel's weight settles slowly: most drives take 15.
+  // Weights of slipping wheels converge slowly; most drives take 15 iterations.
   int max_num_iterations = 100;
 
   bool IsValid(std::string* error) const;
@@ -67,33 +69,33 @@ enum class StandstillKind {
   kAtRest,
 };
 
-// What is known between two successive states.
+// Measurements between two successive states.
 struct OdometryLink {
   double dt_s = 0.0;
   bool has_imu = false;
   ImuPreintegration imu;
-  // By how much the body turns faster at the link's end than at its start, as
-  // the gyroscope has it, rad/s.
+  // Angular velocity of the body at the link's end minus that at its start,
+  // from the gyroscope, rad/s.
   Eigen::Vector3d rate_change = Eigen::Vector3d::Zero();
   bool has_wheel = false;
   WheelMotion wheel;
-  // The wheels see no turn (WheelType::kSpeed).
+  // False for wheels that do not observe the yaw (ObservesYaw).
   bool has_wheel_yaw = false;
   StandstillKind standstill = StandstillKind::kNone;
-  // At a standstill: the density of what the machine turns all the same,
-  // rad/s/sqrt(Hz) about each axis, and the time of all links that stand still
-  // together, s (sensors/smoother/standstill.h).
+  // At a standstill: the density of the machine's residual rotation,
+  // rad/s/sqrt(Hz) about each axis, and the total time of the links of this
+  // standstill, s (sensors/smoother/standstill.h).
   Eigen::Vector3d standstill_rate_density = Eigen::Vector3d::Zero();
   double standstill_time_s = 0.0;
-  // The body's rotation over the link (first_from_second) as cameras saw it,
-  // where wheels without an IMU slip.
+  // The body's rotation over the link (first_from_second) from the cameras, for
+  // links without IMU and wheels (slipping wheels included).
   bool has_vision = false;
   Eigen::Quaterniond visual_rotation = Eigen::Quaterniond::Identity();
   double visual_sigma_rad = 0.0;
 };
 
-// Logged yaw = logged_yaw * true yaw - curvature * distance (rad/m), and the
-// covariance of both.
+// Prior of the wheels' yaw: logged yaw = logged_yaw * true yaw - curvature *
+// distance (rad/m), with the covariance of (logged_yaw, curvature).
 struct WheelYawPrior {
   double logged_yaw = 1.0;
   double curvature = 0.0;
@@ -105,14 +107,15 @@ struct OdometryFusionProblem {
   std::vector<OdometryLink> links;
   Rigid3d imu_from_wheel;
   ImuNoise imu_noise;
-  // The wheels' speed may err alike for seconds (gravel): the variance of its
-  // errors' sum over such a time, over that of the links' stated ones.
+  // Errors of the wheels' speed may persist for seconds (gravel): the variance
+  // of their sum over such a time, divided by that of independent errors with
+  // the links' stated variances.
   double wheel_persistence = 1.0;
-  // What else is known of the gyroscope's bias at the first state, e.g. from
-  // vision; a sigma of 0 takes the options'.
+  // Prior of the gyroscope's bias at the first state, e.g. from vision; where
+  // its sigma is 0, the options' sigma applies.
   Eigen::Vector3d prior_gyroscope_bias = Eigen::Vector3d::Zero();
   double prior_gyroscope_bias_sigma = 0.0;
-  // What is known of the wheels' yaw, in place of the options' sigmas.
+  // Prior of the wheels' yaw, in place of the options' sigmas.
   std::optional<WheelYawPrior> wheel_yaw_prior;
   // First values, e.g. from EstimateInitialOdometry; one more than links.
   std::vector<OdometryState> initial_states;
@@ -128,7 +131,7 @@ struct OdometryMotion {
   double wheel_weight = 1.0;  // < 1: the wheels contradicted the IMU
 };
 
-// Wheels that weigh less than this slip.
+// Wheels with a smaller weight than this count as slipping.
 inline constexpr double kSlipWeight = 0.3;
 
 struct WheelSlip {
@@ -151,46 +154,47 @@ struct NoiseCheck {
 
 struct OdometryFusionResult {
   std::vector<OdometryState> states;
-  std::vector<OdometryMotion> motions;  // one a link
+  std::vector<OdometryMotion> motions;  // one per link
   // Links whose wheels contradict the IMU, with logged minus fused speed.
   std::vector<std::pair<size_t, double>> slipping_links;
   // True length = scale * logged length; 1 sigma.
   double wheel_scale = 1.0;
   double wheel_scale_sigma = 0.0;
-  // How the direction of driving is turned against T_imu_wheel: about its z
-  // (to the left) and its y axis (down), rad.
-  Eigen::Vector2d wheel_mount = Eigen::Vector2d::Zero();
-  Eigen::Vector2d wheel_mount_sigma = Eigen::Vector2d::Zero();
-  // Wheel readings tell what was this long ago, s; 1 sigma.
+  // Rotation of the driving direction relative to T_imu_wheel: about its z (to
+  // the left) and its y axis (down), rad.
+  Eigen::Vector2d driving_direction = Eigen::Vector2d::Zero();
+  Eigen::Vector2d driving_direction_sigma = Eigen::Vector2d::Zero();
+  // Wheel readings describe the motion this long before their times, s; 1
+  // sigma.
   double wheel_delay_s = 0.0;
   double wheel_delay_sigma_s = 0.0;
   // rad/s in the body (IMU) frame: mean over the states, and the mean of their
-  // covariances (rad^2/s^2). Without any IMU the covariance is of the rate that
-  // the errors of track and curvature give all links, zero where no wheels tell
-  // a turn.
+  // covariances (rad^2/s^2). Without any IMU it is the covariance of the rate
+  // error that the errors of track and curvature cause in all links; zero where
+  // no wheels observe the yaw.
   Eigen::Vector3d gyroscope_bias = Eigen::Vector3d::Zero();
   Eigen::Matrix3d gyroscope_bias_covariance = Eigen::Matrix3d::Zero();
   double gyroscope_bias_sigma = 0.0;      // mean of states and axes
   double accelerometer_bias_sigma = 0.0;  // mean of states and axes
-  // Over the links on the move: of the accelerometer over those whose wheels do
-  // not slip, of the wheels by the median of all.
+  // Over moving links: the accelerometer's over links whose wheels have full
+  // weight, the wheels' by the median over all.
   NoiseCheck accelerometer_check, wheel_speed_check, wheel_yaw_check;
   // The wheel_persistence that the residuals show, at least 1.
   double wheel_persistence = 1.0;
-  // 1 sigma of the speed, with the wheels' scale known, as a ratio: the median
-  // of the links on the move. Where lengths err, all neighbours err by it.
+  // 1 sigma of the speed as a ratio, given the wheels' scale: the median over
+  // moving links. Neighbouring links share a length error of this size.
   double speed_sigma_ratio = 0.0;
   int num_iterations = 0;
   bool converged = false;
 };
 
-// One least-squares estimate of all states, biases, the wheels' scale and
-// their mounting from all links at once. The normal equations are block
-// tridiagonal with a narrow border: time and memory are linear in the number
-// of links, and the covariances are the exact marginals of the linearised
-// problem, widened where residuals are more alike over seconds than white noise
-// (smoother/shared_uncertainty.h). Throws std::invalid_argument when sizes
-// disagree.
+// One least-squares estimate of all states, biases, the wheels' scale and their
+// driving direction from all links at once. The normal equations are block
+// tridiagonal with a narrow border: time and memory are linear in the number of
+// links, and the covariances are the exact marginals of the linearised problem,
+// widened where residuals are correlated over seconds
+// (smoother/shared_uncertainty.h). Throws std::invalid_argument when options
+// are invalid or sizes disagree.
 OdometryFusionResult FuseOdometry(const OdometryFusionProblem& problem,
                                   const OdometryFusionOptions& options);
 

@@ -20,8 +20,9 @@ bool OdometryFusionOptions::IsValid(std::string* error) const {
                  {"standstill_speed_sigma_m_s", standstill_speed_sigma},
                  {"standstill_rate_sigma_rad_s", standstill_rate_sigma},
                  {"unaided_speed_sigma_m_s", unaided_speed_sigma}})
-      .NotNegative({{"wheel_mount_sigma_deg", wheel_mount_sigma_deg},
-                    {"slip_min_speed_m_s", slip_min_speed_m_s}})
+      .NotNegative(
+          {{"driving_direction_sigma_deg", driving_direction_sigma_deg},
+           {"slip_min_speed_m_s", slip_min_speed_m_s}})
       .AtLeast(1, "max_num_iterations", max_num_iterations)
       .AllHold();
 }

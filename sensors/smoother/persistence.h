@@ -5,8 +5,8 @@
 
 namespace adasfm {
 
-// How much more residuals add up to over seconds than independent ones would:
-// the squares of their sums over blocks of time, over the sum of their squares.
+// Correlation of residuals over seconds: the squares of their sums over blocks
+// of time, divided by the sum of their squares. 1 for independent residuals.
 class Persistence {
  public:
   void Add(double dt_s, double residual) {
@@ -15,14 +15,14 @@ class Persistence {
     seconds_ += dt_s;
     if (seconds_ >= kBlockS) FinishBlock();
   }
-  // Neighbours are missing: sums begin anew.
+  // Ends the sum of a block, e.g. where the next link is missing.
   void FinishBlock() {
     if (seconds_ == 0.0) return;
     block_square_sum_ += sum_ * sum_;
     num_blocks_ += std::min(1.0, seconds_ / kBlockS);
     sum_ = seconds_ = 0.0;
   }
-  // Few blocks tell little: 1 weighs as much as kPriorBlocks of them.
+  // Few blocks are a poor estimate: 1 has the weight of kPriorBlocks blocks.
   double Ratio() const {
     if (square_sum_ <= 0.0) return 1.0;
     return std::max(

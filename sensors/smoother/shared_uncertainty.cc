@@ -10,10 +10,10 @@ int SharedUncertainty::Column(int index) {
   switch (index) {
     case kScale:
       return kGlobals + ChainGlobals::kLoggedLength;
-    case kMountYaw:
-      return kGlobals + ChainGlobals::kMountYaw;
-    case kMountPitch:
-      return kGlobals + ChainGlobals::kMountPitch;
+    case kDrivingYaw:
+      return kGlobals + ChainGlobals::kDrivingYaw;
+    case kDrivingPitch:
+      return kGlobals + ChainGlobals::kDrivingPitch;
     default:
       return ChainState::kGyro + index - kGyro;
   }
@@ -48,7 +48,7 @@ SharedUncertainty::Vector SharedUncertainty::Growth() const {
         expected_sum_[i] * expected_sum_[i] / expected2_sum_[i];
     const double excess = (influence2_[i] / expected_sum_[i] - 1.0) *
                           num_blocks / (num_blocks + kPriorBlocks);
-    // What priors say does not grow.
+    // The share that priors determine does not grow.
     const double share = std::min(1.0, expected_sum_[i] / variance_[i]);
     growth[i] = std::max(0.0, share * excess);
   }

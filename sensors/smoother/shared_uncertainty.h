@@ -8,32 +8,34 @@
 
 namespace adasfm {
 
-// How much larger than stated the variance is of what all links share: the
-// wheels' scale, their mounting, and the gyroscope's bias.
+// Estimates how much the variances of the parameters that all links share
+// exceed the stated ones: the wheels' scale, the driving direction, the
+// gyroscope's bias.
 //
-// Inputs: of each link in order its duration (s), whitened residuals and
-// Jacobian at the solution, and the marginal covariance of its coordinates.
+// Links are added in sequence: duration (s), whitened residuals and Jacobian at
+// the solution, and the marginal covariance of the link's coordinates.
 //
-// Method. A link's influence on a coordinate x is C_x J^T r, C_x the
-// covariances of x with the link's coordinates; the influences' sum is the
-// error of x. If residuals are independent, of unit variance, the squares of
-// the sums over blocks of kBlockS add up to the sum of C_x J^T J C_x^T. If
-// neighbours are alike (a machine that sways, wheels that err for seconds) or
-// the stated noise is too small, to more: the sandwich covariance of clustered
-// residuals. As few blocks tell a variance badly, 1 weighs as much as
-// kPriorBlocks of them; the blocks are counted by their share.
+// A link's influence on a coordinate x is C_x J^T r, where C_x are the
+// covariances of x with the link's coordinates; the sum of the influences is
+// the error of x. For independent residuals of unit variance, the squares of
+// the sums over blocks of kBlockS add up to the sum of C_x J^T J C_x^T. They
+// add up to more if residuals of neighbours are correlated (a machine that
+// sways, wheels that err for seconds) or the stated noise is too small: the
+// sandwich covariance of clustered residuals. Since few blocks are a poor
+// estimate of a variance, 1 has the weight of kPriorBlocks blocks. The number
+// of blocks is the effective one.
 class SharedUncertainty {
  public:
-  enum Index { kScale = 0, kMountYaw, kMountPitch, kGyro };
+  enum Index { kScale = 0, kDrivingYaw, kDrivingPitch, kGyro };
   static constexpr int kSize = 6;
   using Vector = Eigen::Array<double, kSize, 1>;
 
-  // The columns of a link's coordinates.
+  // The column of a shared coordinate among a link's coordinates.
   static int Column(int index);
 
   void Add(double dt_s, const LinkResiduals& residuals,
            const LinkCovariance& covariance);
-  // By how much the variance grows, as a share of the variance: at least 0.
+  // Relative growth of the variances, at least 0.
   Vector Growth() const;
 
  private:

@@ -11,8 +11,8 @@
 namespace adasfm {
 namespace {
 
-// A candidate: half the window, and what an idling engine may add to the
-// sensors' own noise.
+// Half of a candidate's window, and the motion that an idling engine may add to
+// the sensors' own noise.
 constexpr double kHalfWindowS = 0.5;
 constexpr double kIdleRate = 0.005;       // rad/s
 constexpr double kIdleForce = 0.05;       // m/s^2
@@ -20,15 +20,15 @@ constexpr double kIdleRateDrift = 0.002;  // rad/s
 constexpr double kIdleForceDrift = 0.03;  // m/s^2
 constexpr double kMaxBias = 0.03;         // rad/s
 constexpr double kIdleSpeed = 0.02;       // m/s
-// A link's mean rate is no further from the others', in sigmas of an axis: of
-// 5,000 links one is lost by chance.
+// Largest difference between a link's mean rate and that of the others, in
+// sigmas of an axis: one of 5,000 links exceeds it by chance.
 constexpr double kMaxDeviation = 4.0;
-// Blocks whose means tell the spectrum, seconds: longer ones see slower motion,
-// but there are fewer of them. A run needs this many.
+// Shortest blocks whose means give the spectrum, s. Longer blocks observe
+// slower motion, but are fewer. A run needs kMinNumBlocks of them.
 constexpr double kShortestBlockS = 0.1;
 constexpr int kMinNumBlocks = 3;
-// The white noise weighs as much as this many blocks, since a variance of a few
-// blocks is itself not known.
+// The white noise has the weight of this many blocks, since the variance of a
+// few blocks is uncertain.
 constexpr double kPriorBlocks = 2.0;
 
 using SampleIterator = std::vector<ImuSample>::const_iterator;
@@ -77,7 +77,7 @@ bool IsSeenMoving(const MotionLogs& logs, timestamp_t start_ns,
   return first != intervals.end() && first->first < end_ns;
 }
 
-// Whether the machine stands still in the second around a time.
+// The kind of standstill in the second around a time.
 StandstillKind FindCandidate(const MotionLogs& logs, timestamp_t time_ns,
                              const ImuNoise& noise, double imu_rate_hz) {
   const timestamp_t half = NsFromSeconds(kHalfWindowS);
@@ -91,8 +91,8 @@ StandstillKind FindCandidate(const MotionLogs& logs, timestamp_t time_ns,
     return StandstillKind::kNone;
   }
   const SampleMoments all = ComputeMoments(first, last);
-  // An idling engine shakes, but its means stay; those of a machine that
-  // creeps or rocks do not.
+  // An idling engine shakes, but its means stay constant; the means of a
+  // machine that creeps or rocks do not.
   const auto middle = first + (last - first) / 2;
   const SampleMoments head = ComputeMoments(first, middle);
   const SampleMoments tail = ComputeMoments(middle, last);
@@ -115,19 +115,20 @@ StandstillKind FindCandidate(const MotionLogs& logs, timestamp_t time_ns,
   return has_wheel ? StandstillKind::kNoTurn : StandstillKind::kNone;
 }
 
-// The mean rate over a link and, of it, the sum and time.
-struct Turn {
+// Rotation and duration of links, whose ratio is the mean rate.
+struct RotationSum {
   Eigen::Vector3d angle = Eigen::Vector3d::Zero();  // rad
   double time_s = 0.0;
 
-  void Add(const Turn& other, double sign) {
+  void Add(const RotationSum& other, double sign) {
     angle += sign * other.angle;
     time_s += sign * other.time_s;
   }
 };
 
-Turn TurnOf(const OdometryLink& link) {
-  // The rate as logged: the bias of the preintegration is the same for all.
+RotationSum RotationOf(const OdometryLink& link) {
+  // As logged: the bias of the preintegration, which all links share, is added
+  // back.
   return {LogSo3(link.imu.delta_rotation) + link.dt_s * link.imu.bias.gyroscope,
           link.dt_s};
 }
@@ -142,16 +143,16 @@ class Run {
         imu_(imu),
         links_(*links) {}
 
-  // Takes out the links that do turn.
+  // Removes links that rotate.
   void Test(double density);
-  // What the links' mean rates scatter by, as a density squared about each
-  // axis. Medians, so that links that turn do not count.
+  // Scatter of the links' mean rates as a squared density about each axis.
+  // Medians, so that links that rotate do not count.
   Eigen::Array3d ScatterOfLinks(double white) const;
   void EstimateDensity(double density, double imu_rate_hz);
 
  private:
-  // What the means of blocks of this many samples say of the density of each
-  // axis, squared; zero when there are too few.
+  // The squared density of each axis from the means of blocks of block_size
+  // samples; zero when there are too few.
   Eigen::Array3d DensityOfBlocks(int64_t block_size, double block_s,
                                  double white) const;
 
@@ -169,7 +170,7 @@ Eigen::Array3d Run::ScatterOfLinks(double white) const {
   for (int axis = 0; axis < 3; ++axis) {
     std::vector<double> rates, distances;
     for (const size_t k : indices_) {
-      rates.push_back(TurnOf(links_[k]).angle[axis] / links_[k].dt_s);
+      rates.push_back(RotationOf(links_[k]).angle[axis] / links_[k].dt_s);
     }
     std::vector<double> sorted = rates;
     const double median = UpperMedian(&sorted);
@@ -186,14 +187,14 @@ Eigen::Array3d Run::ScatterOfLinks(double white) const {
 
 void Run::Test(double density) {
   const Eigen::Array3d scatter = ScatterOfLinks(density * density).sqrt();
-  Turn sum;
-  for (const size_t k : indices_) sum.Add(TurnOf(links_[k]), 1.0);
+  RotationSum sum;
+  for (const size_t k : indices_) sum.Add(RotationOf(links_[k]), 1.0);
   while (indices_.size() > 1) {
     double largest = 0.0;
     size_t worst = 0;
     for (size_t i = 0; i < indices_.size(); ++i) {
-      const Turn own = TurnOf(links_[indices_[i]]);
-      Turn rest = sum;
+      const RotationSum own = RotationOf(links_[indices_[i]]);
+      RotationSum rest = sum;
       rest.Add(own, -1.0);
       const double deviation =
           ((own.angle / own.time_s - rest.angle / rest.time_s).array().abs() /
@@ -207,7 +208,7 @@ void Run::Test(double density) {
     }
     if (largest < kMaxDeviation) return;
     OdometryLink& link = links_[indices_[worst]];
-    sum.Add(TurnOf(link), -1.0);
+    sum.Add(RotationOf(link), -1.0);
     link.standstill = StandstillKind::kNone;
     indices_.erase(indices_.begin() + worst);
   }

@@ -9,24 +9,23 @@
 
 namespace adasfm {
 
-// Marks the links over which the machine stands still, and how still.
+// Marks the links over which the machine is stationary, with the density of its
+// residual rotation. times_ns: the states' times (IMU clock, one more than
+// links); noise: the IMU's white noise densities (rad/s/sqrt(Hz),
+// m/s^2/sqrt(Hz)).
 //
-// Inputs: the states' times (ns, IMU clock, one more than links), the logs, the
-// IMU's white noise densities (rad/s/sqrt(Hz), m/s^2/sqrt(Hz)).
-//
-// Method. (1) A link is a candidate when, in the second around it, the wheels
-// (if any) do not turn and the IMU shows noise only, as it does on a machine
-// that glides straight ahead, too: without wheels no camera may have seen it
-// move. (2) Links in a row are a
-// run. In a run the mean rate is the same for all links, but for noise and what
-// they scatter by (medians): the link that is furthest from the mean of the
-// others is taken out for as long as it is further than kMaxDeviation sigmas.
-// (3) What is left of a run moves slowly all the same (springs, an idling
-// engine, people): the spectral density of its rates near frequency zero comes
-// from means over blocks of samples, and what exceeds the gyroscope's white
-// noise is the machine's own motion, standstill_rate_density of each link. So
-// the information of a long standstill grows as the log shows, not as white
-// noise would have it.
+// (1) A link is a candidate when, in the second around it, the wheels (if any)
+// do not turn and the IMU shows noise only. A machine that glides straight
+// ahead shows noise only, too: without wheels no camera may have seen it move.
+// (2) Successive candidates form a run. All links of a run have the same mean
+// rate, except for noise and their scatter (medians). As long as a link differs
+// from the mean of the others by more than kMaxDeviation sigmas, the one that
+// differs most is removed. (3) The remaining links still move slowly (springs,
+// an idling engine, people). Means over blocks of samples give the spectral
+// density of their rates near frequency zero. Its excess over the gyroscope's
+// white noise is the machine's own motion, standstill_rate_density of each
+// link. So the information of a long standstill grows as the log shows, not as
+// for white noise.
 //
 // Links without IMU are left as they are. A log that is too short marks
 // nothing.

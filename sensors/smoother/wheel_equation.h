@@ -10,17 +10,18 @@
 
 namespace adasfm {
 
-// Parts of what wheels say of a link (docs/reference/sensors.md), which the
+// Parts of the wheels' equation of a link (docs/reference/sensors.md) that the
 // smoother's residual and ComposeWheelTranslation have in common.
 
-// From the direction of driving to the logged displacement, in the body's axes
+// Maps the direction of driving to the logged displacement, in the body's axes
 // at the start; excess: WheelMotion's phi.
 inline Eigen::Matrix3d DisplacementMap(const WheelMotion& wheel,
                                        const Eigen::Vector3d& excess) {
   return wheel.displacement_map + wheel.rotation_moment * Hat(excess);
 }
 
-// From the wheel frame in the middle of the turn to the body at its start.
+// From the wheel frame in the middle of the link's rotation to the body at its
+// start.
 inline Eigen::Matrix3d StartFromMiddleWheel(
     const WheelMotion& wheel, const Eigen::Quaterniond& imu_from_wheel) {
   return (Eigen::Quaterniond::Identity().slerp(0.5, wheel.profile_rotation) *
@@ -28,7 +29,8 @@ inline Eigen::Matrix3d StartFromMiddleWheel(
       .toRotationMatrix();
 }
 
-// By how much the wheels' origin drives forward faster at the link's end, m/s.
+// Forward speed of the wheel frame's origin at the link's end minus that at its
+// start, m/s.
 inline double WheelSpeedChange(const OdometryLink& link,
                                const Rigid3d& imu_from_wheel,
                                const OdometryState& first,

@@ -10,14 +10,14 @@ namespace adasfm {
 void LinkBuilder::AddWheel(double weight) {
   const WheelMotion& wheel = link_.wheel;
   const Eigen::Vector3d& lever = context_.problem->imu_from_wheel.translation;
-  Eigen::Matrix<double, 3, 2> forward_by_mount;
+  Eigen::Matrix<double, 3, 2> forward_by_direction;
   const Eigen::Vector3d forward = globals_.Forward(
-      context_.problem->imu_from_wheel.rotation, &forward_by_mount);
+      context_.problem->imu_from_wheel.rotation, &forward_by_direction);
   const double logged_per_true = globals_.values[ChainGlobals::kLoggedLength];
   const Eigen::Vector3d phi =
       LogSo3(wheel.profile_rotation.conjugate() * a_rotation_);
   const Eigen::Matrix3d map = DisplacementMap(wheel, phi);
-  // What the wheel frame's origin moves by.
+  // Displacement of the wheel frame's origin.
   const Eigen::Vector3d moved = second_.step_in_previous + a_ * lever - lever;
   const int row = num_rows_;
   values_.segment<3>(row) = logged_per_true * moved - map * forward;
@@ -27,9 +27,10 @@ void LinkBuilder::AddWheel(double weight) {
                                   wheel.rotation_moment * Hat(forward) *
                                       RightJacobianInverseSo3(phi));
   jacobian_.block<3, 1>(row, kGlobals + ChainGlobals::kLoggedLength) = moved;
-  jacobian_.block<3, 2>(row, kGlobals + ChainGlobals::kMountYaw) =
-      -map * forward_by_mount;
-  // In the wheel frame in the middle of the turn, the first row is the speed.
+  jacobian_.block<3, 2>(row, kGlobals + ChainGlobals::kDrivingYaw) =
+      -map * forward_by_direction;
+  // In the wheel frame in the middle of the rotation, the first row is the
+  // speed.
   const Eigen::Matrix3d wheel_from_start =
       StartFromMiddleWheel(wheel, context_.problem->imu_from_wheel.rotation)
           .transpose();
@@ -43,7 +44,7 @@ void LinkBuilder::AddWheel(double weight) {
   covariance(0, 0) *= persistence;
   Whiten<3>(covariance / weight);
   rows_.wheel_speed = {row, 1};
-  // A slip is judged by what one link errs by.
+  // A slip is judged by the error of one link, without the persistence.
   wheel_chi2_ += (persistence * values_[row] * values_[row] +
                   values_.segment<2>(row + 1).squaredNorm()) /
                  weight;
@@ -58,8 +59,8 @@ void LinkBuilder::AddWheel(double weight) {
 }
 
 // To first order a path that begins and ends earlier is shorter by the delay
-// times the speed's growth. The speed is the state's: a log's is rounded, and
-// what multiplies an unknown should not err.
+// times the increase of the speed. The speed is the state's: a logged one is
+// rounded, and the factor of an unknown should be free of noise.
 void LinkBuilder::AddWheelDelay(int forward_row) {
   const Rigid3d& imu_from_wheel = context_.problem->imu_from_wheel;
   const Eigen::Vector3d forward =
@@ -107,10 +108,10 @@ void LinkBuilder::AddPlanarRotation() {
   const Eigen::Vector3d turn = LogSo3(a_rotation_);
   const double sigma = context_.options->planar_rotation_noise *
                        std::sqrt(std::max(link_.dt_s, 1e-6));
-  const Eigen::Matrix<double, 2, 3> by_turn =
+  const Eigen::Matrix<double, 2, 3> by_rotation =
       wheel_from_imu.topRows<2>() * RightJacobianInverseSo3(turn) / sigma;
   values_.segment<2>(num_rows_) = wheel_from_imu.topRows<2>() * turn / sigma;
-  AddRelativeRotation<2>(num_rows_, by_turn);
+  AddRelativeRotation<2>(num_rows_, by_rotation);
   num_rows_ += 2;
 }
 

@@ -10,14 +10,15 @@
 namespace adasfm {
 namespace {
 
-// Wheels that leave this much force unexplained at the start are slipping or
-// stuck there: no machine's gravity is off so far.
+// Wheels that leave this much force unexplained in the initial states slip or
+// are stuck: no machine's initial gravity is so far off.
 constexpr double kMaxFirstForceError = 1.5;  // m/s^2
-// What jumps may add up to by that much force in the links without one.
+// Sum of jumps that smaller forces may cause in the links without a jump.
 constexpr double kMaxFirstSpeedError = 1.0;  // m/s
 
-// By how much more the wheels' speed grows over link k than the accelerometer's
-// along the motion, m/s, where the force that is left is not gravity.
+// Increase of the wheels' speed over link k minus that of the accelerometer's,
+// along the forward direction, m/s; none where the unexplained force is
+// gravity.
 std::optional<double> FindJump(const OdometryFusionProblem& problem, size_t k,
                                double gravity_m_s2) {
   const OdometryLink& link = problem.links[k];
@@ -39,10 +40,10 @@ std::optional<double> FindJump(const OdometryFusionProblem& problem, size_t k,
 
 }  // namespace
 
-std::vector<size_t> FindSuspectWheels(const OdometryFusionProblem& problem,
+std::vector<size_t> FindOutlierWheels(const OdometryFusionProblem& problem,
                                       double gravity_m_s2) {
   const size_t num_links = problem.links.size();
-  std::vector<bool> is_suspect(num_links, false);
+  std::vector<bool> is_outlier(num_links, false);
   std::vector<double> offsets(num_links, 0.0);
   double offset = 0.0;
   for (size_t k = 0; k < num_links; ++k) {
@@ -51,10 +52,11 @@ std::vector<size_t> FindSuspectWheels(const OdometryFusionProblem& problem,
     if (jump) {
       offset += *jump;
       for (size_t i = k > 0 ? k - 1 : 0; i < std::min(num_links, k + 2); ++i) {
-        is_suspect[i] = true;
+        is_outlier[i] = true;
       }
     }
-    // At rest wheels are right, and across a hole nothing is known.
+    // At rest wheels are right, and across a hole the offset is unknown: it
+    // restarts.
     if (!link.has_imu || !link.has_wheel ||
         link.standstill == StandstillKind::kAtRest) {
       offset = 0.0;
@@ -63,15 +65,15 @@ std::vector<size_t> FindSuspectWheels(const OdometryFusionProblem& problem,
   }
   std::vector<double> sorted = offsets;
   const double usual_offset = UpperMedian(&sorted);
-  std::vector<size_t> suspects;
+  std::vector<size_t> outliers;
   for (size_t k = 0; k < num_links; ++k) {
     if (problem.links[k].has_wheel &&
-        (is_suspect[k] ||
+        (is_outlier[k] ||
          std::abs(offsets[k] - usual_offset) > kMaxFirstSpeedError)) {
-      suspects.push_back(k);
+      outliers.push_back(k);
     }
   }
-  return suspects;
+  return outliers;
 }
 
 double ComputeWheelSpeedError(const OdometryFusionProblem& problem, size_t k,

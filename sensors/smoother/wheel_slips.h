@@ -8,11 +8,11 @@
 
 namespace adasfm {
 
-// Links with grossly wrong wheels, which would pull the first solution far off,
-// in ascending order: those whose first speeds leave a force that is not
-// gravity, their neighbours, and stretches between two such jumps whose speeds
-// are off those of most links by what the jumps add up to.
-std::vector<size_t> FindSuspectWheels(const OdometryFusionProblem& problem,
+// Links with grossly wrong wheels, which would distort the first solution, in
+// ascending order: links whose initial speeds leave a force that is not gravity
+// (jumps), their neighbours, and stretches between two jumps whose speeds
+// differ from those of most links by the sum of the jumps.
+std::vector<size_t> FindOutlierWheels(const OdometryFusionProblem& problem,
                                       double gravity_m_s2);
 
 // Logged minus true mean speed of link k's wheels, m/s along the motion. 0 for

@@ -53,15 +53,16 @@ class RigTest : public CommandLineTest {
 
   // Image k of cam0 and k + num_frames_ of cam1 are a frame: their relative
   // pose is one and the same.
-  Rigid3d Mount(image_t image_id) const {
+  Rigid3d CamFromRig(image_t image_id) const {
     return ComputeCam2FromCam1(
         CamFromWorld(model_.Image(image_id)),
         CamFromWorld(model_.Image(image_id + num_frames_)));
   }
   void ExpectRigidFrames() const {
     for (int image_id = 2; image_id <= num_frames_; ++image_id) {
-      EXPECT_LT((Mount(image_id).ToMatrix() - Mount(1).ToMatrix()).norm(),
-                1e-9);
+      EXPECT_LT(
+          (CamFromRig(image_id).ToMatrix() - CamFromRig(1).ToMatrix()).norm(),
+          1e-9);
     }
   }
 
@@ -135,7 +136,7 @@ TEST_F(RigTest, TheBaselineAloneGivesMetres) {
   Import("");
   Reconstruct();
   ExpectRigidFrames();
-  EXPECT_NEAR(Mount(1).translation.norm(), 0.5, 0.004);
+  EXPECT_NEAR(CamFromRig(1).translation.norm(), 0.5, 0.004);
   // The baseline's 2 mm of 0.5 m are 0.4 %, vision adds some.
   EXPECT_NEAR(Scale(), 1.0, 0.02);
   // COLMAP 3.12 and later read the rig: one, of two cameras.
@@ -226,7 +227,7 @@ TEST_F(RigTest, AllFormsGiveTheSameModels) {
 }
 
 // The host's own rig, of which only the frames are known.
-TEST_F(RigTest, AnUnknownMountIsEstimated) {
+TEST_F(RigTest, UnknownExtrinsicsAreEstimated) {
   Synthesize(40);
   ReshapeDatabase(database_, "4.2");
   MakeStereoRig(database_, num_frames_, "");
@@ -238,9 +239,9 @@ TEST_F(RigTest, AnUnknownMountIsEstimated) {
   }();
   EXPECT_EQ(rigs.images.size(), 2 * num_frames_);
   // In the truth the second camera is to the right, turned by half a degree.
-  EXPECT_NEAR(Mount(1).translation.normalized().x(), -1.0, 0.01);
-  EXPECT_LT(Eigen::AngleAxisd(Mount(1).rotation).angle(), 0.015);
-  EXPECT_GT(Eigen::AngleAxisd(Mount(1).rotation).angle(), 0.007);
+  EXPECT_NEAR(CamFromRig(1).translation.normalized().x(), -1.0, 0.01);
+  EXPECT_LT(Eigen::AngleAxisd(CamFromRig(1).rotation).angle(), 0.015);
+  EXPECT_GT(Eigen::AngleAxisd(CamFromRig(1).rotation).angle(), 0.007);
 }
 
 }  // namespace

@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <Eigen/Cholesky>
+
 #include "core/random.h"
 #include "core/so3.h"
 #include "tests/testing/matchers.h"
@@ -43,6 +45,56 @@ TEST(CameraRig, FramesHaveOnePriorForEachFurtherImage) {
   EXPECT_TRUE(PosesNear(priors[1].cam2_from_cam1, kCam2FromCam1, 1e-12, 1e-12));
   EXPECT_DOUBLE_EQ(priors[1].covariance(0, 0), 1e-6);
   EXPECT_DOUBLE_EQ(priors[1].covariance(5, 5), 4e-6);
+}
+
+// Where the reference camera's image is missing, the leader's own pose has
+// errors, too: the covariance is that of drawn errors of both cameras.
+TEST(CameraRig, CovarianceHasTheErrorsOfTheLeader) {
+  constexpr int kNumDraws = 20000;
+  CameraRigs rigs = MakeRigs(1);
+  rigs.images.erase(1);
+  rigs.images[201] = {3, 1};
+  rigs.cameras[3].cam_from_rig = Rigid3d(
+      ExpSo3(Eigen::Vector3d(-0.3, 0.8, 0.2)), Eigen::Vector3d(0.4, -0.1, 0.6));
+  rigs.cameras[2].rotation_sigma_rad = 2e-3;
+  rigs.cameras[2].translation_sigma_m = 1e-3;
+  rigs.cameras[3].rotation_sigma_rad = 1e-3;
+  rigs.cameras[3].translation_sigma_m = 3e-3;
+  const std::vector<RelativePosePrior> priors = ComputeFramePriors(rigs);
+  ASSERT_EQ(priors.size(), 1u);
+  EXPECT_EQ(priors[0].image_id1, 101u);
+  for (const uint64_t seed : {1, 2, 3}) {
+    Random random(seed);
+    const auto draw = [&](const RigCamera& camera) {
+      const Rigid3d& pose = *camera.cam_from_rig;
+      return Rigid3d(
+          ExpSo3(random.GaussianVector(camera.rotation_sigma_rad)) *
+              pose.rotation,
+          pose.translation + random.GaussianVector(camera.translation_sigma_m));
+    };
+    Eigen::Matrix<double, 6, 6> sum = Eigen::Matrix<double, 6, 6>::Zero();
+    for (int k = 0; k < kNumDraws; ++k) {
+      const Rigid3d drawn =
+          ComputeCam2FromCam1(draw(rigs.cameras[2]), draw(rigs.cameras[3]));
+      Eigen::Matrix<double, 6, 1> error;
+      error << LogSo3(drawn.rotation *
+                      priors[0].cam2_from_cam1.rotation.conjugate()),
+          drawn.translation - priors[0].cam2_from_cam1.translation;
+      sum += error * error.transpose() / kNumDraws;
+    }
+    // In units of the stated sigmas: entries of a sample covariance vary by at
+    // most sqrt(2 / n), here by 0.01.
+    const Eigen::Matrix<double, 6, 6> whitening =
+        priors[0].covariance.llt().matrixL().solve(
+            Eigen::Matrix<double, 6, 6>::Identity());
+    const Eigen::Matrix<double, 6, 6> whitened =
+        whitening * sum * whitening.transpose();
+    EXPECT_LT((whitened - Eigen::Matrix<double, 6, 6>::Identity())
+                  .cwiseAbs()
+                  .maxCoeff(),
+              0.05)
+        << whitened;
+  }
 }
 
 TEST(CameraRig, UnknownCamerasAreEstimatedFromFrames) {

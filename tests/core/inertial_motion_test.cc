@@ -12,7 +12,7 @@ namespace adasfm {
 namespace {
 
 // What the motion says of the world does not depend on the camera's axes.
-TEST(TurnInertialMotion, SaysTheSameOfTheWorld) {
+TEST(RotateInertialMotion, SaysTheSameOfTheWorld) {
   for (const uint64_t seed : {1, 2, 3}) {
     Random random(seed);
     InertialMotion motion;
@@ -29,10 +29,10 @@ TEST(TurnInertialMotion, SaysTheSameOfTheWorld) {
     const Eigen::Vector3d bias = random.GaussianVector(1.0);
     const Eigen::Quaterniond turn = ExpSo3(random.GaussianVector(1.0));
     InertialMotion turned = motion;
-    TurnInertialMotion(turn, &turned);
+    RotateInertialMotion(turn, &turned);
     const auto expect_same = [&](const Eigen::Vector3d& in_cam,
-                                 const Eigen::Vector3d& in_turned) {
-      EXPECT_LT((turn.conjugate() * in_turned - in_cam).norm(), 1e-12);
+                                 const Eigen::Vector3d& in_rotated) {
+      EXPECT_LT((turn.conjugate() * in_rotated - in_cam).norm(), 1e-12);
     };
     expect_same(
         motion.delta_velocity + motion.velocity_by_bias * bias,

@@ -137,7 +137,7 @@ TEST_F(BagTest, RawPhotosOfADb3BagKeepTheirPixels) {
     ++num_photos;
   }
   EXPECT_EQ(num_photos, (kNumImages + 2) / 3);
-  // The mounting is the drive's own.
+  // The extrinsics are the drive's own.
   const auto truth = ReadSensorCalibration(drive_->File("sensors.yaml"));
   const auto found = ReadSensorCalibration(workspace_ + "/bag/sensors.yaml");
   ASSERT_TRUE(found.ok()) << found.status().message();
@@ -158,7 +158,7 @@ TEST_F(BagTest, RawPhotosOfADb3BagKeepTheirPixels) {
 
 TEST_F(BagTest, WhatIsWrongIsSaidInOneLineWithTheRemedy) {
   DriveBagOptions options;
-  options.has_mounting = false;
+  options.has_extrinsics = false;
   options.has_second_imu = true;
   const std::string bag = WriteBag("drive.mcap", options);
   ExpectError(FromBag(bag), "choose one with --imu_topic /imu");

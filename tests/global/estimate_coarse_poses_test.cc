@@ -123,6 +123,35 @@ TEST(EstimateCoarsePoses, AStopIsNoContradiction) {
   }
 }
 
+// A step without a prior is completed by vision, also where priors of images
+// without pairs, before the others, make up the number.
+TEST(EstimateCoarsePoses, VisionCompletesAHoleInThePriors) {
+  SyntheticWorldOptions options = AliasedWorld(1);
+  options.num_blackouts = 0;
+  CoarseProblem problem = BuildCoarseProblem(options);
+  const auto added_edges = [&problem] {
+    const CoarsePoses result =
+        EstimateCoarsePoses(CoarsePoseOptions(), problem.graph,
+                            problem.correspondences, problem.priors);
+    return std::any_of(
+        result.steps.begin(), result.steps.end(), [](const CoarseStep& step) {
+          return step.summary.find("vision added 1 ") != std::string::npos;
+        });
+  };
+  EXPECT_FALSE(added_edges());
+  const size_t hole = problem.priors.size() / 2;
+  RelativePosePrior outside = problem.priors[hole];
+  problem.priors.erase(problem.priors.begin() + hole);
+  EXPECT_TRUE(added_edges());
+  for (const image_t image_id : {100001u, 100002u}) {
+    outside.image_id1 = image_id;
+    outside.image_id2 = image_id + 1;
+    problem.priors.insert(problem.priors.end() - 1, outside);
+    std::swap(problem.priors[problem.priors.size() - 2], problem.priors.back());
+  }
+  EXPECT_TRUE(added_edges());
+}
+
 // Rotations alone cannot tell look-alike places in streets of one direction
 // apart; the way that vision sees between them does.
 TEST(EstimateCoarsePoses, VisionCompletesAnImuWithoutWheels) {
@@ -133,7 +162,7 @@ TEST(EstimateCoarsePoses, VisionCompletesAnImuWithoutWheels) {
     CoarseProblem problem = BuildCoarseProblem(options);
     for (RelativePosePrior& prior : problem.priors) DropPosition(&prior);
     CoarsePoseOptions without;
-    without.visual_steps.enabled = false;
+    without.visual_odometry.enabled = false;
     num_aliases_without +=
         CountKeptPairs(problem, EstimateCoarsePoses(without, problem.graph,
                                                     problem.correspondences,

@@ -140,8 +140,9 @@ INSTANTIATE_TEST_SUITE_P(
         OptionChange{
             "WheelCurvature",
             [](Options* o) { o->fusion.wheel_curvature_sigma = 1e-5; }},
-        OptionChange{"WheelMount",
-                     [](Options* o) { o->fusion.wheel_mount_sigma_deg = 0; }},
+        OptionChange{
+            "DrivingDirection",
+            [](Options* o) { o->fusion.driving_direction_sigma_deg = 0; }},
         OptionChange{"LateralSpeed",
                      [](Options* o) { o->fusion.lateral_speed_noise = 0.5; }},
         OptionChange{"VerticalSpeed",

@@ -39,9 +39,9 @@ double SummedYawError(const PriorEstimate& estimate, const Dataset& data) {
 // the noise of the wheels.
 double SummedYawSigma(double vision_sigma_rad, const SyntheticWorld& world,
                       const Dataset& data) {
-  const double of_wheels =
-      std::sqrt(2.0) * world.options.wheel_speed_noise / world.track_width_m *
-      std::sqrt(Duration(data) / world.options.wheel_rate_hz);
+  const double of_wheels = std::sqrt(2.0) * world.options.wheel_speed_noise /
+                           world.track_width_m *
+                           std::sqrt(Duration(data) / kSyntheticWheelRateHz);
   return std::hypot(
       vision_sigma_rad * std::sqrt(static_cast<double>(data.images.size())),
       of_wheels);

@@ -73,7 +73,7 @@ inline Eigen::Matrix<uint8_t, 3, 1> ColorOf(const colmap::Point3D& point) {
   return point.Color();
 }
 
-// COLMAP's pose (w x y z, translation) as ours, and back.
+// Convert between COLMAP's pose (w x y z, translation) and ours.
 inline Rigid3d CamFromWorld(const colmap::Image& image) {
   const Eigen::Vector4d& qvec = image.Qvec();
   return Rigid3d(Eigen::Quaterniond(qvec(0), qvec(1), qvec(2), qvec(3)),
@@ -110,8 +110,8 @@ inline void FilterPoints(double max_reproj_error_px, double min_angle_deg,
   reconstruction->FilterAllPoints3D(max_reproj_error_px, min_angle_deg);
 }
 
-// Of a model that is not mapped on: where the points that its images might see
-// lie in them, 22 kB an image.
+// For a model that is not mapped further: frees what its images store about the
+// positions of visible points, 22 kB per image.
 inline void ReleaseVisibility(colmap::Reconstruction* reconstruction) {
   for (const auto& [image_id, image] : reconstruction->Images()) {
     reconstruction->Image(image_id).TearDown();

@@ -63,7 +63,7 @@ void DatabaseWriter::WriteNewImage(
     const std::string& name, camera_t camera_id,
     const std::optional<Eigen::Vector3d>& position) {
   colmap::Image image = MakeImage(name, camera_id);
-  // Where COLMAP's feature_extractor puts it.
+  // COLMAP's feature_extractor stores the position here.
   if (position) image.SetTvecPrior(*position);
   host_->database.WriteImage(image);
 }

@@ -23,7 +23,8 @@ namespace {
 
 constexpr std::chrono::milliseconds kThreadPollInterval(100);
 
-// Images of the database that have no descriptors yet, and how many have.
+// Images of the database without descriptors or keypoints, and how many have
+// both.
 std::vector<std::string> ImagesWithoutFeatures(const std::string& path,
                                                int* num_done) {
   const colmap::Database database(path);
@@ -57,7 +58,7 @@ void WaitFor(colmap::Thread* thread, const std::function<void()>& report) {
   thread->Wait();
 }
 
-// Without CUDA the host draws on a display.
+// Without CUDA the host's GPU code needs a display.
 bool CanUseGpu() {
 #ifdef ADASFM_HOST_HAS_CUDA
   return colmap::GetNumCudaDevices() > 0;
@@ -110,7 +111,7 @@ Status ExtractFeatures(const FeatureOptions& options,
 
   const Status gpu = CheckGpu(options);
   if (!gpu.ok()) return gpu;
-  // A line that the host prints for every photo.
+  // The host prints one such line for every photo.
   CaptureOutput capture(log_path, "Processed file");
   colmap::SiftFeatureExtractor extractor(reader, sift);
   extractor.Start();

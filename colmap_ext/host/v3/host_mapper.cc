@@ -20,9 +20,9 @@ struct HostMapper::Host {
   // Filled with the part's cameras, images and matches instead of being read
   // from the database.
   colmap::DatabaseCache cache;
-  // Its counters of registrations decide about intrinsics, which are never
-  // changed here, and are what its FilterImages and AdjustLocalBundle check:
-  // those two are not used.
+  // Its counters of registrations only affect intrinsics, which are never
+  // changed here, and its functions FilterImages and AdjustLocalBundle, which
+  // are not used.
   colmap::IncrementalMapper mapper{&cache};
 };
 
@@ -53,9 +53,9 @@ void HostMapper::AddMatches(image_t image_id1, image_t image_id2,
   for (const FeatureMatch& match : matches) {
     host_matches.emplace_back(match.point2D_idx1, match.point2D_idx2);
   }
-  // The cache is ours and not const; COLMAP 3.8 lets only its own reading of a
-  // database change the graph. The graph is not finalized: that drops images
-  // without matches, which the mapper then asks for in vain.
+  // The cache is ours and not const, but COLMAP 3.8 lets only its own database
+  // reader change the graph. The graph is not finalized: finalizing removes
+  // images without matches, for which the mapper would then ask in vain.
   const_cast<colmap::CorrespondenceGraph&>(host_->Graph())
       .AddCorrespondences(image_id1, image_id2, host_matches);
 }
@@ -64,7 +64,8 @@ void HostMapper::Begin() {
   host_->mapper.BeginReconstruction(&reconstruction_);
   // The reconstruction has its own copy of the keypoints.
   for (const auto& [image_id, image] : reconstruction_.Images()) {
-    // An assignment would keep the memory: COLMAP's images are never moved.
+    // An assignment would keep the memory: COLMAP's images are copied, not
+    // moved.
     colmap::Image* copy = &host_->cache.Image(image_id);
     std::destroy_at(copy);
     new (copy) colmap::Image();
@@ -74,7 +75,7 @@ void HostMapper::Begin() {
 void HostMapper::End() { host_->mapper.EndReconstruction(/*discard=*/false); }
 
 void HostMapper::ReleaseMatches() {
-  // Takes its pointer to the graph from the reconstruction.
+  // Clears the reconstruction's pointer to the graph.
   reconstruction_.Load(colmap::DatabaseCache());
   ReleaseVisibility(&reconstruction_);
   host_.reset();
@@ -132,8 +133,8 @@ bool HostMapper::RegisterNextImage(image_t image_id, double max_reproj_error_px,
 void HostMapper::TriangulateImage(image_t image_id, double min_angle_deg) {
   colmap::IncrementalTriangulator::Options options;
   options.min_angle = min_angle_deg;
-  // A straight drive has many tracks of two views; the adjustment weighs them,
-  // and verified matches made them.
+  // Straight drives have many two-view tracks. They come from verified matches,
+  // and the bundle adjustment weights them.
   options.ignore_two_view_tracks = false;
   host_->mapper.TriangulateImage(options, image_id);
 }

@@ -17,11 +17,11 @@
 namespace adasfm {
 namespace {
 
-// Pairs that are matched in one transaction, for each thread: lost by a kill,
-// and the time that an interruption takes, a second or less.
+// Pairs per thread that are matched in one transaction. A kill loses one
+// transaction, and an interruption waits for it, a second or less.
 constexpr size_t kNumPairsPerThread = 32;
 constexpr size_t kNumPairsPerThreadOfHost = 8;
-// Whose features are kept in memory; an image's pairs are next to each other.
+// Images whose features are kept in memory; the pairs of an image are adjacent.
 constexpr size_t kNumCachedImages = 200;
 
 using PairBlock = std::vector<ImagePair>;

@@ -16,7 +16,7 @@
 namespace adasfm {
 namespace {
 
-// COLMAP's defaults stand in the options of its matcher.
+// COLMAP's defaults are in the options of its matcher.
 colmap::TwoViewGeometry::Options VerificationOptions(size_t num_matches) {
   const colmap::SiftMatchingOptions sift;
   colmap::TwoViewGeometry::Options options;
@@ -26,9 +26,9 @@ colmap::TwoViewGeometry::Options VerificationOptions(size_t num_matches) {
   ransac.confidence = sift.confidence;
   ransac.min_num_trials = sift.min_num_trials;
   ransac.max_num_trials = sift.max_num_trials;
-  // A geometry with a smaller share of the matches has too few to be accepted:
-  // nothing is gained by looking for it, and most of the time of pairs that
-  // show different places is.
+  // A geometry with a smaller inlier ratio has too few inliers to be accepted.
+  // Without this bound, searching for such geometries would take most of the
+  // time of pairs that show different places.
   ransac.min_inlier_ratio =
       std::max(sift.min_inlier_ratio,
                static_cast<double>(sift.min_num_inliers) / num_matches);
@@ -55,9 +55,9 @@ PlaneKeypoints KeypointsOnPlane(const colmap::Camera& camera,
   return plane;
 }
 
-// Whether matches that were found without the prediction are among those found
-// with it: of an even sample of image 1's descriptors, compared with all of
-// image 2. A wrong prediction finds only matches that happen to agree with it.
+// Whether the prediction's matches confirm matches that are found without it:
+// an even sample of image 1's descriptors is compared with all of image 2. A
+// wrong prediction finds only matches that happen to agree with it.
 bool IsConfirmedByAll(const colmap::FeatureMatches& inlier_matches,
                       const colmap::FeatureDescriptors& descriptors1,
                       const colmap::FeatureDescriptors& descriptors2) {
@@ -157,7 +157,7 @@ void SiftPairMatcher::Verify(const ImagePair& pair, Result* result) {
       *cache_->GetKeypoints(pair.image_id1));
   const auto points2 = colmap::FeatureKeypointsToPointsVector(
       *cache_->GetKeypoints(pair.image_id2));
-  // Of this thread.
+  // The seed belongs to the calling thread.
   colmap::SetPRNGSeed();
   result->geometry.Estimate(camera1, points1, camera2, points2, result->matches,
                             VerificationOptions(result->matches.size()));
@@ -207,8 +207,8 @@ void SiftPairMatcher::Match(const std::vector<ImagePair>& pairs) {
   std::vector<Result> results(missing.size());
   ParallelFor(num_threads_, missing.size(),
               [&](size_t i) { results[i] = MatchPair(missing[i]); });
-  // This thread did some of the pairs: what follows starts as it would have
-  // without.
+  // This thread matched some of the pairs and so changed its random state; the
+  // code that follows must not depend on this.
   colmap::SetPRNGSeed();
   for (size_t i = 0; i < missing.size(); ++i) {
     const auto& [image_id1, image_id2] = missing[i];

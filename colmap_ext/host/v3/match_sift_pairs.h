@@ -14,18 +14,20 @@
 namespace adasfm {
 
 // Matches and verifies pairs of images by their SIFT descriptors, as COLMAP's
-// SiftFeatureMatcher does: the same rules and defaults, the same rows in the
-// tables matches and two_view_geometries. Pairs that have both are left out.
+// SiftFeatureMatcher does: the same rules and defaults, and the same rows in
+// the tables matches and two_view_geometries. Pairs that have both rows are
+// skipped.
 // Method: all descriptors are compared (matching/match_descriptors.h), where
-// COLMAP searches by randomised trees; and COLMAP's TwoViewGeometry verifies,
-// each pair from the same seed, with the confidence of COLMAP's defaults for
-// every geometry that has enough inliers to be accepted. So the result depends
+// COLMAP searches by randomised trees. COLMAP's TwoViewGeometry verifies, each
+// pair from the same seed, with the confidence of COLMAP's defaults for every
+// geometry that has enough inliers to be accepted. So the result depends
 // neither on the threads nor on the order of the pairs.
-// Where the motion between the images is predicted, only keypoints are compared
-// that it lets show the same point (matching/find_candidates.h), and the
-// geometry is sought next to it (verify_prediction.h). Where that finds none,
-// or one that a sample of matches found without the prediction does not
-// confirm, the pair is matched as any other. Images must have descriptors of
+// Where the motion between the images is predicted, only keypoints that can
+// show the same point under this motion are compared
+// (matching/find_candidates.h), and the geometry is searched near the
+// prediction (verify_prediction.h). When this search finds no geometry, or when
+// a sample of matches found without the prediction does not confirm it, the
+// pair is matched like any other. Images must have descriptors of
 // kSiftDimensions bytes, or none.
 class SiftPairMatcher {
  public:
@@ -39,7 +41,7 @@ class SiftPairMatcher {
   // Throws std::runtime_error for descriptors of another length.
   void Match(const std::vector<ImagePair>& pairs);
 
-  // Of the pairs matched by Match, those whose geometry is the predicted one.
+  // Number of pairs matched by Match whose geometry is the predicted one.
   int NumGuided() const { return num_guided_; }
 
  private:

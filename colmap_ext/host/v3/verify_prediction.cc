@@ -15,9 +15,9 @@
 namespace adasfm {
 namespace {
 
-// Enough for a start that is near already.
+// Enough, since the start is close to the solution.
 constexpr size_t kMaxNumUsedMatches = 200;
-// 1 sigma of a keypoint, against the prediction's.
+// 1 sigma of a keypoint, relative to which the prediction is weighted.
 constexpr double kKeypointSigmaPx = 1.0;
 constexpr double kMinInlierRatio = 0.5;
 
@@ -88,7 +88,7 @@ std::optional<colmap::TwoViewGeometry> VerifyPrediction(
       num_inliers < kMinInlierRatio * matches.size()) {
     return std::nullopt;
   }
-  // A homography is of interest only where it has that share of the inliers.
+  // A homography matters only when it has at least this share of the inliers.
   colmap::RANSACOptions ransac = options.ransac_options;
   ransac.min_inlier_ratio =
       std::max(ransac.min_inlier_ratio, options.max_H_inlier_ratio *

@@ -12,19 +12,19 @@
 
 namespace adasfm {
 
-// A keypoint of each image for every match, as pixel and on the plane z = 1.
+// One keypoint per image and match, as pixel and on the plane z = 1.
 struct MatchedPoints {
   std::vector<Eigen::Vector2d> pixels1, pixels2;
   std::vector<Eigen::Vector2d> points1, points2;
 };
 
-// The two-view geometry next to a predicted motion, in place of COLMAP's search
-// by RANSAC: the minimum of the robust epipolar distances next to the
-// prediction, the rotation held by its covariance. Inliers, thresholds and the
-// decision between CALIBRATED and PLANAR_OR_PANORAMIC are COLMAP's
-// (TwoViewGeometry::EstimateCalibrated).
+// Finds the two-view geometry near a predicted motion, in place of COLMAP's
+// RANSAC search: minimises the robust epipolar distances, starting at the
+// prediction, with the prediction's covariance as a constraint on the rotation.
+// Inliers, thresholds and the decision between CALIBRATED and
+// PLANAR_OR_PANORAMIC are COLMAP's (TwoViewGeometry::EstimateCalibrated).
 // None with fewer than options.min_num_inliers inliers, or where less than half
-// of the matches agree: then something else than the prediction may be true.
+// of the matches agree: the true motion may then be another one.
 std::optional<colmap::TwoViewGeometry> VerifyPrediction(
     const colmap::TwoViewGeometry::Options& options,
     const PredictedMotion& prediction, const colmap::Camera& camera1,

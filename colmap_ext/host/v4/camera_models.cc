@@ -12,7 +12,7 @@ colmap::CameraModelId HostId(int model_id) {
 
 }  // namespace
 
-// Of those known here COLMAP 4.2 has all, but EQUIRECTANGULAR images have no
+// COLMAP 4.2 has all models known here, but EQUIRECTANGULAR images have no
 // plane z = 1.
 bool IsNewerCameraModel(int model_id) {
   return HostId(model_id) == colmap::CameraModelId::kEquirectangular;

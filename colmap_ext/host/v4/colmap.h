@@ -78,9 +78,9 @@ inline Eigen::Matrix<uint8_t, 3, 1> ColorOf(const colmap::Point3D& point) {
   return point.color;
 }
 
-// An image's pose is that of its frame. In the models made here every image has
-// a frame of its own and every camera a rig of its own, with the same ids; rigs
-// of several cameras are kept in tables of ours (frames.h).
+// An image's pose is that of its frame. In the models made here, every image
+// has its own frame and every camera its own rig, with the same ids; our own
+// tables store rigs of several cameras (frames.h).
 inline Rigid3d CamFromWorld(const colmap::Image& image) {
   const colmap::Rigid3d pose = image.CamFromWorld();
   return Rigid3d(Eigen::Quaterniond(pose.rotation()), pose.translation());
@@ -114,7 +114,7 @@ inline void FilterPoints(double max_reproj_error_px, double min_angle_deg,
       .FilterAllPoints3D(max_reproj_error_px, min_angle_deg);
 }
 
-// A model has nothing of the kind: its ObservationManager does.
+// Does nothing: not the model but its ObservationManager has this data.
 inline void ReleaseVisibility(colmap::Reconstruction*) {}
 
 }  // namespace adasfm

@@ -5,8 +5,8 @@
 
 namespace adasfm {
 
-// Features and matches are those of the host's program, always: it is of the
-// library's version, and has its options.
+// The host's program always extracts and matches: it has the version of the
+// linked library, and that version's options.
 
 bool UsesGpu(const FeatureOptions& options) { return options.use_gpu == 1; }
 

@@ -11,14 +11,14 @@
 
 namespace adasfm {
 
-// What COLMAP's IncrementalMapper is made of: that class itself takes a
-// database's rigs and frames, and brings COLMAP's own bundle adjustment.
+// The parts of COLMAP's IncrementalMapper. That class itself needs a database's
+// rigs and frames, and brings COLMAP's own bundle adjustment.
 struct HostMapper::Host {
   std::shared_ptr<colmap::CorrespondenceGraph> graph =
       std::make_shared<colmap::CorrespondenceGraph>();
   std::shared_ptr<colmap::ObservationManager> observations;
   std::unique_ptr<colmap::IncrementalTriangulator> triangulator;
-  // To be tried after the others.
+  // Images whose registration was tried; they come after the others.
   std::set<image_t> tried;
 };
 
@@ -70,7 +70,7 @@ void HostMapper::End() {
 
 void HostMapper::ReleaseMatches() {
   host_->triangulator.reset();
-  // Without a graph it counts no visible points.
+  // Without a graph, the ObservationManager counts no visible points.
   host_->observations =
       std::make_shared<colmap::ObservationManager>(reconstruction_);
   host_->graph.reset();
@@ -162,7 +162,7 @@ bool HostMapper::RegisterNextImage(image_t image_id, double max_reproj_error_px,
   colmap::AbsolutePoseEstimationOptions options;
   options.ransac_options.max_error = max_reproj_error_px;
   options.ransac_options.min_inlier_ratio = kMinInlierRatio;
-  // As results must not depend on threads.
+  // Results must not depend on threads.
   options.ransac_options.random_seed = 0;
   colmap::Camera camera = reconstruction_.Camera(image.CameraId());
   colmap::Rigid3d pose;
@@ -190,8 +190,8 @@ bool HostMapper::RegisterNextImage(image_t image_id, double max_reproj_error_px,
 void HostMapper::TriangulateImage(image_t image_id, double min_angle_deg) {
   colmap::IncrementalTriangulator::Options options;
   options.min_angle = min_angle_deg;
-  // A straight drive has many tracks of two views; the adjustment weighs them,
-  // and verified matches made them.
+  // Straight drives have many two-view tracks. They come from verified matches,
+  // and the bundle adjustment weights them.
   options.ignore_two_view_tracks = false;
   options.random_seed = 0;
   host_->triangulator->TriangulateImage(options, image_id);

@@ -12,8 +12,8 @@ namespace {
 static_assert(colmap::TwoViewGeometry::CALIBRATED == kCalibratedConfiguration,
               "the number that databases have");
 
-// The rays of points on the plane z = 1, and their derivatives by the points:
-// errors are then lengths on that plane.
+// The rays of points on the plane z = 1, with derivatives by the points, so
+// that errors are lengths on that plane.
 std::vector<colmap::CamRayWithJac> RaysOf(
     const std::vector<Eigen::Vector2d>& points) {
   std::vector<colmap::CamRayWithJac> rays;

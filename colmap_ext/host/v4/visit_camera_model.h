@@ -6,7 +6,7 @@
 namespace adasfm {
 
 // A camera model of COLMAP. Project: pixel of (u, v) on the plane z = 1, in any
-// number type; false where it has none.
+// number type; false where there is no pixel.
 template <typename Model>
 struct CameraModelType {
   static constexpr int kNumParams = Model::num_params;

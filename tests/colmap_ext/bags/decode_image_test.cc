@@ -196,10 +196,44 @@ TEST(SelectPhotos, ByStepAndByDistanceDriven) {
   const int num_photos = SelectPhotos(Drive(), options)->size();
   EXPECT_GE(num_photos, 6 + 7);
   EXPECT_LE(num_photos, 6 + 9);
-  BagLogs ticks = Drive();
-  ticks.wheel_type = WheelType::kTicks;
-  EXPECT_THAT(SelectPhotos(ticks, options).status().message(),
-              HasSubstr("--image_step"));
+  for (const WheelType type : {WheelType::kTicks, WheelType::kEncoder}) {
+    BagLogs ticks = Drive();
+    ticks.wheel_type = type;
+    EXPECT_THAT(SelectPhotos(ticks, options).status().message(),
+                HasSubstr("--image_step"));
+  }
+}
+
+// The same drive as other wheels log it: two speeds of wheels 0.6 m apart, one
+// speed, a steering angle (which turns nothing at rest). The distance is the
+// same, and no turn is computed smaller than it is.
+TEST(SelectPhotos, WheelsOfEachKind) {
+  PhotoSelectionOptions options;
+  options.image_distance_m = 0.99;
+  const BagLogs drive = Drive();
+  const auto count = [&](WheelType type, const auto& convert) {
+    BagLogs logs = drive;
+    logs.wheel_type = type;
+    for (WheelSample& sample : logs.wheel) convert(&sample);
+    return SelectPhotos(logs, options)->size();
+  };
+  EXPECT_GE(count(WheelType::kDifferential,
+                  [](WheelSample* sample) {
+                    const double half = 0.3 * sample->second;
+                    *sample = {sample->timestamp_ns, sample->first - half,
+                               sample->first + half};
+                  }),
+            6 + 7);
+  EXPECT_EQ(count(WheelType::kSpeed,
+                  [](WheelSample* sample) { sample->second = 1e6; }),
+            6);
+  EXPECT_EQ(count(WheelType::kSteering,
+                  [](WheelSample* sample) { sample->second = 0.0; }),
+            6);
+  // 11.8 degrees a photo with a wheelbase of 0.5 m: each is taken.
+  EXPECT_EQ(count(WheelType::kSteering,
+                  [](WheelSample* sample) { sample->second = -0.8; }),
+            51);
 }
 
 }  // namespace

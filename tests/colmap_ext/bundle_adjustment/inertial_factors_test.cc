@@ -14,7 +14,7 @@
 #include "colmap_ext/host/pose_conversion.h"
 #include "core/random.h"
 #include "core/so3.h"
-#include "global/calibration/correct_camera_mount.h"
+#include "global/calibration/correct_camera_imu_rotation.h"
 #include "tests/testing/colmap_ext/mapper_drive.h"
 #include "tests/testing/matchers.h"
 
@@ -134,8 +134,8 @@ TEST(InertialCost, KnowsTheTurnOfTheImu) {
     images.motion2.camera_from_imu_origin.setZero();
     const Eigen::Vector3d before =
         images.parameters.Residuals(images.Cost(sigma));
-    TurnInertialMotion(ExpSo3(-turn), &images.motion1);
-    TurnInertialMotion(ExpSo3(-turn), &images.motion2);
+    RotateInertialMotion(ExpSo3(-turn), &images.motion1);
+    RotateInertialMotion(ExpSo3(-turn), &images.motion2);
     images.parameters.bias = ExpSo3(-turn) * images.parameters.bias;
     const double unknown =
         (images.parameters.Residuals(images.Cost(sigma)) - before).norm();
@@ -264,21 +264,21 @@ TEST(InertialFactors, TellHowTheImuIsTurned) {
     problem.priors.clear();
     for (size_t i = 0; i < world.data.priors.size(); ++i) {
       RelativePosePrior prior = world.data.priors[i];
-      TurnPrior(stated, &prior);
+      RotatePrior(stated, &prior);
       problem.priors.push_back(PosePriorEdgeFromPrior(prior));
-      TurnInertialMotion(stated, &motions[i]);
+      RotateInertialMotion(stated, &motions[i]);
       motions[i].by_wheels =
           MeasuredTranslation{prior.cam2_from_cam1.translation,
                               prior.covariance.bottomRightCorner<3, 3>()};
     }
-    const auto error_of_turn = [&](const PriorBundleAdjustmentSummary& found) {
+    const auto rotation_error = [&](const PriorBundleAdjustmentSummary& found) {
       return std::abs(found.shared_errors.extrinsic_rotation.y() - angle);
     };
     colmap::Reconstruction model = start;
-    error_without += error_of_turn(Adjust(problem, &model)) / 5.0;
+    error_without += rotation_error(Adjust(problem, &model)) / 5.0;
     problem.inertial_motions = motions;
     model = start;
-    error += error_of_turn(Adjust(problem, &model)) / 5.0;
+    error += rotation_error(Adjust(problem, &model)) / 5.0;
   }
   RecordProperty("deg", std::to_string(RadToDeg(error)));
   EXPECT_LT(error, DegToRad(0.1));

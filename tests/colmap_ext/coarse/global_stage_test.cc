@@ -187,17 +187,18 @@ TEST(RunGlobalStageTest, SameResultOnAnyNumberOfThreads) {
 }
 
 // A camera that is mounted 3 deg off what the calibration says: no weights
-// bring vision and sensors together, unless the mount is corrected or the
+// bring vision and sensors together, unless the rotation is corrected or the
 // adjustment finds the direction of driving.
-TEST(RunGlobalStageTest, CorrectsTheMountOrWarnsOfTheContradiction) {
+TEST(RunGlobalStageTest,
+     CorrectsTheCameraImuRotationOrWarnsOfTheContradiction) {
   const SyntheticWorld world = BuildSyntheticWorld(SmallWorld());
   SceneData scene = BuildSyntheticScene(world, SyntheticPriorOptions());
   EXPECT_TRUE(ListGlobalWarnings(scene, RunStage(scene)).empty());
   const Eigen::Quaterniond turn =
       ExpSo3(DegToRad(3.0) * Eigen::Vector3d::UnitY());
-  for (RelativePosePrior& prior : scene.priors) TurnPrior(turn, &prior);
+  for (RelativePosePrior& prior : scene.priors) RotatePrior(turn, &prior);
   GlobalStageOptions options;
-  options.poses.camera_mount.enabled = false;
+  options.poses.camera_imu_rotation.enabled = false;
   const GlobalStageResult found = RunStage(scene, options);
   EXPECT_TRUE(found.models[0].priors_agree);
   options.structure.bundle.shared_errors.enabled = false;
@@ -209,19 +210,22 @@ TEST(RunGlobalStageTest, CorrectsTheMountOrWarnsOfTheContradiction) {
 
   const GlobalStageResult corrected = RunStage(scene);
   EXPECT_TRUE(corrected.models[0].priors_agree);
-  EXPECT_TRUE(corrected.poses.camera_mount.corrected);
-  const CameraMountReport& mount = corrected.poses.camera_mount;
-  EXPECT_NEAR(mount.turn_rad.y(), -DegToRad(3.0), 4.0 * mount.sigma_rad);
+  EXPECT_TRUE(corrected.poses.camera_imu_rotation.corrected);
+  const CameraImuRotationReport& camera_imu =
+      corrected.poses.camera_imu_rotation;
+  EXPECT_NEAR(camera_imu.rotation_rad.y(), -DegToRad(3.0),
+              4.0 * camera_imu.sigma_rad);
   // 90 m turn little, which tells the roll; it is left where it is uncertain.
-  EXPECT_LT(AngleBetweenRad(ExpSo3(mount.turn_rad) * turn,
+  EXPECT_LT(AngleBetweenRad(ExpSo3(camera_imu.rotation_rad) * turn,
                             Eigen::Quaterniond::Identity()),
             DegToRad(0.6));
   warnings = ListGlobalWarnings(scene, corrected);
   ASSERT_EQ(warnings.size(), 1);
-  EXPECT_NE(warnings[0].find("mount"), std::string::npos);
+  EXPECT_NE(warnings[0].find("camera-IMU rotation"), std::string::npos);
   // A turn that the direction of driving explains is no reason for advice.
   GlobalStageResult uncertain = corrected;
-  uncertain.poses.camera_mount.sigma_rad = 0.4 * mount.turn_rad.norm();
+  uncertain.poses.camera_imu_rotation.sigma_rad =
+      0.4 * camera_imu.rotation_rad.norm();
   EXPECT_TRUE(ListGlobalWarnings(scene, uncertain).empty());
 }
 

@@ -82,7 +82,7 @@ TEST(MeasurePairAgreement, TellsFoldedWorlds) {
     no_priors.enabled = false;
     SceneData scene = BuildSyntheticScene(world, no_priors);
     GlobalStageOptions without;
-    without.poses.visual_steps.enabled = false;
+    without.poses.visual_odometry.enabled = false;
     const StatusOr<GlobalStageResult> result = RunGlobalStage(without, &scene);
     ASSERT_TRUE(result.ok()) << result.status().message();
     const CoarseModel& model = result->models.front();

@@ -29,18 +29,18 @@ const std::vector<OptionCase<Options>>& Cases() {
       ADASFM_OPTION("Global.min_num_inliers", 20, poses.min_num_inliers),
       ADASFM_OPTION("Global.num_rotation_rounds", 1, poses.num_rotation_rounds),
       ADASFM_OPTION("Global.camera_imu_max_num_steps", 5,
-                    poses.camera_mount.max_num_steps),
+                    poses.camera_imu_rotation.max_num_steps),
       ADASFM_OPTION("Global.camera_imu_sigma_deg", 2,
-                    poses.camera_mount.sigma_deg),
+                    poses.camera_imu_rotation.sigma_deg),
       ADASFM_OPTION("Global.camera_imu_min_sigma_deg", 0.2,
-                    poses.camera_mount.min_sigma_deg),
+                    poses.camera_imu_rotation.min_sigma_deg),
       ADASFM_OPTION("Global.camera_imu_min_num_sigmas", 3,
-                    poses.camera_mount.min_num_sigmas),
+                    poses.camera_imu_rotation.min_num_sigmas),
       ADASFM_OPTION("Global.wheel_scale_sigma", 0.02, poses.chain.scale_sigma),
       ADASFM_OPTION("Global.gyro_bias_sigma_rad_s", 0.001,
                     poses.chain.gyro_bias_sigma_rad_s),
       ADASFM_OPTION("Global.visual_odometry_length_error", 0.2,
-                    poses.visual_steps.length_error_ratio),
+                    poses.visual_odometry.length_error_ratio),
       ADASFM_OPTION("Global.loop_significance", 1e-4, poses.loops.significance),
       ADASFM_OPTION("Global.loop_pair_angle_sigma_deg", 1,
                     poses.loops.pair_angle_sigma_deg),
@@ -88,11 +88,11 @@ const std::vector<OptionCase<Options>>& Cases() {
       ADASFM_OPTION("Global.split_unconfirmed_closures", 0,
                     poses.loops.split_unconfirmed_closures),
       ADASFM_OPTION("Global.use_visual_odometry", 0,
-                    poses.visual_steps.enabled),
+                    poses.visual_odometry.enabled),
       ADASFM_OPTION("Global.refine_relative_poses", 0,
                     poses.relative_poses.enabled),
       ADASFM_OPTION("Global.correct_camera_imu_rotation", 0,
-                    poses.camera_mount.enabled),
+                    poses.camera_imu_rotation.enabled),
       ADASFM_OPTION("Global.refine_translations", 0,
                     poses.translations.enabled),
       ADASFM_OPTION("Global.use_augmentation", 0, poses.augmentation.enabled),
@@ -126,7 +126,7 @@ TEST(GlobalOptionsTest, OldNamesAreTaken) {
                   AddGlobalOptions, &stage)
                   .ok());
   const std::string notes = testing::internal::GetCapturedStderr();
-  EXPECT_EQ(stage.poses.visual_steps.length_error_ratio, 0.3);
+  EXPECT_EQ(stage.poses.visual_odometry.length_error_ratio, 0.3);
   EXPECT_EQ(stage.poses.loops.min_turn_deg, 40.0);
   EXPECT_NE(notes.find("--AdaSfmGlobal.visual_step_length_error is "
                        "--AdaSfmGlobal.visual_odometry_length_error now"),
@@ -138,7 +138,7 @@ TEST(GlobalOptionsTest, OldNamesAreTaken) {
   EXPECT_TRUE(ParseWords<GlobalStageOptions>({"--project_path", path},
                                              AddGlobalOptions, &stage)
                   .ok());
-  EXPECT_EQ(stage.poses.camera_mount.sigma_deg, 0.5);
+  EXPECT_EQ(stage.poses.camera_imu_rotation.sigma_deg, 0.5);
 }
 
 }  // namespace

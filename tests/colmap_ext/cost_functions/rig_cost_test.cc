@@ -21,23 +21,25 @@ AdjustedPose RandomPose(Random* random, double distance) {
   return pose;
 }
 
-// Two frames and two mounts; image k of frame k / 2 with mount k % 2.
+// Two frames and two cams_from_rig; image k of frame k / 2 with cam_from_rig k
+// % 2.
 struct Rig {
   explicit Rig(Random* random) {
     for (int k = 0; k < 2; ++k) frames.push_back(RandomPose(random, 2.0));
-    for (int k = 0; k < 2; ++k) mounts.push_back(RandomPose(random, 0.5));
+    for (int k = 0; k < 2; ++k)
+      cams_from_rig.push_back(RandomPose(random, 0.5));
     images.resize(4);
     for (int k = 0; k < 4; ++k) {
-      poses.push_back({&images[k], &frames[k / 2], &mounts[k % 2]});
+      poses.push_back({&images[k], &frames[k / 2], &cams_from_rig[k % 2]});
     }
     Update();
   }
   void Update() {
     for (AdjustedPose& frame : frames) frame.Update();
-    for (AdjustedPose& mount : mounts) mount.Update();
+    for (AdjustedPose& cam_from_rig : cams_from_rig) cam_from_rig.Update();
     for (RigPose& pose : poses) pose.Update();
   }
-  std::deque<AdjustedPose> frames, mounts, images;
+  std::deque<AdjustedPose> frames, cams_from_rig, images;
   std::vector<RigPose> poses;
 };
 
@@ -86,7 +88,8 @@ TEST(RigCost, JacobiansEqualNumericOnes) {
     edge.rotation_sigma_rad = edge.translation_sigma_m = 0.5;
     for (const auto term :
          {PosePriorCost::Term::kRotation, PosePriorCost::Term::kTranslation}) {
-      // One mount, two mounts; and a frame beside a pose of its own.
+      // One cam_from_rig, two cams_from_rig; and a frame beside a pose of its
+      // own.
       for (const auto& [i, j] : {std::pair(1, 3), std::pair(0, 3)}) {
         const PosePriorCost inner(edge, term, 1.0, rig.poses[i].pose,
                                   rig.poses[j].pose);
@@ -115,7 +118,7 @@ TEST(RigCost, JacobiansEqualNumericOnes) {
 
 // The images of a street, of which each odd one is the right camera of the
 // frame that the one before it begins.
-TEST(RigCost, AdjustmentKeepsFramesRigidAndFindsTheMount) {
+TEST(RigCost, AdjustmentKeepsFramesRigidAndFindsTheExtrinsics) {
   BundleWorldOptions options;
   options.num_images = 20;
   options.num_keypoints_per_image = 60;

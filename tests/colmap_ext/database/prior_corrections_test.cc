@@ -11,7 +11,7 @@
 #include "colmap_ext/datasets/write_synthetic_world.h"
 #include "colmap_ext/scene/scene_data.h"
 #include "core/so3.h"
-#include "global/calibration/correct_camera_mount.h"
+#include "global/calibration/correct_camera_imu_rotation.h"
 #include "tests/testing/colmap_ext/synthetic_scene.h"
 #include "tests/testing/colmap_ext/temporary_folder.h"
 
@@ -35,7 +35,8 @@ class PriorCorrectionsTest : public testing::Test {
     }
     EXPECT_TRUE(WritePriorTables(path_, tables_).ok());
     corrected_ = tables_.priors;
-    for (RelativePosePrior& prior : corrected_) TurnPrior(mount_, &prior);
+    for (RelativePosePrior& prior : corrected_)
+      RotatePrior(correction_, &prior);
   }
 
   Priors Read(bool originals = false) const {
@@ -64,13 +65,14 @@ class PriorCorrectionsTest : public testing::Test {
   TemporaryFolder folder_;
   std::string path_ = folder_.File("database.db");
   PriorTables tables_;
-  const Eigen::Quaterniond mount_ = ExpSo3(Eigen::Vector3d(0.01, -0.03, 0.02));
+  const Eigen::Quaterniond correction_ =
+      ExpSo3(Eigen::Vector3d(0.01, -0.03, 0.02));
   Priors corrected_;
 };
 
 TEST_F(PriorCorrectionsTest, AreReadUntilTheyAreRestored) {
   ExpectPriors(Read(), tables_.priors);
-  ASSERT_TRUE(RewriteTwoViewGeometries(path_, {}, {}, mount_).ok());
+  ASSERT_TRUE(RewriteTwoViewGeometries(path_, {}, {}, correction_).ok());
   ExpectPriors(Read(), corrected_);
   // A second run of the global stage starts from the import.
   ExpectPriors(Read(true), tables_.priors);
@@ -82,19 +84,19 @@ TEST_F(PriorCorrectionsTest, AreReadUntilTheyAreRestored) {
 }
 
 TEST_F(PriorCorrectionsTest, TheLastRunCounts) {
-  ASSERT_TRUE(RewriteTwoViewGeometries(path_, {}, {}, mount_).ok());
+  ASSERT_TRUE(RewriteTwoViewGeometries(path_, {}, {}, correction_).ok());
   ASSERT_TRUE(RewriteTwoViewGeometries(path_, {}, {}).ok());
   ExpectPriors(Read(), tables_.priors);
 }
 
 TEST_F(PriorCorrectionsTest, ANewImportRemovesThem) {
-  ASSERT_TRUE(RewriteTwoViewGeometries(path_, {}, {}, mount_).ok());
+  ASSERT_TRUE(RewriteTwoViewGeometries(path_, {}, {}, correction_).ok());
   ASSERT_TRUE(WritePriorTables(path_, tables_).ok());
   ExpectPriors(Read(), tables_.priors);
 }
 
 TEST_F(PriorCorrectionsTest, DamagedRowsAreAnError) {
-  ASSERT_TRUE(RewriteTwoViewGeometries(path_, {}, {}, mount_).ok());
+  ASSERT_TRUE(RewriteTwoViewGeometries(path_, {}, {}, correction_).ok());
   SqliteConnection(path_, SqliteConnection::Mode::kWrite)
       .Execute("UPDATE adasfm_camera_mount SET qvec = X'0102'");
   EXPECT_FALSE(ReadSceneData(path_, SceneDataOptions()).ok());
@@ -109,8 +111,9 @@ TEST_F(PriorCorrectionsTest, TurnGravityToo) {
     options.use_original_two_view_geometries = originals;
     return *ReadSceneData(path_, options)->images.at(image_id).gravity_in_cam;
   };
-  ASSERT_TRUE(RewriteTwoViewGeometries(path_, {}, {}, mount_).ok());
-  EXPECT_LT((gravity(false) - mount_ * Eigen::Vector3d::UnitY()).norm(), 1e-9);
+  ASSERT_TRUE(RewriteTwoViewGeometries(path_, {}, {}, correction_).ok());
+  EXPECT_LT((gravity(false) - correction_ * Eigen::Vector3d::UnitY()).norm(),
+            1e-9);
   EXPECT_EQ(gravity(true), Eigen::Vector3d::UnitY());
   ASSERT_TRUE(RestoreTwoViewGeometries(path_)->priors_restored);
   EXPECT_EQ(gravity(false), Eigen::Vector3d::UnitY());
@@ -142,8 +145,9 @@ class InertialLengthsTest : public PriorCorrectionsTest {
     return bridge;
   }
 
-  Status Rewrite(const std::optional<Eigen::Quaterniond>& mount = {}) const {
-    return RewriteTwoViewGeometries(path_, {}, {}, mount, lengths_);
+  Status Rewrite(
+      const std::optional<Eigen::Quaterniond>& correction = {}) const {
+    return RewriteTwoViewGeometries(path_, {}, {}, correction, lengths_);
   }
 
   // Whether the priors have got their lengths.
@@ -189,7 +193,7 @@ TEST_F(InertialLengthsTest, OlderTablesHaveNoBridges) {
 }
 
 TEST_F(InertialLengthsTest, GoToPriorsWithoutLength) {
-  ASSERT_TRUE(Rewrite(mount_).ok());
+  ASSERT_TRUE(Rewrite(correction_).ok());
   const StatusOr<SceneData> scene = ReadSceneData(path_, SceneDataOptions());
   ASSERT_TRUE(scene.ok()) << scene.status().message();
   for (size_t k = 0; k + 1 < lengths_.size(); ++k) {
@@ -231,9 +235,9 @@ TEST_F(InertialLengthsTest, StayUntilTheyAreReplaced) {
   EXPECT_TRUE(AreApplied());
   ASSERT_TRUE(RestoreTwoViewGeometries(path_)->priors_restored);
   EXPECT_FALSE(AreApplied());
-  ASSERT_TRUE(Rewrite(mount_).ok());
+  ASSERT_TRUE(Rewrite(correction_).ok());
   EXPECT_TRUE(AreApplied());
-  ASSERT_TRUE(RewriteTwoViewGeometries(path_, {}, {}, mount_).ok());
+  ASSERT_TRUE(RewriteTwoViewGeometries(path_, {}, {}, correction_).ok());
   EXPECT_FALSE(AreApplied());
   ASSERT_TRUE(Rewrite().ok());
   ASSERT_TRUE(WritePriorTables(path_, tables_).ok());

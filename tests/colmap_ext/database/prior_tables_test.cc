@@ -5,6 +5,7 @@
 
 #include <limits>
 
+#include "colmap_ext/database/prior_corrections.h"
 #include "colmap_ext/datasets/write_synthetic_world.h"
 #include "colmap_ext/scene/scene_data.h"
 #include "core/random.h"
@@ -212,6 +213,26 @@ void PriorTablesTest::ExpectScene(bool has_lengths) {
 }
 
 // As written before imports stated it, and again by one without a gyroscope.
+// Only the tables of COLMAP and of the version stay.
+TEST_F(PriorTablesTest, RemovesAllThatItWrote) {
+  PriorTables tables = MakeTables(1);
+  tables.rig_cameras[1] = {1, true, Rigid3d()};
+  ASSERT_TRUE(WritePriorTables(path_, tables).ok());
+  SqliteConnection database(path_, SqliteConnection::Mode::kWrite);
+  WritePriorCorrections(
+      Eigen::Quaterniond::Identity(),
+      {{tables.priors[0].image_id1, tables.priors[0].image_id2, 1.0}},
+      &database);
+  RemovePriorTables(&database);
+  SqliteStatement names(&database,
+                        "SELECT name FROM sqlite_master WHERE type = 'table' "
+                        "AND name LIKE 'adasfm%'");
+  while (names.Step()) EXPECT_EQ(names.Text(0), "adasfm_meta");
+  SqliteStatement origin(
+      &database, "SELECT * FROM adasfm_meta WHERE key = 'position_origin'");
+  EXPECT_FALSE(origin.Step());
+}
+
 TEST_F(PriorTablesTest, DatabasesWithoutSharedErrorsAreRead) {
   PriorTables tables = MakeTables(1);
   ASSERT_TRUE(WritePriorTables(path_, tables).ok());

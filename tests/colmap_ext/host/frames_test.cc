@@ -139,8 +139,8 @@ TEST_F(FramesTest, FilesSayTheIdsAndPosesOfRegisteredImages) {
 colmap::Reconstruction WriteRigModel(const std::string& folder) {
   const Rigid3d pose1(Eigen::Quaterniond(0.5, 0.5, -0.5, 0.5),
                       Eigen::Vector3d(1.0, 2.0, 3.0));
-  const Rigid3d mount(Eigen::Quaterniond::Identity(),
-                      Eigen::Vector3d(-0.5, 0.0, 0.0));
+  const Rigid3d cam_from_rig(Eigen::Quaterniond::Identity(),
+                             Eigen::Vector3d(-0.5, 0.0, 0.0));
   colmap::Reconstruction model;
   for (const camera_t camera_id : {1, 2}) {
     colmap::Camera camera;
@@ -157,7 +157,7 @@ colmap::Reconstruction WriteRigModel(const std::string& folder) {
     image.SetImageId(image_id);
     image.SetCameraId(camera_id);
     image.SetName(std::to_string(image_id));
-    SetCamFromWorld(camera_id == 1 ? pose1 : mount * pose1, &image);
+    SetCamFromWorld(camera_id == 1 ? pose1 : cam_from_rig * pose1, &image);
     model.AddImage(image);
     model.RegisterImage(image_id);
     frames.rigs.images[image_id] = {camera_id, (image_id + 1) / 2};

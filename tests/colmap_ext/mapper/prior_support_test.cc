@@ -15,21 +15,21 @@
 namespace adasfm {
 namespace {
 
-// The indices of the torn priors; all others can be told.
-std::vector<size_t> FindTorn(const std::vector<RelativePosePrior>& priors,
-                             const colmap::Reconstruction& model) {
-  std::vector<size_t> torn;
+// The indices of the violated priors; all others can be told.
+std::vector<size_t> FindViolated(const std::vector<RelativePosePrior>& priors,
+                                 const colmap::Reconstruction& model) {
+  std::vector<size_t> violated;
   for (size_t i = 0; i < priors.size(); ++i) {
-    const std::optional<bool> is_torn = IsTorn(priors[i], model);
-    EXPECT_TRUE(is_torn.has_value());
-    if (is_torn.value_or(false)) torn.push_back(i);
+    const std::optional<bool> is_violated = IsViolated(priors[i], model);
+    EXPECT_TRUE(is_violated.has_value());
+    if (is_violated.value_or(false)) violated.push_back(i);
   }
-  return torn;
+  return violated;
 }
 
-class IsTornTest : public testing::TestWithParam<uint64_t> {
+class IsViolatedTest : public testing::TestWithParam<uint64_t> {
  protected:
-  IsTornTest() {
+  IsViolatedTest() {
     BundleWorldOptions world;
     world.num_images = 120;
     world.seed = GetParam();
@@ -80,38 +80,41 @@ class IsTornTest : public testing::TestWithParam<uint64_t> {
   std::vector<RelativePosePrior> priors_;
 };
 
-TEST_P(IsTornTest, ManySigmasOfAFewMillimetresAreNoTear) {
-  EXPECT_TRUE(FindTorn(priors_, model_).empty());
+TEST_P(IsViolatedTest, ManySigmasOfAFewMillimetresAreNoTear) {
+  EXPECT_TRUE(FindViolated(priors_, model_).empty());
   for (RelativePosePrior& prior : priors_) prior.covariance *= 1e-6;
-  EXPECT_TRUE(FindTorn(priors_, model_).empty());
+  EXPECT_TRUE(FindViolated(priors_, model_).empty());
 }
 
-TEST_P(IsTornTest, AFoldTearsThePriorsThere) {
+TEST_P(IsViolatedTest, AFoldTearsThePriorsThere) {
   MoveRest(Rigid3d(Eigen::Quaterniond::Identity(), {8.0, 0.0, -4.0}));
-  EXPECT_EQ(FindTorn(priors_, model_), PriorsAcross());
+  EXPECT_EQ(FindViolated(priors_, model_), PriorsAcross());
 }
 
 // Of a gyroscope alone.
-TEST_P(IsTornTest, AWrongTurnTearsRotations) {
+TEST_P(IsViolatedTest, AWrongTurnViolatesRotations) {
   for (RelativePosePrior& prior : priors_) {
     prior.flags = kPriorRotation;
   }
   MoveRest(Rigid3d(Eigen::Quaterniond::Identity(), {8.0, 0.0, -4.0}));
-  EXPECT_TRUE(FindTorn(priors_, model_).empty());
+  EXPECT_TRUE(FindViolated(priors_, model_).empty());
   MoveRest(Rigid3d(ExpSo3({0.0, 0.3, 0.0}), Eigen::Vector3d::Zero()));
-  EXPECT_EQ(FindTorn(priors_, model_), PriorsAcross());
+  EXPECT_EQ(FindViolated(priors_, model_), PriorsAcross());
 }
 
-TEST_P(IsTornTest, SlipsAndMissingImagesTellNothing) {
+TEST_P(IsViolatedTest, SlipsAndMissingImagesTellNothing) {
   RelativePosePrior prior = priors_[10];
   prior.flags |= kPriorWheelSlip;
-  EXPECT_EQ(IsTorn(prior, model_), std::nullopt);
+  EXPECT_EQ(IsViolated(prior, model_), std::nullopt);
+  prior = priors_[10];
+  prior.flags = kPriorDirection;
+  EXPECT_EQ(IsViolated(prior, model_), std::nullopt);
   prior = priors_[10];
   prior.image_id2 = 100000;
-  EXPECT_EQ(IsTorn(prior, model_), std::nullopt);
+  EXPECT_EQ(IsViolated(prior, model_), std::nullopt);
 }
 
-INSTANTIATE_TEST_SUITE_P(Seeds, IsTornTest, testing::Values(1, 2, 3));
+INSTANTIATE_TEST_SUITE_P(Seeds, IsViolatedTest, testing::Values(1, 2, 3));
 
 }  // namespace
 }  // namespace adasfm

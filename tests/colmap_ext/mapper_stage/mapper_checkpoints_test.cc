@@ -9,8 +9,10 @@
 #include <mutex>
 #include <new>
 #include <nlohmann/json.hpp>
+#include <set>
 #include <stdexcept>
 
+#include "colmap_ext/mapper_stage/mapper_fingerprint.h"
 #include "colmap_ext/mapper_stage/mapper_stage.h"
 #include "colmap_ext/mapper_stage/mapping_summary.h"
 #include "colmap_ext/mapper_stage/part_memory.h"
@@ -325,6 +327,63 @@ TEST_F(MapperCheckpointsTest, ChangedOptionsOrDataStartAnew) {
   EXPECT_NE(with_data.Fingerprint(), stage.Fingerprint());
   ASSERT_TRUE(with_data.Plan().ok());
   EXPECT_FALSE(fs::exists(part));
+}
+
+// All that an import may change: a checkpoint of other sensors is not used.
+TEST(ComputePartsFingerprint, DependsOnAllThatSensorsMeasure) {
+  SceneData data;
+  data.priors.resize(1);
+  data.inertial_motions.resize(1);
+  data.inertial_motions[0].by_wheels = MeasuredTranslation();
+  data.positions.resize(1);
+  data.wheel_scale = WheelScale();
+  data.rigs.cameras[1].cam_from_rig = Rigid3d();
+  data.rigs.images[1].camera_id = 1;
+  const auto fingerprint = [&data] {
+    return ComputePartsFingerprint(PartitionPlanOptions(), LocalMapperOptions(),
+                                   data, CoarsePoseMap());
+  };
+  std::set<std::string> seen = {fingerprint()};
+  const auto expect_new = [&](const char* what) {
+    EXPECT_TRUE(seen.insert(fingerprint()).second) << what;
+  };
+  for (const auto& [name, value] : std::vector<std::pair<const char*, double*>>{
+           {"rotation", &data.priors[0].cam2_from_cam1.rotation.x()},
+           {"translation", &data.priors[0].cam2_from_cam1.translation.x()},
+           {"covariance", &data.priors[0].covariance(5, 5)},
+           {"dt", &data.inertial_motions[0].dt_s},
+           {"velocity", &data.inertial_motions[0].delta_velocity.z()},
+           {"position", &data.inertial_motions[0].delta_position.z()},
+           {"velocity by bias",
+            &data.inertial_motions[0].velocity_by_bias(2, 2)},
+           {"position by bias",
+            &data.inertial_motions[0].position_by_bias(2, 2)},
+           {"lever arm", &data.inertial_motions[0].camera_from_imu_origin.z()},
+           {"wheels", &data.inertial_motions[0].by_wheels->translation.z()},
+           {"wheels' covariance",
+            &data.inertial_motions[0].by_wheels->covariance(2, 2)},
+           {"fix", &data.positions[0].position.z()},
+           {"fix's covariance", &data.positions[0].covariance(2, 2)},
+           {"antenna", &data.positions[0].antenna_in_cam.z()},
+           {"length drift", &data.length_drift_ratio},
+           {"accelerometer's scale", &data.inertial_scale_sigma},
+           {"wheel scale", &data.wheel_scale->scale},
+           {"wheel scale's sigma", &data.wheel_scale->sigma},
+           {"rig", &data.rigs.cameras[1].cam_from_rig->translation.z()},
+           {"rig's rotation sigma", &data.rigs.cameras[1].rotation_sigma_rad},
+           {"rig's translation sigma",
+            &data.rigs.cameras[1].translation_sigma_m}}) {
+    *value += 0.125;
+    expect_new(name);
+  }
+  data.priors[0].dt_ns = 1;
+  expect_new("time");
+  data.priors[0].flags = kPriorRotation;
+  expect_new("flags");
+  data.rigs.images[1].frame_id = 7;
+  expect_new("frame");
+  data.images[1].gravity_in_cam = Eigen::Vector3d::UnitY();
+  expect_new("gravity");
 }
 
 TEST_F(MapperCheckpointsTest, MergeNamesTheMissingParts) {

@@ -200,7 +200,7 @@ TEST_F(MapperStageTest, ImagesThatNothingHoldsAreLeftOut) {
         EXPECT_EQ(poses.count(image_id), image.keypoints.empty() ? 0 : 1)
             << image.name;
       }
-      EXPECT_EQ(summary_.refine.num_images_left_out, 3);
+      EXPECT_EQ(summary_.refine.num_images_deregistered, 3);
     }
   }
 }

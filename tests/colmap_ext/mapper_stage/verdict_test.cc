@@ -159,8 +159,8 @@ TEST_F(VerdictTest, WrongLengthsAreDoubtfulUnlessKeypointsWereLetGo) {
   ExpectResult(Assess(), VerdictResult::kGood, "");
 }
 
-// A camera's mounting that is off turns all directions of driving alike, which
-// the adjustment knows.
+// A camera-IMU rotation that is off rotates all directions of driving alike,
+// which the adjustment knows.
 TEST_F(VerdictTest, DirectionsOffAlikeAreNoContradiction) {
   const SceneData honest = world_.data;
   const auto turn = [&](double angle_rad, bool alike) {
@@ -203,9 +203,9 @@ TEST_F(VerdictTest, LensesOfAnotherKind) {
 TEST_F(VerdictTest, WhatTheStagesSaid) {
   ExpectResult(Assess({"the wheels slip"}), VerdictResult::kDoubtful,
                "an earlier step warned: the wheels slip");
-  summary_.refine.num_images_put_back = 5;
+  summary_.refine.num_images_reset = 5;
   ExpectResult(Assess(), VerdictResult::kDoubtful, "5 images contradicted");
-  summary_.refine.num_images_put_back = 0;
+  summary_.refine.num_images_reset = 0;
   summary_.parts[0].failure = "a bad point";
   ExpectResult(Assess(), VerdictResult::kDoubtful, "parts could not be used");
   summary_.parts[0].failure.clear();

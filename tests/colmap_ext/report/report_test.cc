@@ -177,7 +177,7 @@ TEST_F(ReportTest, NamesModelsLostImagesAndWeakPlaces) {
       "{\"weak_places\": [{\"model1\": 0, \"model2\": 1, \"pairs\": 4, "
       "\"inliers\": 31, \"reason\": \"unverified join\", \"name1\": \"" +
           world_.images[2].name + "\", \"name2\": \"" + world_.images[5].name +
-          "\"}], \"models\": [{\"unverified_joins\": [{\"pairs\": 3, "
+          "\"}], \"models\": [{\"unconfirmed_closures\": [{\"pairs\": 3, "
           "\"images\": 12, \"name1\": \"a\", \"name2\": \"b\"}]}]}");
   folder_.Write("sparse/summary.json",
                 R"({"models": [

@@ -22,15 +22,15 @@ TestScene BuildScene(uint64_t seed) {
   return BuildTestScene(options, seed);
 }
 
-VisualSteps AddSteps(const TestScene& scene,
-                     const std::vector<RelativePosePrior>& priors = {}) {
-  return AddVisualSteps(VisualStepOptions(), EdgeLengthOptions(), scene.graph,
-                        scene.correspondences, {}, priors);
+VisualOdometryEdges AddSteps(
+    const TestScene& scene, const std::vector<RelativePosePrior>& priors = {}) {
+  return AddVisualOdometry(VisualOdometryOptions(), EdgeLengthOptions(),
+                           scene.graph, scene.correspondences, {}, priors);
 }
 
-int Reject(const TestScene& scene, VisualSteps* steps,
+int Reject(const TestScene& scene, VisualOdometryEdges* steps,
            size_t num_sensor_priors = 0) {
-  return RejectVisualOdometry(VisualStepOptions(), LoopClosureOptions(),
+  return RejectVisualOdometry(VisualOdometryOptions(), LoopClosureOptions(),
                               OdometryChainOptions(), scene.graph,
                               num_sensor_priors, steps);
 }
@@ -43,7 +43,7 @@ void Turn(double angle_rad, ViewGraphEdge* edge) {
 TEST(RejectVisualOdometry, ASequenceKeepsAll) {
   for (uint64_t seed = 1; seed <= 5; ++seed) {
     const TestScene scene = BuildScene(seed);
-    VisualSteps steps = AddSteps(scene);
+    VisualOdometryEdges steps = AddSteps(scene);
     ASSERT_EQ(steps.priors.size(), kNumImages - 1);
     EXPECT_EQ(Reject(scene, &steps), 0) << "seed " << seed;
     EXPECT_EQ(steps.priors.size(), kNumImages - 1);
@@ -59,7 +59,7 @@ TEST(RejectVisualOdometry, ContradictedOdometryGoes) {
       const image_t gap = edge.image_id2 - edge.image_id1;
       if (gap > 1 && random.Uniform(0.0, 1.0) < 0.2) Turn(0.4, &edge);
     }
-    VisualSteps steps = AddSteps(scene);
+    VisualOdometryEdges steps = AddSteps(scene);
     EXPECT_EQ(Reject(scene, &steps), kNumImages - 1) << "seed " << seed;
     EXPECT_TRUE(steps.priors.empty());
     // Odometry of sensors stays, whatever vision says.
@@ -73,7 +73,7 @@ TEST(RejectVisualOdometry, ContradictedOdometryGoes) {
 TEST(RejectVisualOdometry, EachRunIsJudgedByItsOwnPairs) {
   for (uint64_t seed = 1; seed <= 5; ++seed) {
     TestScene scene = BuildScene(seed);
-    VisualSteps steps = AddSteps(scene);
+    VisualOdometryEdges steps = AddSteps(scene);
     const auto sensor = std::find_if(
         steps.priors.begin(), steps.priors.end(),
         [](const RelativePosePrior& prior) { return prior.image_id1 == 12; });

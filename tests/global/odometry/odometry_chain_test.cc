@@ -75,12 +75,12 @@ TEST(OdometryChain, BreaksWherePriorsAreMissing) {
 
 TEST(OdometryChain, FollowersHaveTheirLeadersPlace) {
   Random random(1);
-  const Rigid3d mount(ExpSo3(Eigen::Vector3d(0.1, -1.2, 0.2)),
-                      Eigen::Vector3d(-0.5, 0.1, 0.2));
+  const Rigid3d cam_from_rig(ExpSo3(Eigen::Vector3d(0.1, -1.2, 0.2)),
+                             Eigen::Vector3d(-0.5, 0.1, 0.2));
   std::vector<RelativePosePrior> priors, frame_priors;
   for (int k = 1; k < 10; ++k) {
     priors.push_back(BuildPrior(k, k + 1, TrueStep(k), 1e-3, 0.02, &random));
-    frame_priors.push_back(BuildPrior(k, 100 + k, mount, 0, 0, &random));
+    frame_priors.push_back(BuildPrior(k, 100 + k, cam_from_rig, 0, 0, &random));
     frame_priors.back().covariance.setIdentity();
     frame_priors.back().covariance *= 1e-6;
   }
@@ -91,22 +91,23 @@ TEST(OdometryChain, FollowersHaveTheirLeadersPlace) {
   EXPECT_EQ(chain.Index(103), chain.Index(3));
   EXPECT_EQ(chain.NumSteps(103, 8), 5);
   EXPECT_EQ(chain.NumSteps(3, 103), 0);
-  EXPECT_TRUE(PosesNear(chain.CamFromStart(108), mount * chain.CamFromStart(8),
-                        1e-9, 1e-9));
+  EXPECT_TRUE(PosesNear(chain.CamFromStart(108),
+                        cam_from_rig * chain.CamFromStart(8), 1e-9, 1e-9));
   const ChainMotion followers = chain.Motion(103, 108);
   EXPECT_TRUE(followers.has_rotation);
   EXPECT_TRUE(followers.has_position);
-  EXPECT_TRUE(PosesNear(followers.cam2_from_cam1,
-                        mount * leaders.cam2_from_cam1 * mount.Inverse(), 1e-9,
-                        1e-9));
-  // The mounts' errors of 1 mrad come to the odometry's.
+  EXPECT_TRUE(
+      PosesNear(followers.cam2_from_cam1,
+                cam_from_rig * leaders.cam2_from_cam1 * cam_from_rig.Inverse(),
+                1e-9, 1e-9));
+  // The extrinsics' errors of 1 mrad come to the odometry's.
   const auto rotation_variance = [](const ChainMotion& motion) {
     return Eigen::Matrix3d(motion.covariance.topLeftCorner<3, 3>()).trace();
   };
   EXPECT_NEAR(rotation_variance(followers),
               rotation_variance(leaders) + 2 * 3e-6, 1e-12);
   const ChainMotion within = chain.Motion(3, 103);
-  EXPECT_TRUE(PosesNear(within.cam2_from_cam1, mount, 1e-9, 1e-9));
+  EXPECT_TRUE(PosesNear(within.cam2_from_cam1, cam_from_rig, 1e-9, 1e-9));
   EXPECT_TRUE(within.covariance.isApprox(frame_priors[0].covariance, 1e-9));
 }
 
@@ -173,14 +174,14 @@ TEST(OdometryChain, CovarianceAgreesWithMonteCarlo) {
 }
 
 // Turns that vision has found are taken out, and the rest of them has the
-// spread of their covariance: a drive up a helix, whose priors have the mount
-// and the direction of driving wrong together.
-TEST(OdometryChain, SharedTurnsAgreeWithMonteCarlo) {
+// spread of their covariance: a drive up a helix, whose priors have the
+// rotation and the direction of driving wrong together.
+TEST(OdometryChain, SharedErrorsAgreeWithMonteCarlo) {
   constexpr int kNumSteps = 120;
   constexpr int kNumDraws = 1500;
   Random random(11);
-  SharedTurns found;
-  found.mount_rad = Eigen::Vector3d(0.01, -0.02, 0.005);
+  SharedRotationErrors found;
+  found.camera_imu_rad = Eigen::Vector3d(0.01, -0.02, 0.005);
   found.driving_direction_rad = Eigen::Vector3d(-0.015, 0.01, 0.02);
   Matrix6d root = Matrix6d::Zero();
   for (int k = 0; k < 36; ++k) root(k / 6, k % 6) = random.Gaussian(0.001);
@@ -200,22 +201,22 @@ TEST(OdometryChain, SharedTurnsAgreeWithMonteCarlo) {
   }
   const ChainMotion expected = OdometryChain(truth, options).Motion(11, 111);
   // Priors that these turns make true.
-  const auto turn_away = [&](const Eigen::Vector3d& mount_rad,
+  const auto turn_away = [&](const Eigen::Vector3d& camera_imu_rad,
                              const Eigen::Vector3d& driving_rad) {
     std::vector<RelativePosePrior> priors = truth;
-    const Eigen::Quaterniond mount = ExpSo3(mount_rad);
+    const Eigen::Quaterniond camera_imu = ExpSo3(camera_imu_rad);
     for (RelativePosePrior& prior : priors) {
       Rigid3d& motion = prior.cam2_from_cam1;
       const Eigen::Quaterniond middle = ExpSo3(0.5 * LogSo3(motion.rotation));
       motion.translation = ExpSo3(middle * -driving_rad) * motion.translation;
-      motion.rotation = mount.conjugate() * motion.rotation * mount;
+      motion.rotation = camera_imu.conjugate() * motion.rotation * camera_imu;
     }
     return priors;
   };
-  options.shared_turns = found;
+  options.shared_rotation_errors = found;
   const ChainMotion stated =
-      OdometryChain(turn_away(found.mount_rad, found.driving_direction_rad),
-                    options)
+      OdometryChain(
+          turn_away(found.camera_imu_rad, found.driving_direction_rad), options)
           .Motion(11, 111);
   EXPECT_TRUE(
       PosesNear(stated.cam2_from_cam1, expected.cam2_from_cam1, 1e-9, 1e-9));
@@ -225,7 +226,7 @@ TEST(OdometryChain, SharedTurnsAgreeWithMonteCarlo) {
     normal << random.GaussianVector(1.0), random.GaussianVector(1.0);
     const Eigen::Matrix<double, 6, 1> drawn = root * normal;
     std::vector<RelativePosePrior> priors =
-        turn_away(found.mount_rad + drawn.head<3>(),
+        turn_away(found.camera_imu_rad + drawn.head<3>(),
                   found.driving_direction_rad + drawn.tail<3>());
     for (RelativePosePrior& prior : priors) {
       Rigid3d& step = prior.cam2_from_cam1;

@@ -13,10 +13,10 @@
 namespace adasfm {
 namespace {
 
-std::vector<Track> BuildTracks(
+std::vector<Track> FindTracks(
     const TrackOptions& options,
     const std::map<ImagePair, std::vector<FeatureMatch>>& matches) {
-  return SelectTracks(options, JoinMatches(options, matches));
+  return SelectTracks(options, BuildTracks(options, matches));
 }
 
 // Images 1 2 3; keypoint 0 everywhere is one point, and a wrong match would
@@ -27,16 +27,16 @@ TEST(BuildTracks, KeepsOneKeypointPerImage) {
   matches[ImagePair(1, 2)] = {{0, 0}, {1, 1}, {2, 2}};
   matches[ImagePair(1, 3)] = {{0, 0}, {1, 1}};
   matches[ImagePair(2, 3)] = {{0, 5}};
-  const std::vector<Track> tracks = BuildTracks(TrackOptions(), matches);
+  const std::vector<Track> tracks = FindTracks(TrackOptions(), matches);
   ASSERT_EQ(tracks.size(), 2);
   EXPECT_EQ(tracks[0], (Track{{1, 0}, {2, 0}, {3, 0}}));
   EXPECT_EQ(tracks[1], (Track{{1, 1}, {2, 1}, {3, 1}}));
   TrackOptions options;
   options.min_track_length = 2;
-  EXPECT_EQ(BuildTracks(options, matches).size(), 3);
+  EXPECT_EQ(FindTracks(options, matches).size(), 3);
   options = TrackOptions();
   options.min_num_tracks_per_image = 1;
-  EXPECT_EQ(BuildTracks(options, matches).size(), 1);
+  EXPECT_EQ(FindTracks(options, matches).size(), 1);
 }
 
 TEST(BuildTracks, ShortensLongTracksEvenly) {
@@ -51,7 +51,7 @@ TEST(BuildTracks, ShortensLongTracksEvenly) {
   for (const int max_length : {3, 4, 12, 39, 40, 50}) {
     TrackOptions options;
     options.max_track_length = max_length;
-    const std::vector<Track> tracks = BuildTracks(options, matches);
+    const std::vector<Track> tracks = FindTracks(options, matches);
     ASSERT_EQ(tracks.size(), kNumTracks);
     std::map<image_t, int> num_tracks;
     const int length = std::min(max_length, kNumImages);
@@ -90,7 +90,7 @@ TEST(EstimateTrackBytes, CoversTheTracksAndGrowsWithTheMatches) {
     size_t num_bytes = 0;
     TrackOptions options;
     options.min_track_length = 2;
-    for (const Track& track : BuildTracks(options, matches)) {
+    for (const Track& track : FindTracks(options, matches)) {
       num_bytes += sizeof(Track) + track.capacity() * sizeof(TrackElement);
     }
     EXPECT_GT(estimate, num_bytes);

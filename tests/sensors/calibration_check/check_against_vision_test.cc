@@ -49,7 +49,7 @@ TEST(CheckAgainstVision, HalvedTurnsAreNoClockShift) {
       }
     }
     const VisionCheck check =
-        CheckAgainstVision(vision, imu, SensorCalibration(), {});
+        CheckAgainstVision(vision, imu, SensorCalibration());
     EXPECT_FALSE(check.contradiction_is_time_shift) << check.contradiction;
     EXPECT_NE(check.contradiction.find("focal length"), std::string::npos)
         << "seed " << seed << ": " << check.contradiction;

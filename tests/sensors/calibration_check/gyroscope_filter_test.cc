@@ -125,7 +125,7 @@ TEST(GyroscopeFilter, IsFoundFromVision) {
     Wobble wobble(seed);
     const std::vector<TimedRotation> vision = wobble.Vision(2e-4);
     const VisionCheck check = CheckAgainstVision(
-        vision, wobble.Log(filter, 1e-3), SensorCalibration(), {});
+        vision, wobble.Log(filter, 1e-3), SensorCalibration());
     ASSERT_GT(check.filter.lag_s, 0.0) << "seed " << seed;
     const double lag_error = check.filter.lag_s - filter.lag_s;
     lags += lag_error;
@@ -151,8 +151,8 @@ TEST(GyroscopeFilter, IsNotFoundWhereThereIsNone) {
     calibration.cam_from_imu.rotation =
         ExpSo3(random.GaussianVector(DegToRad(0.5)));
     const std::vector<TimedRotation> vision = wobble.Vision(2e-4);
-    const VisionCheck check = CheckAgainstVision(
-        vision, wobble.Log({0.0, 0.025}, 1e-3), calibration, {});
+    const VisionCheck check =
+        CheckAgainstVision(vision, wobble.Log({0.0, 0.025}, 1e-3), calibration);
     EXPECT_TRUE(check.is_conclusive);
     EXPECT_NEAR(check.time_shift_correction_s, 0.025, 0.003);
     EXPECT_EQ(check.filter.lag_s, 0.0) << "seed " << seed;

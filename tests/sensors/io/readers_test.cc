@@ -314,7 +314,7 @@ TEST_F(Readers, CalibrationOfARig) {
                             "  timeshift_cam_imu: 0.0625\n"
                             "cam2:\n  resolution: [800, 500]\n"));
   ASSERT_TRUE(rig.ok()) << rig.status().message();
-  // cam2 has no mount.
+  // cam2 has no extrinsics.
   ASSERT_EQ(rig->other_cams_from_imu.size(), 1u);
   EXPECT_EQ(rig->other_cams_from_imu[0].translation.x(), -0.4);
   EXPECT_TRUE(ReadSensorCalibration(Write("one.yaml", kCalibration))

@@ -197,15 +197,5 @@ TEST(PreintegrateImu, RefusesTimesOutsideTheLog) {
                std::invalid_argument);
 }
 
-TEST(CoversInterval, SeesGapsInsideOnly) {
-  std::vector<ImuSample> samples = Sample(Motion(), 100.0, 1.0);
-  samples.erase(samples.begin() + 50, samples.begin() + 70);
-  EXPECT_TRUE(CoversInterval(samples, 0, 490'000'000, 0.1));
-  EXPECT_FALSE(CoversInterval(samples, 0, 500'000'000, 0.1));
-  EXPECT_FALSE(CoversInterval(samples, 550'000'000, 600'000'000, 0.1));
-  EXPECT_TRUE(CoversInterval(samples, 700'000'000, 1'000'000'000, 0.1));
-  EXPECT_FALSE(CoversInterval(samples, 0, 1'000'000'001, 0.1));
-}
-
 }  // namespace
 }  // namespace adasfm

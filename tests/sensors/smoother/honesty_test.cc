@@ -55,7 +55,7 @@ Dataset SpoiltDataset(const SyntheticWorld& world, const Mismatch& mismatch,
   Random random(seed);
   AddRinging(mismatch, random.Uniform(0.0, 2.0 * kPi),
              world.options.standstill_s, &data);
-  const double keep = std::exp(-1.0 / world.options.wheel_rate_hz);
+  const double keep = std::exp(-1.0 / kSyntheticWheelRateHz);
   double slow_error = random.Gaussian(mismatch.slow_wheel_error);
   for (WheelSample& sample : data.logs.wheel) {
     sample.timestamp_ns += std::llround(1e9 * mismatch.wheel_delay_s);

@@ -15,8 +15,8 @@
 namespace adasfm {
 namespace {
 
-void WriteMounting(const SensorCalibration& calibration, timestamp_t time_ns,
-                   BagWriter* bag) {
+void WriteExtrinsics(const SensorCalibration& calibration, timestamp_t time_ns,
+                     BagWriter* bag) {
   const Rigid3d imu_from_cam = calibration.cam_from_imu.Inverse();
   bag->Write("/tf_static", "tf2_msgs/msg/TFMessage", time_ns,
              TransformMessage({time_ns, "imu_link"}, "camera_optical",
@@ -91,8 +91,8 @@ void WriteDriveBag(const std::string& folder, const std::string& bag_path,
           .as<std::vector<double>>();
   BagWriter bag(bag_path, options.writer);
   const std::vector<ImuSample> imu = ReadImu(folder + "/imu.csv").value();
-  if (options.has_mounting) {
-    WriteMounting(calibration, imu[0].timestamp_ns, &bag);
+  if (options.has_extrinsics) {
+    WriteExtrinsics(calibration, imu[0].timestamp_ns, &bag);
   }
   for (const ImuSample& sample : imu) {
     for (const char* topic : {"/imu", "/imu/raw"}) {

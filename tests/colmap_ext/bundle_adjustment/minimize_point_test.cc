@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "colmap_ext/bundle_adjustment/settle_point.h"
+#include "colmap_ext/bundle_adjustment/minimize_point.h"
 
 #include <ceres/ceres.h>
 #include <gtest/gtest.h>
@@ -48,9 +48,9 @@ struct SeenPoint {
   }
 
   double Cost(const ceres::LossFunction* loss, Eigen::Vector3d point) const {
-    SettlePointOptions options;
+    MinimizePointOptions options;
     options.max_num_iterations = 0;
-    return SettlePoint(options, Observations(), loss, &point);
+    return MinimizePoint(options, Observations(), loss, &point);
   }
 
   Eigen::Vector3d truth;
@@ -80,9 +80,9 @@ double SolveWithCeres(const SeenPoint& seen, ceres::LossFunction* loss,
   return summary.final_cost;
 }
 
-TEST(SettlePointTest, FindsTheMinimumOfCeres) {
+TEST(MinimizePointTest, FindsTheMinimumOfCeres) {
   ceres::CauchyLoss cauchy(4.0);
-  SettlePointOptions options;
+  MinimizePointOptions options;
   options.function_tolerance = 1e-12;
   for (ceres::LossFunction* loss :
        {static_cast<ceres::LossFunction*>(nullptr),
@@ -96,7 +96,7 @@ TEST(SettlePointTest, FindsTheMinimumOfCeres) {
       const double expected_cost = SolveWithCeres(seen, loss, &expected);
       Eigen::Vector3d point = start;
       const double cost =
-          SettlePoint(options, seen.Observations(), loss, &point);
+          MinimizePoint(options, seen.Observations(), loss, &point);
       EXPECT_NEAR(cost, expected_cost, 1e-9 * expected_cost);
       EXPECT_NEAR(cost, seen.Cost(loss, point), 1e-12 * cost);
       // A hundredth of what these points err by, 0.16 m on average (RMS).
@@ -107,9 +107,9 @@ TEST(SettlePointTest, FindsTheMinimumOfCeres) {
 
 // Where observations are of two points, steps are short, but lead to a minimum:
 // no place nearby costs less.
-TEST(SettlePointTest, EndsAtAMinimumOfContradictingObservations) {
+TEST(MinimizePointTest, EndsAtAMinimumOfContradictingObservations) {
   ceres::CauchyLoss cauchy(4.0);
-  SettlePointOptions options;
+  MinimizePointOptions options;
   options.max_num_iterations = 200;
   options.function_tolerance = 1e-10;
   for (uint64_t seed = 1; seed <= 20; ++seed) {
@@ -118,7 +118,7 @@ TEST(SettlePointTest, EndsAtAMinimumOfContradictingObservations) {
     Eigen::Vector3d point = seen.truth;
     const double start_cost = seen.Cost(&cauchy, point);
     const double cost =
-        SettlePoint(options, seen.Observations(), &cauchy, &point);
+        MinimizePoint(options, seen.Observations(), &cauchy, &point);
     EXPECT_LT(cost, start_cost);
     Random random(seed);
     for (int k = 0; k < 100; ++k) {
@@ -128,23 +128,23 @@ TEST(SettlePointTest, EndsAtAMinimumOfContradictingObservations) {
   }
 }
 
-TEST(SettlePointTest, LeavesWhatItCannotImprove) {
+TEST(MinimizePointTest, LeavesWhatItCannotImprove) {
   const SeenPoint seen(1);
-  SettlePointOptions options;
+  MinimizePointOptions options;
   Eigen::Vector3d point = seen.truth;
-  EXPECT_GT(SettlePoint(options, seen.Observations(), nullptr, &point), 0.0);
+  EXPECT_GT(MinimizePoint(options, seen.Observations(), nullptr, &point), 0.0);
   Eigen::Vector3d again = point;
-  SettlePoint(options, seen.Observations(), nullptr, &again);
+  MinimizePoint(options, seen.Observations(), nullptr, &again);
   EXPECT_EQ(again, point);
 
   // One ray has no depth; behind all cameras nothing pulls.
   BundleProblem::ObservationRange one = seen.Observations();
   one.last = one.first + 1;
-  SettlePoint(options, one, nullptr, &point);
+  MinimizePoint(options, one, nullptr, &point);
   EXPECT_TRUE(point.allFinite());
   const Eigen::Vector3d behind(0.0, 0.0, -20.0);
   point = behind;
-  SettlePoint(options, seen.Observations(), nullptr, &point);
+  MinimizePoint(options, seen.Observations(), nullptr, &point);
   EXPECT_EQ(point, behind);
 }
 

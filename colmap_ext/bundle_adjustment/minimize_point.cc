@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "colmap_ext/bundle_adjustment/settle_point.h"
+#include "colmap_ext/bundle_adjustment/minimize_point.h"
 
 #include <Eigen/LU>
 
@@ -32,9 +32,9 @@ PointEquations Linearize(const BundleProblem::ObservationRange& observations,
 
 }  // namespace
 
-double SettlePoint(const SettlePointOptions& options,
-                   const BundleProblem::ObservationRange& observations,
-                   const ceres::LossFunction* loss, Eigen::Vector3d* point) {
+double MinimizePoint(const MinimizePointOptions& options,
+                     const BundleProblem::ObservationRange& observations,
+                     const ceres::LossFunction* loss, Eigen::Vector3d* point) {
   PointEquations equations = Linearize(observations, loss, *point);
   for (int i = 0; i < options.max_num_iterations; ++i) {
     const Eigen::Vector3d step =

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "global/calibration/correct_camera_mount.h"
+#include "global/calibration/correct_camera_imu_rotation.h"
 
 #include <gtest/gtest.h>
 
@@ -20,7 +20,7 @@ struct Drive {
 
 struct DriveOptions {
   // The true camera from the stated one.
-  Eigen::Vector3d mount_deg = Eigen::Vector3d::Zero();
+  Eigen::Vector3d camera_imu_deg = Eigen::Vector3d::Zero();
   // Largest turn of a step.
   double turn_rad = 0.05;
   double noise_px = 0.5;
@@ -55,7 +55,7 @@ Drive BuildDrive(const DriveOptions& options, uint64_t seed) {
   std::vector<Rigid3d> poses = {Rigid3d()};
   drive.graph.images = {1};
   const Eigen::Quaterniond stated_from_true =
-      ExpSo3(-DegToRad(1.0) * options.mount_deg);
+      ExpSo3(-DegToRad(1.0) * options.camera_imu_deg);
   for (int k = 1; k < options.num_images; ++k) {
     const Rigid3d step(
         ExpSo3(Eigen::Vector3d(0, options.turn_rad * std::sin(0.1 * k), 0)),
@@ -63,7 +63,7 @@ Drive BuildDrive(const DriveOptions& options, uint64_t seed) {
     poses.push_back(step * poses.back());
     drive.graph.images.push_back(k + 1);
     drive.priors.push_back(BuildPrior(k, k + 1, step, 2e-4, 5e-3, &random));
-    TurnPrior(stated_from_true, &drive.priors.back());
+    RotatePrior(stated_from_true, &drive.priors.back());
     if (!options.has_positions) drive.priors.back().flags = kPriorRotation;
   }
   for (int i = 0; i < options.num_images; ++i) {
@@ -99,34 +99,38 @@ void TurnDirections(const Eigen::Vector3d& turn, Drive* drive) {
   }
 }
 
-CameraMountReport Correct(Drive* drive, const CameraMountOptions& options) {
-  return CorrectCameraMount(
+CameraImuRotationReport Correct(Drive* drive,
+                                const CameraImuRotationOptions& options) {
+  return CorrectCameraImuRotation(
       options, OdometryChain(drive->priors, WithoutSharedErrors({})),
       drive->graph, drive->correspondences, &drive->priors);
 }
 
-double ErrorDeg(const CameraMountReport& report, const Eigen::Vector3d& truth) {
-  return RadToDeg(
-      AngleBetweenRad(ExpSo3(report.turn_rad), ExpSo3(DegToRad(1.0) * truth)));
+double ErrorDeg(const CameraImuRotationReport& report,
+                const Eigen::Vector3d& truth) {
+  return RadToDeg(AngleBetweenRad(ExpSo3(report.rotation_rad),
+                                  ExpSo3(DegToRad(1.0) * truth)));
 }
 
-TEST(CorrectCameraMount, FindsTheTurnAboutAllAxes) {
+TEST(CorrectCameraImuRotation, FindsTheTurnAboutAllAxes) {
   for (uint64_t seed = 1; seed <= 4; ++seed) {
     DriveOptions options;
-    options.mount_deg = Eigen::Vector3d(0.6, -1.0, 1.5);
+    options.camera_imu_deg = Eigen::Vector3d(0.6, -1.0, 1.5);
     Drive drive = BuildDrive(options, seed);
     const Drive stated = drive;
-    const CameraMountReport report = Correct(&drive, CameraMountOptions());
+    const CameraImuRotationReport report =
+        Correct(&drive, CameraImuRotationOptions());
     ASSERT_TRUE(report.corrected) << "seed " << seed;
     // The steps' 5e-3 of direction, mostly persistent, is 0.29 deg for one step
     // and a tenth of it for 120; turns of 0.05 know the roll to 1e-3 / 0.1 for
     // one pair and a twentieth of it for all.
-    EXPECT_LT(ErrorDeg(report, options.mount_deg), 0.15) << "seed " << seed;
-    EXPECT_LT(ErrorDeg(report, options.mount_deg),
+    EXPECT_LT(ErrorDeg(report, options.camera_imu_deg), 0.15)
+        << "seed " << seed;
+    EXPECT_LT(ErrorDeg(report, options.camera_imu_deg),
               4.0 * RadToDeg(report.sigma_rad));
     for (size_t k = 0; k < drive.priors.size(); ++k) {
       RelativePosePrior expected = stated.priors[k];
-      TurnPrior(ExpSo3(report.turn_rad), &expected);
+      RotatePrior(ExpSo3(report.rotation_rad), &expected);
       EXPECT_EQ(expected.cam2_from_cam1.translation,
                 drive.priors[k].cam2_from_cam1.translation);
       EXPECT_EQ(expected.covariance, drive.priors[k].covariance);
@@ -134,11 +138,12 @@ TEST(CorrectCameraMount, FindsTheTurnAboutAllAxes) {
   }
 }
 
-TEST(CorrectCameraMount, LeavesARightMountAsItIs) {
+TEST(CorrectCameraImuRotation, LeavesARightRotationAsItIs) {
   for (uint64_t seed = 1; seed <= 8; ++seed) {
     Drive drive = BuildDrive(DriveOptions(), seed);
     const Drive before = drive;
-    const CameraMountReport report = Correct(&drive, CameraMountOptions());
+    const CameraImuRotationReport report =
+        Correct(&drive, CameraImuRotationOptions());
     EXPECT_FALSE(report.corrected) << "seed " << seed;
     EXPECT_LT(report.chi2, 16.0) << "seed " << seed;
     for (size_t k = 0; k < drive.priors.size(); ++k) {
@@ -149,52 +154,55 @@ TEST(CorrectCameraMount, LeavesARightMountAsItIs) {
 }
 
 // Straight ahead nothing tells the roll: it stays zero, the others are found.
-TEST(CorrectCameraMount, KeepsWhatAStraightRoadDoesNotTellAtZero) {
+TEST(CorrectCameraImuRotation, KeepsWhatAStraightRoadDoesNotTellAtZero) {
   DriveOptions options;
-  options.mount_deg = Eigen::Vector3d(0.6, -1.0, 1.5);
+  options.camera_imu_deg = Eigen::Vector3d(0.6, -1.0, 1.5);
   options.turn_rad = 0.0;
   Drive drive = BuildDrive(options, 1);
-  const CameraMountReport report = Correct(&drive, CameraMountOptions());
+  const CameraImuRotationReport report =
+      Correct(&drive, CameraImuRotationOptions());
   ASSERT_TRUE(report.corrected);
-  EXPECT_NEAR(RadToDeg(report.turn_rad.z()), 0.0, 0.1);
-  EXPECT_NEAR(RadToDeg(report.turn_rad.x()), 0.6, 0.15);
-  EXPECT_NEAR(RadToDeg(report.turn_rad.y()), -1.0, 0.15);
+  EXPECT_NEAR(RadToDeg(report.rotation_rad.z()), 0.0, 0.1);
+  EXPECT_NEAR(RadToDeg(report.rotation_rad.x()), 0.6, 0.15);
+  EXPECT_NEAR(RadToDeg(report.rotation_rad.y()), -1.0, 0.15);
 }
 
 // Without wheels the axis of the turns remains.
-TEST(CorrectCameraMount, SeesTheAxisOfTurnsWithoutPositions) {
+TEST(CorrectCameraImuRotation, SeesTheAxisOfTurnsWithoutPositions) {
   DriveOptions options;
-  options.mount_deg = Eigen::Vector3d(2.0, 0.0, -3.0);
+  options.camera_imu_deg = Eigen::Vector3d(2.0, 0.0, -3.0);
   options.has_positions = false;
   Drive drive = BuildDrive(options, 1);
-  const CameraMountReport report = Correct(&drive, CameraMountOptions());
+  const CameraImuRotationReport report =
+      Correct(&drive, CameraImuRotationOptions());
   ASSERT_TRUE(report.corrected);
-  EXPECT_LT(ErrorDeg(report, options.mount_deg), 0.6);
+  EXPECT_LT(ErrorDeg(report, options.camera_imu_deg), 0.6);
 }
 
-TEST(CorrectCameraMount, OptionsDecide) {
+TEST(CorrectCameraImuRotation, OptionsDecide) {
   DriveOptions options;
-  options.mount_deg = Eigen::Vector3d(0.0, 0.7, 0.0);
+  options.camera_imu_deg = Eigen::Vector3d(0.0, 0.7, 0.0);
   const Drive drive = BuildDrive(options, 3);
-  const auto correct = [&](const CameraMountOptions& changed) {
+  const auto correct = [&](const CameraImuRotationOptions& changed) {
     Drive copy = drive;
     return Correct(&copy, changed);
   };
-  const CameraMountReport report = correct(CameraMountOptions());
+  const CameraImuRotationReport report = correct(CameraImuRotationOptions());
   EXPECT_TRUE(report.corrected);
-  CameraMountOptions changed;
+  CameraImuRotationOptions changed;
   changed.enabled = false;
   EXPECT_FALSE(correct(changed).corrected);
-  changed = CameraMountOptions();
+  changed = CameraImuRotationOptions();
   changed.min_num_sigmas = 50.0;
   EXPECT_FALSE(correct(changed).corrected);
-  changed = CameraMountOptions();
+  changed = CameraImuRotationOptions();
   changed.min_sigma_deg = 0.5;
   EXPECT_FALSE(correct(changed).corrected);
-  changed = CameraMountOptions();
+  changed = CameraImuRotationOptions();
   changed.sigma_deg = 0.01;
-  EXPECT_LT(correct(changed).turn_rad.norm(), 0.2 * report.turn_rad.norm());
-  changed = CameraMountOptions();
+  EXPECT_LT(correct(changed).rotation_rad.norm(),
+            0.2 * report.rotation_rad.norm());
+  changed = CameraImuRotationOptions();
   changed.max_num_steps = 2;
   EXPECT_LT(correct(changed).num_pairs, 0.5 * report.num_pairs);
   std::string error;
@@ -203,47 +211,49 @@ TEST(CorrectCameraMount, OptionsDecide) {
   EXPECT_NE(error.find("max_num_steps"), std::string::npos);
 }
 
-// The direction of driving is wrong and the mount is not, or both are: bends
-// about one axis cannot tell the yaw of the one from that of the other, and the
-// sigma says so. Of 24 seeds 4 beyond 3 sigmas have a probability of 1e-6 where
-// the sigmas are right.
-TEST(CorrectCameraMount, SharesTheBlameWithTheDirectionOfDriving) {
-  for (const double mount_sigma_deg : {0.0, 1.0}) {
+// The direction of driving is wrong and the camera-IMU rotation is not, or both
+// are: bends about one axis cannot tell the yaw of the one from that of the
+// other, and the sigma says so. Of 24 seeds 4 beyond 3 sigmas have a
+// probability of 1e-6 where the sigmas are right.
+TEST(CorrectCameraImuRotation, SharesTheBlameWithTheDirectionOfDriving) {
+  for (const double camera_imu_sigma_deg : {0.0, 1.0}) {
     int num_failures = 0;
     for (uint64_t seed = 1; seed <= 24; ++seed) {
       Random random(100 + seed);
       DriveOptions options;
-      options.mount_deg = random.GaussianVector(mount_sigma_deg);
+      options.camera_imu_deg = random.GaussianVector(camera_imu_sigma_deg);
       Drive drive = BuildDrive(options, seed);
       // 1 sigma of what the odometry chain grants the direction.
       const Eigen::Vector3d turn = random.GaussianVector(0.01);
       TurnDirections(turn, &drive);
-      const CameraMountReport report = Correct(&drive, CameraMountOptions());
+      const CameraImuRotationReport report =
+          Correct(&drive, CameraImuRotationOptions());
       // Of the angle: along its axis.
-      const double error = report.turn_rad.normalized().dot(
-          report.turn_rad - DegToRad(1.0) * options.mount_deg);
+      const double error = report.rotation_rad.normalized().dot(
+          report.rotation_rad - DegToRad(1.0) * options.camera_imu_deg);
       num_failures += std::abs(error) > 3.0 * report.sigma_rad;
       // A direction that is wrong is no reason to report a tiny turn.
-      const CameraMountOptions limits;
+      const CameraImuRotationOptions limits;
       EXPECT_TRUE(!report.corrected ||
-                  RadToDeg(report.turn_rad.norm()) >=
+                  RadToDeg(report.rotation_rad.norm()) >=
                       limits.min_num_sigmas * limits.min_sigma_deg)
           << "seed " << seed;
     }
-    EXPECT_LE(num_failures, 3) << "mount " << mount_sigma_deg;
+    EXPECT_LE(num_failures, 3)
+        << "camera-IMU rotation " << camera_imu_sigma_deg;
   }
 }
 
 // What is left of both in the priors, by the frames that they were made with.
-Eigen::Matrix<double, 6, 1> LeftInPriors(const CameraMountReport& report,
-                                         const Eigen::Vector3d& mount_deg,
+Eigen::Matrix<double, 6, 1> LeftInPriors(const CameraImuRotationReport& report,
+                                         const Eigen::Vector3d& camera_imu_deg,
                                          const Eigen::Vector3d& driving) {
-  const Eigen::Quaterniond mount = ExpSo3(DegToRad(1.0) * mount_deg);
+  const Eigen::Quaterniond error = ExpSo3(DegToRad(1.0) * camera_imu_deg);
   const Eigen::Quaterniond corrected = ExpSo3(
-      report.corrected ? report.turn_rad : Eigen::Vector3d(0.0, 0.0, 0.0));
+      report.corrected ? report.rotation_rad : Eigen::Vector3d(0.0, 0.0, 0.0));
   Eigen::Matrix<double, 6, 1> left;
-  left << LogSo3(mount * corrected.conjugate()),
-      LogSo3(mount * ExpSo3(-driving) * corrected.conjugate());
+  left << LogSo3(error * corrected.conjugate()),
+      LogSo3(error * ExpSo3(-driving) * corrected.conjugate());
   return left;
 }
 
@@ -251,24 +261,25 @@ Eigen::Matrix<double, 6, 1> LeftInPriors(const CameraMountReport& report,
 // seeds 4 beyond the chi-square of 6 degrees of freedom that 3 in 1,000 exceed
 // have a probability of 1e-6. And it says more than was known before: how far
 // from the plane of its turns the machine drives.
-TEST(CorrectCameraMount, TellsWhatIsLeftInThePriors) {
+TEST(CorrectCameraImuRotation, TellsWhatIsLeftInThePriors) {
   constexpr double kChi2 = 20.06;
   constexpr double kDrivingSigmaRad = 0.01;
-  for (const double mount_sigma_deg : {0.0, 0.3, 1.0}) {
+  for (const double camera_imu_sigma_deg : {0.0, 0.3, 1.0}) {
     int num_failures = 0;
     for (uint64_t seed = 1; seed <= 24; ++seed) {
       Random random(300 + seed);
       DriveOptions options;
-      options.mount_deg = random.GaussianVector(mount_sigma_deg);
+      options.camera_imu_deg = random.GaussianVector(camera_imu_sigma_deg);
       Drive drive = BuildDrive(options, seed);
       const Eigen::Vector3d driving = random.GaussianVector(kDrivingSigmaRad);
       TurnDirections(driving, &drive);
-      const CameraMountReport report = Correct(&drive, CameraMountOptions());
+      const CameraImuRotationReport report =
+          Correct(&drive, CameraImuRotationOptions());
       ASSERT_TRUE(report.left_in_priors.has_value());
-      const SharedTurns& found = *report.left_in_priors;
+      const SharedRotationErrors& found = *report.left_in_priors;
       Eigen::Matrix<double, 6, 1> error =
-          LeftInPriors(report, options.mount_deg, driving);
-      error.head<3>() -= found.mount_rad;
+          LeftInPriors(report, options.camera_imu_deg, driving);
+      error.head<3>() -= found.camera_imu_rad;
       error.tail<3>() -= found.driving_direction_rad;
       num_failures += error.dot(found.covariance.ldlt().solve(error)) > kChi2;
       // The turns are about y: x is the climb.
@@ -279,23 +290,24 @@ TEST(CorrectCameraMount, TellsWhatIsLeftInThePriors) {
                 0.3 * kDrivingSigmaRad)
           << "seed " << seed;
     }
-    EXPECT_LE(num_failures, 3) << "mount " << mount_sigma_deg;
+    EXPECT_LE(num_failures, 3)
+        << "camera-IMU rotation " << camera_imu_sigma_deg;
   }
 }
 
-TEST(CorrectCameraMount, SaysNothingOfDirectionsThatPriorsDoNotHave) {
+TEST(CorrectCameraImuRotation, SaysNothingOfDirectionsThatPriorsDoNotHave) {
   DriveOptions options;
   options.has_positions = false;
   Drive drive = BuildDrive(options, 1);
-  EXPECT_FALSE(Correct(&drive, CameraMountOptions()).left_in_priors);
+  EXPECT_FALSE(Correct(&drive, CameraImuRotationOptions()).left_in_priors);
 }
 
-TEST(TurnPrior, KeepsWhatIsNotObservedInfinite) {
+TEST(RotatePrior, KeepsWhatIsNotObservedInfinite) {
   Random random(1);
   RelativePosePrior prior = BuildPrior(1, 2, Rigid3d(), 1e-3, 1e-2, &random);
   prior.covariance.bottomRightCorner<3, 3>().diagonal().setConstant(
       std::numeric_limits<double>::infinity());
-  TurnPrior(ExpSo3(Eigen::Vector3d(0.1, 0.2, 0.3)), &prior);
+  RotatePrior(ExpSo3(Eigen::Vector3d(0.1, 0.2, 0.3)), &prior);
   EXPECT_FALSE(prior.covariance.hasNaN());
   EXPECT_EQ(prior.covariance(4, 4), std::numeric_limits<double>::infinity());
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "global/calibration/mount_observations.h"
+#include "global/calibration/extrinsic_observations.h"
 
 #include <Eigen/Cholesky>
 #include <Eigen/LU>
@@ -15,74 +15,76 @@
 namespace adasfm {
 namespace {
 
-using Jacobian = Eigen::Matrix<double, 3, kNumMountUnknowns>;
+using Jacobian = Eigen::Matrix<double, 3, kNumExtrinsicUnknowns>;
 
-// Matches beyond these add little.
+// Pairs and matches beyond these add little.
 constexpr size_t kMaxNumPairs = 2000;
 constexpr int kMaxNumMatches = 150;
-// Steps of the chain whose pairs share their errors.
+// Length of a span, in steps of the chain: pairs of one span share their
+// errors.
 constexpr int kSpanSteps = 10;
 constexpr double kLossScalePx = 1.5;
 constexpr double kKeypointSigmaPx = 0.5;
-// Least error granted to a rotation, of vision or sensors.
+// Least sigma of a rotation, of vision or sensors.
 constexpr double kMinRotationSigmaRad = 5e-4;
-// Sensors know the direction of longer motions only.
+// Sensors observe no direction of shorter motions.
 constexpr double kMinLengthM = 0.05;
-// Directions farther from the sensors' are not theirs.
+// Visual directions farther from the sensors' are rejected.
 constexpr double kMaxDirectionErrorRad = 0.5;
 
-// The motion of a pair with its priors turned.
-struct TurnedMotion {
+// The motion of a pair with its priors rotated.
+struct RotatedMotion {
   Eigen::Matrix3d rotation;
   Eigen::Vector3d direction;
   // Of the rotation, and of the direction as a vector.
   Eigen::Matrix3d rotation_covariance;
   Eigen::Matrix3d direction_covariance;
-  // Changes of the rotation (from the left) by all unknowns, as vision sees it
-  // from the sensors' but without vision's own offset.
+  // Derivative of the rotation from the sensors' to the visual one (from the
+  // left) by all unknowns, without vision's own offset.
   Jacobian rotation_change = Jacobian::Zero();
   Eigen::Matrix3d camera_from_middle;
   bool has_direction = false;
 };
 
-TurnedMotion TurnMotion(const ChainMotion& motion,
-                        const Eigen::Quaterniond& turn, double seconds) {
-  TurnedMotion turned;
+RotatedMotion RotateMotion(const ChainMotion& motion,
+                           const Eigen::Quaterniond& turn, double seconds) {
+  RotatedMotion rotated;
   const Eigen::Matrix3d matrix = turn.toRotationMatrix();
   const Eigen::Quaterniond rotation =
       turn * motion.cam2_from_cam1.rotation * turn.conjugate();
-  turned.rotation = rotation.toRotationMatrix();
-  turned.rotation_covariance =
+  rotated.rotation = rotation.toRotationMatrix();
+  rotated.rotation_covariance =
       matrix * motion.covariance.topLeftCorner<3, 3>() * matrix.transpose();
-  turned.rotation_covariance.diagonal().array() +=
+  rotated.rotation_covariance.diagonal().array() +=
       kMinRotationSigmaRad * kMinRotationSigmaRad;
-  // Exp(e) R Exp(-e) R^T = Exp((I - R) e); the mean turn of the frames in
-  // between is good enough for a few steps.
-  turned.rotation_change.leftCols<3>() =
-      Eigen::Matrix3d::Identity() - turned.rotation;
-  turned.camera_from_middle = ExpSo3(0.5 * LogSo3(rotation)).toRotationMatrix();
-  turned.rotation_change.middleCols<3>(kRateUnknown) =
-      seconds * turned.camera_from_middle;
+  // Exp(e) R Exp(-e) R^T = Exp((I - R) e). For the gyroscope's bias the mean
+  // rotation of the frames in between is good enough for a few steps.
+  rotated.rotation_change.leftCols<3>() =
+      Eigen::Matrix3d::Identity() - rotated.rotation;
+  rotated.camera_from_middle =
+      ExpSo3(0.5 * LogSo3(rotation)).toRotationMatrix();
+  rotated.rotation_change.middleCols<3>(kRateUnknown) =
+      seconds * rotated.camera_from_middle;
   const Eigen::Vector3d& translation = motion.cam2_from_cam1.translation;
   const double length = translation.norm();
-  turned.has_direction = motion.has_position && length > kMinLengthM;
-  if (!turned.has_direction) return turned;
-  turned.direction = matrix * translation / length;
-  turned.direction_covariance = matrix *
-                                motion.covariance.bottomRightCorner<3, 3>() *
-                                matrix.transpose() / (length * length);
-  return turned;
+  rotated.has_direction = motion.has_position && length > kMinLengthM;
+  if (!rotated.has_direction) return rotated;
+  rotated.direction = matrix * translation / length;
+  rotated.direction_covariance = matrix *
+                                 motion.covariance.bottomRightCorner<3, 3>() *
+                                 matrix.transpose() / (length * length);
+  return rotated;
 }
 
 // Whitens `residual = jacobian * unknowns` of the first kRows rows.
 template <int kRows>
-MountObservation Whiten(
-    const MountPair& pair,
-    const Eigen::Matrix<double, kRows, kNumMountUnknowns>& jacobian,
+ExtrinsicObservation Whiten(
+    const ExtrinsicPair& pair,
+    const Eigen::Matrix<double, kRows, kNumExtrinsicUnknowns>& jacobian,
     const Eigen::Matrix<double, kRows, 1>& residual,
     const Eigen::Matrix<double, kRows, kRows>& covariance) {
   const Eigen::LLT<Eigen::Matrix<double, kRows, kRows>> root(covariance);
-  MountObservation observation;
+  ExtrinsicObservation observation;
   observation.jacobian.setZero();
   observation.residual.setZero();
   observation.jacobian.template topRows<kRows>() =
@@ -94,8 +96,8 @@ MountObservation Whiten(
   return observation;
 }
 
-MountObservation ObserveRotation(const MountPair& pair,
-                                 const TurnedMotion& motion) {
+ExtrinsicObservation ObserveRotation(const ExtrinsicPair& pair,
+                                     const RotatedMotion& motion) {
   Jacobian jacobian = motion.rotation_change;
   jacobian.rightCols<3>().setIdentity();
   const Eigen::Vector3d residual = LogSo3(
@@ -106,9 +108,9 @@ MountObservation ObserveRotation(const MountPair& pair,
       motion.rotation_covariance + sigma * sigma * Eigen::Matrix3d::Identity());
 }
 
-bool ObservesMount(int max_num_steps, const OdometryChain& chain,
-                   const GlobalCorrespondences& correspondences,
-                   const ViewGraphEdge& edge) {
+bool ObservesExtrinsics(int max_num_steps, const OdometryChain& chain,
+                        const GlobalCorrespondences& correspondences,
+                        const ViewGraphEdge& edge) {
   return edge.IsKept() && edge.has_rotation &&
          edge.source != EdgeSource::kSensor &&
          chain.IsConnected(edge.image_id1, edge.image_id2) &&
@@ -134,10 +136,10 @@ std::map<int, double> SumSeconds(const OdometryChain& chain,
   return seconds;
 }
 
-MountPair CreatePair(const OdometryChain& chain,
-                     const GlobalCorrespondences& correspondences,
-                     const ViewGraphEdge& edge) {
-  MountPair pair;
+ExtrinsicPair CreatePair(const OdometryChain& chain,
+                         const GlobalCorrespondences& correspondences,
+                         const ViewGraphEdge& edge) {
+  ExtrinsicPair pair;
   pair.first = edge.image_id1;
   pair.last = edge.image_id2;
   pair.last_from_first = edge.cam2_from_cam1.rotation;
@@ -159,18 +161,18 @@ MountPair CreatePair(const OdometryChain& chain,
 
 }  // namespace
 
-std::vector<MountPair> CollectMountPairs(
+std::vector<ExtrinsicPair> CollectExtrinsicPairs(
     int max_num_steps, const OdometryChain& chain, const ViewGraph& graph,
     const GlobalCorrespondences& correspondences,
     const std::vector<RelativePosePrior>& priors) {
   std::vector<const ViewGraphEdge*> edges;
   for (const ViewGraphEdge& edge : graph.edges) {
-    if (ObservesMount(max_num_steps, chain, correspondences, edge)) {
+    if (ObservesExtrinsics(max_num_steps, chain, correspondences, edge)) {
       edges.push_back(&edge);
     }
   }
   const std::map<int, double> seconds = SumSeconds(chain, priors);
-  std::vector<MountPair> pairs;
+  std::vector<ExtrinsicPair> pairs;
   const size_t count = std::min(kMaxNumPairs, edges.size());
   for (size_t k = 0; k < count; ++k) {
     pairs.push_back(
@@ -181,12 +183,12 @@ std::vector<MountPair> CollectMountPairs(
   return pairs;
 }
 
-std::vector<MountObservation> ObserveMount(const OdometryChain& chain,
-                                           const Eigen::Quaterniond& turn,
-                                           const MountPair& pair) {
-  std::vector<MountObservation> observations;
-  const TurnedMotion motion =
-      TurnMotion(chain.Motion(pair.first, pair.last), turn, pair.seconds);
+std::vector<ExtrinsicObservation> ObserveExtrinsics(
+    const OdometryChain& chain, const Eigen::Quaterniond& turn,
+    const ExtrinsicPair& pair) {
+  std::vector<ExtrinsicObservation> observations;
+  const RotatedMotion motion =
+      RotateMotion(chain.Motion(pair.first, pair.last), turn, pair.seconds);
   observations.push_back(ObserveRotation(pair, motion));
   if (!motion.has_direction) return observations;
 
@@ -212,17 +214,18 @@ std::vector<MountObservation> ObserveMount(const OdometryChain& chain,
   if (solver.info() != Eigen::Success || !by_matches.allFinite()) {
     return observations;
   }
-  // How the direction of least distances moves with the rotation that is held;
-  // it is held at the sensors', which is off by minus the change.
+  // Minus the derivative of the direction of least distances by the held
+  // rotation: the sensors' rotation is held, which is off by minus
+  // rotation_change.
   const Eigen::Matrix<double, 2, 3> by_rotation =
       solver.solve(information.matrix.bottomLeftCorner<2, 3>());
-  Eigen::Matrix<double, 2, kNumMountUnknowns> jacobian =
+  Eigen::Matrix<double, 2, kNumExtrinsicUnknowns> jacobian =
       by_rotation * motion.rotation_change;
-  const Eigen::Matrix<double, 2, 3> by_turn =
+  const Eigen::Matrix<double, 2, 3> by_extrinsics =
       -basis.transpose() * Hat(motion.direction);
-  jacobian.leftCols<3>() += by_turn;
+  jacobian.leftCols<3>() += by_extrinsics;
   jacobian.middleCols<3>(kDrivingDirectionUnknown) +=
-      by_turn * motion.camera_from_middle;
+      by_extrinsics * motion.camera_from_middle;
   observations.push_back(Whiten<2>(
       pair, jacobian, -basis.transpose() * motion.direction,
       by_matches +

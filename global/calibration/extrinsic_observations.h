@@ -12,28 +12,29 @@
 
 namespace adasfm {
 
-// What all pairs share: the turn of the camera's mount, that of the direction
-// of driving against it (both rad), the gyroscope's bias (rad/s) and vision's
-// own offset in the later camera (rad), three numbers each. The first two look
-// the same in the direction of a motion.
-constexpr int kNumMountUnknowns = 12;
+// Unknowns that all pairs share, three numbers each: the error of the
+// camera-IMU rotation, the error of the direction of driving relative to it
+// (both rad), the gyroscope's bias (rad/s) and the offset of visual rotations
+// in the later camera (rad). A direction of motion cannot separate the first
+// two.
+constexpr int kNumExtrinsicUnknowns = 12;
 constexpr int kDrivingDirectionUnknown = 3;
 constexpr int kRateUnknown = 6;
 
 // One pair's rotation or direction, whitened: residual = jacobian * unknowns.
 // Rows that a term does not have are zero.
-struct MountObservation {
-  Eigen::Matrix<double, 3, kNumMountUnknowns> jacobian;
+struct ExtrinsicObservation {
+  Eigen::Matrix<double, 3, kNumExtrinsicUnknowns> jacobian;
   Eigen::Vector3d residual;
   int num_dof = 3;
-  // Pairs of many steps overlap with as many others.
+  // Pairs of many steps overlap with as many other pairs.
   double weight = 1.0;
-  // Those of one span of the drive share their errors.
+  // Observations of one span of the drive share their errors.
   int span = 0;
 };
 
 // A pair that the chain predicts, the earlier image first.
-struct MountPair {
+struct ExtrinsicPair {
   image_t first = kInvalidImageId;
   image_t last = kInvalidImageId;
   Eigen::Quaterniond last_from_first;  // by vision
@@ -44,18 +45,18 @@ struct MountPair {
   EdgeBearings bearings;
 };
 
-// The pairs that tell the mount: with matches, and at most so many steps of the
-// chain apart. Of very many an even subset.
-std::vector<MountPair> CollectMountPairs(
+// The pairs that observe the camera-IMU rotation: pairs with matches, at most
+// max_num_steps steps of the chain apart. Of very many pairs, an even subset.
+std::vector<ExtrinsicPair> CollectExtrinsicPairs(
     int max_num_steps, const OdometryChain& chain, const ViewGraph& graph,
     const GlobalCorrespondences& correspondences,
     const std::vector<RelativePosePrior>& priors);
 
-// What the pair says with its priors turned by `turn`: the rotation, and the
-// direction of motion where sensors have one. Empty where matches and sensors
-// have nothing in common.
-std::vector<MountObservation> ObserveMount(const OdometryChain& chain,
-                                           const Eigen::Quaterniond& turn,
-                                           const MountPair& pair);
+// Observations of the pair with its priors rotated by `turn`: its rotation, and
+// its direction of motion where the sensors have one and the matches determine
+// a similar one.
+std::vector<ExtrinsicObservation> ObserveExtrinsics(
+    const OdometryChain& chain, const Eigen::Quaterniond& turn,
+    const ExtrinsicPair& pair);
 
 }  // namespace adasfm

@@ -13,18 +13,18 @@ namespace adasfm {
 // What a step's result depends on, by name.
 using StepInputs = std::map<std::string, std::string>;
 
-// What a step has to say, for the user: lines of text.
+// Receives a step's messages for the user: lines of text.
 using MessageCallback = std::function<void(const std::string&)>;
 
-// Which steps of a run are done, in a file, so that a run that was interrupted
-// continues and one with other inputs starts at the first step that they
-// change. A step depends on all steps before it.
-class StepJournal {
+// Records in a file which steps of a run are done, so that an interrupted run
+// continues, and a run with other inputs restarts at the first step that they
+// affect. A step depends on all steps before it.
+class RunManifest {
  public:
   enum class State {
     kDone,     // with these inputs: nothing to do
     kBegun,    // with these inputs, and not finished: continue
-    kChanged,  // done or begun with other inputs: what it left is outdated
+    kChanged,  // done or begun with other inputs: results are outdated
     kNew,
   };
 
@@ -35,31 +35,33 @@ class StepJournal {
     double seconds = 0.0;  // of the run that finished it
   };
 
-  // No file: no steps. An error for a file that is not a journal.
-  static StatusOr<StepJournal> Read(const std::string& path);
+  // No file: no steps. An error for a file that is not a manifest.
+  static StatusOr<RunManifest> Read(const std::string& path);
 
   State GetState(const std::string& name, const StepInputs& inputs) const;
-  // "max_num_features is 2000, was 1000", for a changed step.
+  // For a changed step, for example "max_num_features is '2000', was '1000'".
   std::string DescribeChange(const std::string& name,
                              const StepInputs& inputs) const;
-  // Written at once. Begin forgets the steps after this one.
+  // Both write the file immediately. Begin removes the steps after this one.
   Status Begin(const std::string& name, const StepInputs& inputs);
   Status Finish(const std::string& name, double seconds);
-  // Forgets all steps but this one.
+  // Removes all steps but this one.
   Status KeepOnly(const std::string& name);
 
   struct StepActions {
-    // Removes what other inputs left, unless the step was begun with these.
+    // Removes results of other inputs; not called if the step was begun with
+    // these.
     std::function<Status()> reset;
-    // Does the step, continuing from what is there.
+    // Does the step, continuing from existing results.
     std::function<Status()> work;
-    // Whether the result is there and whole; an error says what is missing.
+    // Checks that the result exists and is complete; the error names what is
+    // missing.
     std::function<Status()> check;
   };
 
-  // Does the step, unless it is done with these inputs and its result is there.
-  // What `check` misses after the work is an error, and the step is not done.
-  // Returns the seconds that it took, now or then.
+  // Does the step, unless it is done with these inputs and `check` succeeds. An
+  // error when `check` fails after the work; the step is then not done. Returns
+  // the duration of the step in seconds, in this run or an earlier one.
   StatusOr<double> Run(const std::string& name, const StepInputs& inputs,
                        const StepActions& actions,
                        const MessageCallback& message);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "global/odometry/visual_steps.h"
+#include "global/odometry/visual_odometry.h"
 
 #include <algorithm>
 #include <cmath>
@@ -10,9 +10,13 @@
 #include "core/median.h"
 #include "core/option_checker.h"
 #include "core/so3.h"
+#include "global/odometry/uncertain_motion.h"
 
 namespace adasfm {
 namespace {
+
+// 1 sigma, per axis, of the drift of a visual step's rotation.
+constexpr double kRotationErrorRad = DegToRad(0.3);
 
 int FindVisualEdge(const ViewGraph& graph, const ImagePair& pair) {
   const int e = FindEdge(graph, pair);
@@ -34,8 +38,8 @@ std::vector<image_t> InOrderOfCapture(const ViewGraph& graph) {
   return images;
 }
 
-// Neighbours in the order of capture that share a pair, where one piece of the
-// chain ends and another begins. A step without anything, to be filled.
+// Adds empty steps, to be filled, between neighbours in the order of capture
+// that share a pair, where one piece of the chain ends and another begins.
 std::vector<RelativePosePrior> ContinueChain(
     const ViewGraph& graph, std::vector<RelativePosePrior> priors,
     const std::vector<RelativePosePrior>& frame_priors) {
@@ -66,8 +70,8 @@ std::vector<RelativePosePrior> ContinueChain(
   return priors;
 }
 
-// Only the pairs of images that follow each other closely: look-alike places
-// must not tell how long the steps are.
+// Keeps only the pairs of images that follow each other closely: aliased pairs
+// must not influence the lengths of the steps.
 ViewGraph SequenceGraph(const ViewGraph& graph, const OdometryChain& chain,
                         int max_num_steps) {
   ViewGraph sequence = graph;
@@ -90,17 +94,16 @@ void SetTranslation(const Eigen::Vector3d& translation,
   prior->flags |= kPriorDirection | kPriorLength;
 }
 
-// What the pair of the two images says, in the order of the prior.
+// The relative pose of the prior's images by vision, in the prior's order.
 Rigid3d VisualMotion(const ViewGraphEdge& edge,
                      const RelativePosePrior& prior) {
   return edge.image_id1 == prior.image_id1 ? edge.cam2_from_cam1
                                            : edge.cam2_from_cam1.Inverse();
 }
 
-void FillRotation(const VisualStepOptions& options, const ViewGraphEdge& edge,
-                  RelativePosePrior* prior) {
+void FillRotation(const ViewGraphEdge& edge, RelativePosePrior* prior) {
   const double sigma_rad =
-      std::hypot(edge.rotation_sigma_rad, DegToRad(options.rotation_error_deg));
+      std::hypot(edge.rotation_sigma_rad, kRotationErrorRad);
   prior->cam2_from_cam1.rotation = VisualMotion(edge, *prior).rotation;
   prior->covariance.setZero();
   prior->covariance.topLeftCorner<3, 3>() =
@@ -108,8 +111,9 @@ void FillRotation(const VisualStepOptions& options, const ViewGraphEdge& edge,
   prior->flags |= kPriorRotation;
 }
 
-void FillPosition(const VisualStepOptions& options, const ViewGraphEdge& edge,
-                  const EdgeLength& length, RelativePosePrior* prior) {
+void FillPosition(const VisualOdometryOptions& options,
+                  const ViewGraphEdge& edge, const EdgeLength& length,
+                  RelativePosePrior* prior) {
   const Eigen::Vector3d direction =
       VisualMotion(edge, *prior).translation.normalized();
   const double along =
@@ -117,12 +121,8 @@ void FillPosition(const VisualStepOptions& options, const ViewGraphEdge& edge,
   const double across =
       length.length * std::hypot(edge.direction_sigma_rad,
                                  DegToRad(options.direction_error_deg));
-  const Eigen::Matrix3d along_part = direction * direction.transpose();
-  SetTranslation(
-      length.length * direction,
-      along * along * along_part +
-          across * across * (Eigen::Matrix3d::Identity() - along_part),
-      prior);
+  SetTranslation(length.length * direction,
+                 CovarianceAlong(direction, along, across), prior);
 }
 
 double MedianLength(const std::vector<RelativePosePrior>& priors) {
@@ -136,32 +136,32 @@ double MedianLength(const std::vector<RelativePosePrior>& priors) {
 
 }  // namespace
 
-bool VisualStepOptions::IsValid(std::string* error) const {
+bool VisualOdometryOptions::IsValid(std::string* error) const {
   return OptionChecker(error)
       .AtLeast(1, "max_num_steps", max_num_steps)
       .Positive({{"length_error_ratio", length_error_ratio},
-                 {"direction_error_deg", direction_error_deg},
-                 {"rotation_error_deg", rotation_error_deg}})
+                 {"direction_error_deg", direction_error_deg}})
       .NotNegative({{"scale_drift_ratio", scale_drift_ratio}})
       .Within(0, 1, "max_contradicting_ratio", max_contradicting_ratio)
       .AllHold();
 }
 
-VisualSteps AddVisualSteps(const VisualStepOptions& options,
-                           const EdgeLengthOptions& length_options,
-                           const ViewGraph& graph,
-                           const GlobalCorrespondences& correspondences,
-                           const std::map<ImagePair, double>& known_lengths_m,
-                           const std::vector<RelativePosePrior>& priors,
-                           const std::vector<RelativePosePrior>& frame_priors) {
-  VisualSteps steps;
+VisualOdometryEdges AddVisualOdometry(
+    const VisualOdometryOptions& options,
+    const EdgeLengthOptions& length_options, const ViewGraph& graph,
+    const GlobalCorrespondences& correspondences,
+    const std::map<ImagePair, double>& known_lengths_m,
+    const std::vector<RelativePosePrior>& priors,
+    const std::vector<RelativePosePrior>& frame_priors) {
+  VisualOdometryEdges steps;
   steps.priors = ContinueChain(graph, priors, frame_priors);
   const OdometryChain chain(steps.priors, OdometryChainOptions(), frame_priors);
   const EdgeLengths lengths = EstimateEdgeLengths(
       length_options, SequenceGraph(graph, chain, options.max_num_steps),
       known_lengths_m, correspondences);
 
-  // Steps that vision sees; a standstill's error is in terms of the others.
+  // Steps that vision observes; a standstill's sigma depends on the other
+  // lengths.
   std::vector<RelativePosePrior*> standstills;
   std::map<ImagePair, double> known_lengths = known_lengths_m;
   for (RelativePosePrior& prior : steps.priors) {
@@ -169,7 +169,7 @@ VisualSteps AddVisualSteps(const VisualStepOptions& options,
     const ImagePair pair(prior.image_id1, prior.image_id2);
     const int e = FindVisualEdge(graph, pair);
     if (e < 0) continue;
-    if (!prior.HasRotation()) FillRotation(options, graph.edges[e], &prior);
+    if (!prior.HasRotation()) FillRotation(graph.edges[e], &prior);
     if (!graph.edges[e].has_baseline) {
       standstills.push_back(&prior);
       continue;

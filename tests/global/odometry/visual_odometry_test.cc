@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "global/odometry/visual_steps.h"
+#include "global/odometry/visual_odometry.h"
 
 #include <gtest/gtest.h>
 
@@ -47,16 +47,16 @@ StepProblem BuildProblem(uint64_t seed, Function has_position) {
   return problem;
 }
 
-VisualSteps Complete(const StepProblem& problem,
-                     const VisualStepOptions& options = {}) {
-  return AddVisualSteps(options, EdgeLengthOptions(), problem.scene.graph,
-                        problem.scene.correspondences, problem.known_lengths_m,
-                        problem.priors);
+VisualOdometryEdges Complete(const StepProblem& problem,
+                             const VisualOdometryOptions& options = {}) {
+  return AddVisualOdometry(options, EdgeLengthOptions(), problem.scene.graph,
+                           problem.scene.correspondences,
+                           problem.known_lengths_m, problem.priors);
 }
 
 // The way from the first image to the last, as the completed chain has it.
 double LengthRatioOfTheWay(const StepProblem& problem,
-                           const VisualSteps& steps) {
+                           const VisualOdometryEdges& steps) {
   const OdometryChain chain(steps.priors, OdometryChainOptions());
   const auto& poses = problem.scene.cams_from_world;
   const ChainMotion motion =
@@ -70,10 +70,10 @@ double LengthRatioOfTheWay(const StepProblem& problem,
   return motion.cam2_from_cam1.translation.norm() / truth.translation.norm();
 }
 
-TEST(AddVisualSteps, SpreadsMetresToTheStepsWithoutPosition) {
+TEST(AddVisualOdometry, SpreadsMetresToTheStepsWithoutPosition) {
   for (uint64_t seed = 1; seed <= 3; ++seed) {
     const StepProblem problem = BuildProblem(seed, [](int k) { return k < 4; });
-    const VisualSteps steps = Complete(problem);
+    const VisualOdometryEdges steps = Complete(problem);
     EXPECT_EQ(steps.num_by_vision, kNumImages - 1 - 4);
     EXPECT_EQ(steps.unit_m, 1.0);
     EXPECT_NEAR(LengthRatioOfTheWay(problem, steps), 1.0, 0.1) << seed;
@@ -83,9 +83,9 @@ TEST(AddVisualSteps, SpreadsMetresToTheStepsWithoutPosition) {
   }
 }
 
-TEST(AddVisualSteps, WithoutMetresTheUnitIsAStep) {
+TEST(AddVisualOdometry, WithoutMetresTheUnitIsAStep) {
   const StepProblem problem = BuildProblem(1, [](int) { return false; });
-  const VisualSteps steps = Complete(problem);
+  const VisualOdometryEdges steps = Complete(problem);
   EXPECT_EQ(steps.num_by_vision, kNumImages - 1);
   const double first = steps.priors[0].cam2_from_cam1.translation.norm();
   const auto& poses = problem.scene.cams_from_world;
@@ -102,9 +102,9 @@ double TranslationVariance(const RelativePosePrior& prior) {
 }
 
 // Vision that drifts more is believed less.
-TEST(AddVisualSteps, SigmasFollowTheOptions) {
+TEST(AddVisualOdometry, SigmasFollowTheOptions) {
   const StepProblem problem = BuildProblem(1, [](int) { return false; });
-  VisualStepOptions options;
+  VisualOdometryOptions options;
   const double plain = TranslationVariance(Complete(problem).priors[3]);
   options.length_error_ratio *= 3.0;
   options.direction_error_deg *= 3.0;
@@ -113,38 +113,38 @@ TEST(AddVisualSteps, SigmasFollowTheOptions) {
 }
 
 // What neither sensors nor vision see stays open.
-TEST(AddVisualSteps, NothingGoesOnThroughAHole) {
+TEST(AddVisualOdometry, NothingGoesOnThroughAHole) {
   StepProblem problem = BuildProblem(1, [](int) { return false; });
   for (ViewGraphEdge& edge : problem.scene.graph.edges) {
     if (edge.image_id1 <= 7 && edge.image_id2 >= 6) {
       edge.removal = EdgeRemoval::kFewInliers;
     }
   }
-  const VisualSteps steps = Complete(problem);
+  const VisualOdometryEdges steps = Complete(problem);
   EXPECT_LT(steps.num_by_vision, kNumImages - 1);
 }
 
-TEST(AddVisualSteps, ContinuesAnInterruptedChain) {
+TEST(AddVisualOdometry, ContinuesAnInterruptedChain) {
   StepProblem problem = BuildProblem(1, [](int) { return true; });
   problem.priors.erase(problem.priors.begin() + 5);
-  const VisualSteps steps = Complete(problem);
+  const VisualOdometryEdges steps = Complete(problem);
   EXPECT_EQ(steps.priors.size(), kNumImages - 1);
   EXPECT_EQ(steps.num_by_vision, 1);
   EXPECT_NEAR(LengthRatioOfTheWay(problem, steps), 1.0, 0.1);
 }
 
-TEST(VisualStepOptions, NamesWhatIsWrong) {
-  VisualStepOptions options;
+TEST(VisualOdometryOptions, NamesWhatIsWrong) {
+  VisualOdometryOptions options;
   std::string error;
   EXPECT_TRUE(options.IsValid(&error));
   options.max_num_steps = 0;
   EXPECT_FALSE(options.IsValid(&error));
   EXPECT_NE(error.find("max_num_steps"), std::string::npos);
-  options = VisualStepOptions();
+  options = VisualOdometryOptions();
   options.scale_drift_ratio = -1.0;
   EXPECT_FALSE(options.IsValid(&error));
   EXPECT_NE(error.find("scale_drift_ratio"), std::string::npos);
-  options = VisualStepOptions();
+  options = VisualOdometryOptions();
   options.max_contradicting_ratio = 1.5;
   EXPECT_FALSE(options.IsValid(&error));
   EXPECT_NE(error.find("max_contradicting_ratio"), std::string::npos);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "colmap_ext/io/step_journal.h"
+#include "colmap_ext/io/run_manifest.h"
 
 #include <algorithm>
 #include <filesystem>
@@ -12,11 +12,11 @@
 
 namespace adasfm {
 
-StatusOr<StepJournal> StepJournal::Read(const std::string& path) {
-  StepJournal journal;
-  journal.path_ = path;
+StatusOr<RunManifest> RunManifest::Read(const std::string& path) {
+  RunManifest manifest;
+  manifest.path_ = path;
   std::error_code error;
-  if (!std::filesystem::exists(path, error)) return journal;
+  if (!std::filesystem::exists(path, error)) return manifest;
   try {
     std::ifstream file(path);
     // Throws for anything but a list.
@@ -28,24 +28,24 @@ StatusOr<StepJournal> StepJournal::Read(const std::string& path) {
       step.inputs = entry.at("inputs").get<StepInputs>();
       step.is_done = entry.at("is_done");
       step.seconds = entry.at("seconds");
-      journal.steps_.push_back(std::move(step));
+      manifest.steps_.push_back(std::move(step));
     }
   } catch (const nlohmann::json::exception&) {
     return Status::Error(path +
                          " is damaged; remove it to do all steps again, or "
                          "choose another workspace");
   }
-  return journal;
+  return manifest;
 }
 
-const StepJournal::Step* StepJournal::Find(const std::string& name) const {
+const RunManifest::Step* RunManifest::Find(const std::string& name) const {
   const auto step =
       std::find_if(steps_.begin(), steps_.end(),
                    [&name](const Step& entry) { return entry.name == name; });
   return step == steps_.end() ? nullptr : &*step;
 }
 
-StepJournal::State StepJournal::GetState(const std::string& name,
+RunManifest::State RunManifest::GetState(const std::string& name,
                                          const StepInputs& inputs) const {
   const Step* step = Find(name);
   if (step == nullptr) return State::kNew;
@@ -53,7 +53,7 @@ StepJournal::State StepJournal::GetState(const std::string& name,
   return step->is_done ? State::kDone : State::kBegun;
 }
 
-std::string StepJournal::DescribeChange(const std::string& name,
+std::string RunManifest::DescribeChange(const std::string& name,
                                         const StepInputs& inputs) const {
   const Step* step = Find(name);
   if (step == nullptr) return "";
@@ -68,16 +68,16 @@ std::string StepJournal::DescribeChange(const std::string& name,
   return text;
 }
 
-Status StepJournal::Begin(const std::string& name, const StepInputs& inputs) {
+Status RunManifest::Begin(const std::string& name, const StepInputs& inputs) {
   const Step* old = Find(name);
   if (old != nullptr) steps_.resize(old - steps_.data());
   steps_.push_back({name, inputs, false, 0.0});
   return Write();
 }
 
-Status StepJournal::Finish(const std::string& name, double seconds) {
+Status RunManifest::Finish(const std::string& name, double seconds) {
   if (Find(name) == nullptr) {
-    throw std::logic_error("StepJournal: " + name + " has not begun");
+    throw std::logic_error("RunManifest: " + name + " has not begun");
   }
   Step& step = steps_[Find(name) - steps_.data()];
   step.is_done = true;
@@ -85,7 +85,7 @@ Status StepJournal::Finish(const std::string& name, double seconds) {
   return Write();
 }
 
-Status StepJournal::KeepOnly(const std::string& name) {
+Status RunManifest::KeepOnly(const std::string& name) {
   steps_.erase(
       std::remove_if(steps_.begin(), steps_.end(),
                      [&name](const Step& step) { return step.name != name; }),
@@ -93,7 +93,7 @@ Status StepJournal::KeepOnly(const std::string& name) {
   return Write();
 }
 
-StatusOr<double> StepJournal::Run(const std::string& name,
+StatusOr<double> RunManifest::Run(const std::string& name,
                                   const StepInputs& inputs,
                                   const StepActions& actions,
                                   const MessageCallback& message) {
@@ -115,7 +115,7 @@ StatusOr<double> StepJournal::Run(const std::string& name,
   const Stopwatch watch;
   Status status;
   if (state != State::kBegun) {
-    // After a crash in here no inputs are those of the step.
+    // If the run crashes in reset, the step's inputs then match none.
     status = Begin(name, {{"removing", "old results"}});
     if (status.ok()) status = actions.reset();
   }
@@ -129,7 +129,7 @@ StatusOr<double> StepJournal::Run(const std::string& name,
   return seconds;
 }
 
-Status StepJournal::Write() const {
+Status RunManifest::Write() const {
   nlohmann::json json = nlohmann::json::array();
   for (const Step& step : steps_) {
     json.push_back({{"name", step.name},

@@ -1,0 +1,32 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <ceres/loss_function.h>
+
+#include <Eigen/Core>
+
+#include "colmap_ext/bundle_adjustment/bundle_problem.h"
+
+namespace adasfm {
+
+struct MinimizePointOptions {
+  // 0: the point stays.
+  int max_num_iterations = 20;
+  // Relative decrease of its cost, as the linearised residuals predict it, at
+  // which the point stays.
+  double function_tolerance = 1e-5;
+};
+
+// Moves a point to a minimum of its observations' cost at fixed poses. Returns
+// that cost, half of the sum of rho(|r|^2) (`loss` null: of the squares), which
+// never exceeds the initial cost.
+//
+// Method: Gauss-Newton with the current robust weights. Its steps are too short
+// where observations contradict each other, and a few points (10 to 100 of
+// 20,000) need many. Iterated alone between the joint steps (embedded point
+// iterations, Jeong et al. 2010), these points do not delay the others.
+double MinimizePoint(const MinimizePointOptions& options,
+                     const BundleProblem::ObservationRange& observations,
+                     const ceres::LossFunction* loss, Eigen::Vector3d* point);
+
+}  // namespace adasfm
