@@ -2,16 +2,16 @@
 # SPDX-License-Identifier: BSD-3-Clause
 # Sets up everything on Debian 12: installs the packages, builds the host
 # COLMAP once into a cache folder, configures and builds the project.
-# Run it again at any time: what is done is not done twice.
+# It may run again at any time: finished steps are not repeated.
 #
 #   scripts/setup.sh [--for-demo | --for-tests] [--host-only] [--configure-only]
 #                    [CMake arguments...]
 #
-# --for-demo does only what the adasfm_* commands need: no tests, no benchmarks,
-# no program of COLMAP, only the files of its library that are linked; the next
-# run without it does the rest. --for-tests also installs the browser that
-# the report's test and the screenshots need, a Slurm for the cluster's test,
-# and what the packages and the documentation are checked with. --host-only
+# --for-demo builds only what the adasfm_* commands need: no tests, no benchmarks,
+# no program of COLMAP, only the files of its library that are linked; a later
+# run without it builds everything else. --for-tests also installs the browser
+# for the report's test and the screenshots, a Slurm for the cluster's test, and
+# the tools that check the packages and the documentation. --host-only
 # stops after the host; --configure-only leaves the project unbuilt.
 # Environment: ADASFM_CACHE (default: the user's cache folder) holds the host;
 # ADASFM_BUILD_DIR (default: build/); ADASFM_BUILD_TYPE (default: Release).
@@ -26,10 +26,10 @@ colmap_version=3.8
 host_prefix=$cache/colmap-$colmap_version
 host_source=$cache/apt/sources/colmap-$colmap_version
 host_log=$cache/colmap-build.log
-# CPU minutes, for the plan; a machine that has nothing else to do needs less.
+# CPU minutes, for the plan; an idle machine needs less.
 host_minutes=12 host_part_minutes=6 project_minutes=20 demo_minutes=11
 
-# Without these nothing is built.
+# The packages that every build needs.
 demo_packages=(
   # The tools; Python writes the manual pages.
   build-essential cmake ninja-build dpkg-dev python3
@@ -38,11 +38,11 @@ demo_packages=(
   libboost-system-dev libboost-test-dev libfreeimage-dev libflann-dev
   liblz4-dev libmetis-dev libgoogle-glog-dev libsqlite3-dev libglew-dev
   libgl1-mesa-dev libeigen3-dev libceres-dev libsuitesparse-dev
-  # Faster than the ATLAS that libceres-dev brings. This build starts no
-  # threads before it is asked to, and our commands never ask, but takes buffers
-  # for each core. The serial one errs when two threads call it at once.
+  # OpenBLAS is faster than the ATLAS that libceres-dev brings. Its OpenMP build
+  # starts threads only on request, which our commands never make, but takes
+  # buffers for each core. Its serial build errs if two threads call it at once.
   libopenblas-openmp-dev
-  # Ours.
+  # The project's dependencies.
   libopencv-dev libyaml-cpp-dev nlohmann-json3-dev libzstd-dev)
 more_packages=(
   ccache clang-format
@@ -51,7 +51,7 @@ more_packages=(
   libgtest-dev libgmock-dev libbenchmark-dev
   # For the scripts that draw tables and compare models.
   python3-numpy python3-matplotlib sqlite3)
-test_packages=(chromium chromium-driver python3-selenium file lintian
+test_packages=(chromium chromium-driver python3-selenium file lintian locales
   python3-h5py clang libclang-rt-14-dev linux-perf ffmpeg
   slurmctld slurmd slurm-client munge)
 
@@ -72,7 +72,7 @@ host_part=(base/{camera,camera_database,camera_models,camera_rig}
   util/{bitmap,camera_specs,logging,math,misc}
   util/{ply,random,string,threading,timer})
 host_part_libraries=(PBA/libpba.a SiftGPU/libsift_gpu.a VLFeat/libvlfeat.a)
-# Linked by name, and nothing of them used.
+# Linked by name, but no part of them is used.
 host_unused_libraries=(liblsd.a libpoisson_recon.a)
 
 say() { printf '\n== %s\n' "$*"; }
@@ -91,7 +91,7 @@ check_root() {
 }
 
 # Reads lines `DONE ALL` of numbers, and shows one line of progress with the
-# time left; in a log a line at every tenth.
+# time left; without a terminal, a line at every tenth.
 show_progress() {
   local what=$1 start=$SECONDS shown=0 finished all percent rest line
   while read -r finished all; do
@@ -111,8 +111,8 @@ show_progress() {
   if [ -t 1 ]; then printf '\n'; fi
 }
 
-# Builds with Ninja in the folder $2, all or the targets that follow, into the
-# log $3, with progress called $1.
+# Builds with Ninja in the folder $2: the targets after $3, or all. Appends to the
+# log $3 and shows progress under the name $1.
 build_with_progress() {
   local what=$1 folder=$2 log=$3
   shift 3
@@ -141,7 +141,7 @@ install_packages() {
         --no-install-recommends -o APT::Status-Fd=1 "${missing_packages[@]}" \
         2>> "$log" | tee -a "$log" |
         while IFS=: read -r kind _ percent _; do
-          # Getting the packages is a quarter of the time.
+          # Downloading the packages counts as a quarter of the time.
           case $kind in
             dlstatus) echo "${percent%%.*}" 400 ;;
             pmstatus) echo $((100 + 3 * ${percent%%.*})) 400 ;;
@@ -199,8 +199,9 @@ configure_host() {
     -DCGAL_ENABLED=OFF -DTESTS_ENABLED=OFF -DBOOST_STATIC=OFF > "$host_log" 2>&1
 }
 
-# Headers, CMake package and what of the libraries our program links. The build
-# folder stays: build_host goes on from there, and installs the same headers.
+# Headers, CMake package and the files of the libraries that our program links.
+# The build folder stays: build_whole_host continues there, and installs the same
+# headers.
 build_host_part() {
   local source objects=() lib=$host_prefix/lib/colmap
   for source in "${host_part[@]}"; do
@@ -229,7 +230,8 @@ build_host() {
   say "Building COLMAP $colmap_version ($1) into $host_prefix, once"
   local mark=$host_prefix/.complete
   if [ "$1" = part ]; then mark=$host_prefix/.part; fi
-  # In a shell of its own, as an if would switch off errexit, and cd stays.
+  # In a subshell, so that cd has no effect here. errexit is off before ||, so the
+  # functions chain their commands with &&.
   (
     case $1 in
       part) build_host_part ;;

@@ -3,6 +3,7 @@
 #include <sys/stat.h>
 
 #include <clocale>
+#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 
@@ -36,7 +37,7 @@ class Readers : public testing::Test {
   std::string folder_;
 };
 
-// The words must all be in the message, and the file's name too.
+// The message must contain all words and the file's name, and have one line.
 void ExpectError(const Status& status, const std::string& path,
                  const std::vector<std::string>& words) {
   ASSERT_FALSE(status.ok());
@@ -130,13 +131,24 @@ TEST_F(Readers, ImuWithCommasAndSpaces) {
   EXPECT_EQ((*seasons)[0].angular_velocity, Eigen::Vector3d(0.1, -0.2, 0.3));
 }
 
+// With a locale whose decimal separator is a comma, which localedef compiles
+// for the test.
 TEST_F(Readers, NumbersDoNotDependOnTheLocale) {
   const std::string path = Write("imu.csv", "100,0.5,0,0,0,0,9.81\n");
+  const std::string compile = "localedef -i de_DE -f UTF-8 '" + folder_ +
+                              "/de_DE.UTF-8' > /dev/null 2>&1";
+  if (std::system(compile.c_str()) != 0) {
+    GTEST_SKIP() << "no German locale here; install Debian's locales";
+  }
   const std::string old = std::setlocale(LC_ALL, nullptr);
-  // Absent on bare machines: then the test shows nothing, but holds.
-  std::setlocale(LC_ALL, "de_DE.UTF-8");
+  setenv("LOCPATH", folder_.c_str(), 1);
+  const bool is_set = std::setlocale(LC_ALL, "de_DE.UTF-8") != nullptr;
+  const std::string separator = std::localeconv()->decimal_point;
   const auto imu = ReadImu(path);
   std::setlocale(LC_ALL, old.c_str());
+  unsetenv("LOCPATH");
+  ASSERT_TRUE(is_set);
+  EXPECT_EQ(separator, ",");
   ASSERT_TRUE(imu.ok()) << imu.status().message();
   EXPECT_EQ((*imu)[0].angular_velocity.x(), 0.5);
 }
@@ -178,7 +190,7 @@ TEST_F(Readers, GapsAreWarnings) {
   EXPECT_NE(warnings[0].find("line 302"), std::string::npos) << warnings[0];
 }
 
-// Editors of Windows write it.
+// Windows editors write a byte order mark.
 TEST_F(Readers, TakeAByteOrderMark) {
   const std::string mark = "\xEF\xBB\xBF";
   const auto imu =
@@ -220,7 +232,7 @@ TEST_F(Readers, KittiOxts) {
   std::filesystem::remove(folder_ + "/oxts/data/0000000001.txt");
   ExpectError(ReadImu(folder_ + "/oxts").status(), "0000000001.txt",
               {"no such file"});
-  // With the year's nanoseconds this would be beyond 64 bits.
+  // These seconds and the year in nanoseconds would exceed 64 bits.
   Write("oxts/timestamps.txt", "2200-12-31 23:59:8999999999\n");
   ExpectError(ReadImu(folder_ + "/oxts").status(), "timestamps.txt",
               {"line 1", "hh:mm:ss"});
