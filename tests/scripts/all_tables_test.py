@@ -143,7 +143,7 @@ class VersionTest(Folder):
     self.assertIn('a b c', read(page))
     figures = json.loads(read(args.figures_path))
     self.assertEqual(figures['stamp']['sources'], hash_sources(self.folder))
-    # Another version: rows of before do not count, and their worlds go.
+    # In another version, old rows do not count, and their worlds are removed.
     write(self.path('core', 'a.cc'), 'int b;')
     make('d')
     self.assertEqual(runs, ['a', 'b', 'c', 'd'])
@@ -207,7 +207,7 @@ class HandheldTest(Folder):
               for k in range(7)]
     samples = [{'sensorType': 1, 'timestamp': 500 + 1000 * k,
                 'values': [float(k), 2.0 * k, 9.8]} for k in range(7)]
-    # Twice the same time, an uncalibrated gyroscope's six values, a magnetometer.
+    # A repeated time, six values of an uncalibrated gyroscope, a magnetometer.
     samples += [{'sensorType': 4, 'timestamp': t,
                  'values': [0.1, 0.2, 0.3, 0.0, 0.0, 0.0]}
                 for t in (0, 500, 1750, 1750, 9000)]
@@ -290,8 +290,8 @@ class AllTest(Folder):
     self.assertIn('| kitti01-51 | a bend with low overlap | 52.5, 80 of 100 | '
                   '**0.020** | 3.000, 60 of 100 | 0.040 | 1.000 |', readme)
     self.assertIn('| no model | **0.020** |', readme)
-    # What we lose stands there too.
-    self.assertIn('More accurate than ours: COLMAP 4.2.1 mapper on kitti01-51 '
+    # The page also lists the sets where a peer is more accurate.
+    self.assertIn('Better than ours: COLMAP 4.2.1 mapper on kitti01-51 '
                   '(0.020 m, ours 0.040)', readme)
     page = read(self.path('docs', 'results', 'benchmark.md'))
     self.assertIn('| 60 + 30 | 3.000, 0.050 | folded, in 2 models, 10 images '
@@ -303,7 +303,7 @@ class AllTest(Folder):
   def test_rows_of_two_versions_are_an_error(self):
     stamp = make_stamp(all_tables.ROOT)
     self.fill(dict(stamp, sources='older'))
-    # A table of an older version alone is one of the past: not mixed.
+    # Rows of an older version alone are not mixed.
     self.assertEqual(self.draw().returncode, 0)
     before = read(self.path('README.md'))
     ledger = Ledger(self.path('out', 'benchmark', 'rows.jsonl'), stamp)

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The tables of README.md and of the pages about other COLMAPs: what each
-method finds, loses and folds on the same database."""
+"""The tables of README.md and of the pages about other COLMAPs: models, lost
+images and folds of each method on the same database."""
 
-# A model whose centres err by more after the best similarity is folded, or bent
-# beyond use: the drives here are 50 to 600 m long.
+# A model with a larger error of centres after the best similarity is folded, or
+# bent beyond use: the drives here are 50 to 600 m long.
 FOLDED_M = 1.0
 
 
@@ -101,7 +101,8 @@ def detail_table(records, sets, methods):
 
 
 def losses(records, sets, methods):
-  """Where a peer's whole model is more accurate than ours, in one line."""
+  """Sets where a peer's whole model is more accurate than ours, or ours lacks
+  images, in one line."""
   runs = by_key(records)
   said = []
   for name in sets:
@@ -113,7 +114,7 @@ def losses(records, sets, methods):
         said.append('%s on %s (%s m, ours %s)' % (
             heading, name, format_error(error_of(peer)),
             cell(ours, False)))
-  return ('More accurate than ours: %s.' % '; '.join(said) if said else
+  return ('Better than ours: %s.' % '; '.join(said) if said else
           'No other method has a whole model with a smaller error.')
 
 
@@ -130,7 +131,7 @@ def cleaner_table(records, sets, commands):
           cells.append('%s | | ' % ('no model' if record else '-'))
           continue
         models = record['models']
-        # Of the mapper alone: the cleaning is the same for all.
+        # CPU time of the mapper alone; the cleaning is the same for all.
         cpu_s = [seconds for step, seconds in
                  record['step_cpu_seconds'].items() if step != 'clean']
         cells.append('%s | %s | %.0f' % (

@@ -36,7 +36,7 @@ ConsistencyMatrix DrawMatrix(int size, double density, Random* random) {
   return matrix;
 }
 
-// True loops agree with each other; false ones with few, by chance.
+// True loop closures are consistent; false ones agree with few, by chance.
 TEST(FindConsistentSet, FindsThePlantedSet) {
   for (uint64_t seed = 1; seed <= 10; ++seed) {
     Random random(seed);
@@ -55,8 +55,8 @@ TEST(FindConsistentSet, FindsThePlantedSet) {
   }
 }
 
-// Against all subsets: a clique that cannot grow, not much lighter than the
-// maximum.
+// Compared with all subsets: the result is a maximal clique, not much lighter
+// than the maximum clique.
 TEST(FindConsistentSet, NearTheMaximumOfAllSubsets) {
   constexpr int kSize = 12;
   constexpr int kNumDraws = 40;
@@ -89,7 +89,7 @@ TEST(FindConsistentSet, NearTheMaximumOfAllSubsets) {
   }
 }
 
-// Many pairs outweigh many loops of one pair.
+// One loop of many pairs outweighs several loops of one pair each.
 TEST(FindConsistentSet, WeightsDecide) {
   ConsistencyMatrix matrix(5, std::vector<bool>(5, false));
   for (const int a : {0, 1, 2}) {

@@ -12,9 +12,9 @@
 namespace adasfm {
 namespace {
 
-// Two laps of a square block, 1 m a step: image k and k + kLap see the same
-// place. Look-alike places: one side of the block and the opposite one, seen
-// driving the other way, and places along one side 40 m apart.
+// Two laps of a square block, 1 m a step: images k and k + kLap see the same
+// place. Aliased places: one side of the block and the opposite side seen in
+// the other direction, and places 40 m apart along one side.
 constexpr int kSide = 100;
 constexpr int kLap = 4 * kSide;
 
@@ -83,7 +83,7 @@ LoopProblem BuildProblem(uint64_t seed, double length_ratio) {
                 has_length, &problem);
       } else if (i % kSide < 50 && i < kSide && std::abs(j - i - 40) <= 2 &&
                  j < kSide && j - i != 40) {
-        // 40 m ahead looks like here.
+        // The place 40 m ahead is aliased with this one.
         AddEdge(i, j, ComputeCam2FromCam1(TruePose(i + 40), TruePose(j)), true,
                 has_length, &problem);
       }
@@ -119,8 +119,8 @@ TEST(FilterLoopClosures, KeepsTrueLoopsAndDropsLookAlikes) {
   }
 }
 
-// Pairs of which nothing is known but rotation and direction fall with the
-// loop that they are part of.
+// Pairs of which only rotation and direction are known are rejected with the
+// false loop that they belong to.
 TEST(FilterLoopClosures, DropsUntestablePairsOfAFalseLoop) {
   for (uint64_t seed = 1; seed <= 3; ++seed) {
     LoopProblem problem = BuildProblem(seed, 0.5);
@@ -131,8 +131,8 @@ TEST(FilterLoopClosures, DropsUntestablePairsOfAFalseLoop) {
   }
 }
 
-// A wrong pose at a place that the drive truly sees again, or of images that
-// follow each other, is removed as such: its matches may come back.
+// A wrong pose at a place that the drive truly revisits, or of neighbouring
+// images, is removed as a wrong pose: its matches may be used again.
 TEST(FilterLoopClosures, AWrongPoseOfATruePlaceIsNoFalseLoop) {
   LoopProblem problem = BuildProblem(1, 1.0);
   const Eigen::Quaterniond turn = ExpSo3(Eigen::Vector3d(0.0, 0.5, 0.0));

@@ -55,7 +55,7 @@ std::vector<RelativePosePrior> DrawLogs(const OdometryChainOptions& options,
   return priors;
 }
 
-// What two images see of each other, with an edge's own noise.
+// The relative pose of two images with the noise of its own edge.
 ViewGraphEdge DrawPair(int i, int j, const LoopClosureOptions& options,
                        double* length, Random* random) {
   Rigid3d motion;
@@ -84,7 +84,7 @@ OdometryChainOptions ErrorsOfEqualWeight() {
   return options;
 }
 
-// The share of true pairs below the probability, one pair a drive.
+// The share of true pairs below the probability level, one pair a drive.
 double RefusedShare(double probability, bool has_length,
                     const OdometryChainOptions& drawn,
                     const OdometryChainOptions& believed, uint64_t seed) {
@@ -107,8 +107,8 @@ double RefusedShare(double probability, bool has_length,
   return static_cast<double>(num_refused) / kNumDrives;
 }
 
-// True pairs are refused at the stated level. The standard error of a share of
-// 0.05 of 400 is 0.011, of 0.2 it is 0.02: four of them.
+// True pairs are rejected at the stated level. The tolerances are four standard
+// errors of a share of 400 drives: 0.011 for 0.05, 0.02 for 0.2.
 TEST(TestByOdometry, RefusesTruePairsAtTheStatedLevel) {
   const OdometryChainOptions errors = ErrorsOfEqualWeight();
   for (uint64_t seed = 1; seed <= 4; ++seed) {
@@ -123,7 +123,7 @@ TEST(TestByOdometry, RefusesTruePairsAtTheStatedLevel) {
   }
 }
 
-// Each shared error counts: without it far more true pairs are refused.
+// Each shared error counts: without it far more true pairs are rejected.
 TEST(TestByOdometry, EachSharedErrorIsInTheCovariance) {
   using Change = std::function<void(OdometryChainOptions*)>;
   const std::vector<Change> leave_out = {
@@ -134,14 +134,14 @@ TEST(TestByOdometry, EachSharedErrorIsInTheCovariance) {
       [](auto* o) { o->driving_direction_sigma_rad = 0.0; }};
   for (size_t k = 0; k < leave_out.size(); ++k) {
     OdometryChainOptions drawn = ErrorsOfEqualWeight();
-    // This one alone, and larger than what a pair's own noise covers.
+    // Only this error is drawn, larger than what a pair's own noise covers.
     for (size_t other = 0; other < leave_out.size(); ++other) {
       if (other != k) leave_out[other](&drawn);
     }
     drawn.scale_sigma *= 8.0;
     drawn.gyro_bias_sigma_rad_s *= 8.0;
     drawn.gyro_bias_walk_rad_s_sqrt_s *= 8.0;
-    drawn.extrinsic_rotation_sigma_rad *= 2.0;  // it has second-order terms
+    drawn.extrinsic_rotation_sigma_rad *= 2.0;  // has second-order terms
     drawn.driving_direction_sigma_rad *= 8.0;
     OdometryChainOptions without = drawn;
     leave_out[k](&without);
@@ -150,8 +150,8 @@ TEST(TestByOdometry, EachSharedErrorIsInTheCovariance) {
   }
 }
 
-// Without a length a pair that leads elsewhere is refused by its direction, one
-// that leads there is not, however far.
+// Without a length a pair is rejected if its direction contradicts the
+// prediction, but at no distance along that direction.
 TEST(TestPair, UnknownLengthTestsTheDirection) {
   UncertainMotion predicted;
   predicted.cam2_from_cam1.translation = Eigen::Vector3d(0.0, 0.0, 30.0);
@@ -188,7 +188,7 @@ TEST(MeasurePair, GrantsTheLeastErrors) {
   EXPECT_NEAR(sigmas(5), 1.3, 1e-9);
 }
 
-// Without a baseline the rotation alone is tested.
+// Without a baseline only the rotation is tested.
 TEST(TestPair, NoBaselineTestsTheRotation) {
   ViewGraphEdge edge = BuildEdge(ImagePair(1, 2), Rigid3d());
   edge.has_baseline = false;

@@ -50,7 +50,7 @@ TEST(RejectVisualOdometry, ASequenceKeepsAll) {
   }
 }
 
-// Odometry that a fifth of the short pairs contradict excludes nothing.
+// Visual odometry that a fifth of the short pairs contradict is removed.
 TEST(RejectVisualOdometry, ContradictedOdometryGoes) {
   for (uint64_t seed = 1; seed <= 5; ++seed) {
     TestScene scene = BuildScene(seed);
@@ -62,14 +62,14 @@ TEST(RejectVisualOdometry, ContradictedOdometryGoes) {
     VisualOdometryEdges steps = AddSteps(scene);
     EXPECT_EQ(Reject(scene, &steps), kNumImages - 1) << "seed " << seed;
     EXPECT_TRUE(steps.priors.empty());
-    // Odometry of sensors stays, whatever vision says.
+    // Odometry of sensors is kept even if vision contradicts it.
     steps = AddSteps(scene);
     EXPECT_EQ(Reject(scene, &steps, steps.priors.size()), 0);
   }
 }
 
-// Between two runs lies an odometry edge of sensors: each run is judged by its
-// own pairs.
+// An odometry edge of sensors separates two runs: each run is tested by its own
+// pairs.
 TEST(RejectVisualOdometry, EachRunIsJudgedByItsOwnPairs) {
   for (uint64_t seed = 1; seed <= 5; ++seed) {
     TestScene scene = BuildScene(seed);

@@ -14,12 +14,12 @@
 namespace adasfm {
 namespace {
 
-// Two drives around the same block, a metre an image, and neither sensors nor
-// neighbouring images from one to the other:
+// Two drives around the same block, 1 m an image. No sensors and no pairs of
+// neighbouring images connect the drives:
 //
-//    60 --<-- 41     ids 1 ... 80, and the second drive 201 ... 280 in lanes a
-//    |         |     metre beside; where an image of one sees one of the other
-//    61       40     there may be a pair.
+//    60 --<-- 41     Ids 1 ... 80; the second drive has ids 201 ... 280 in a
+//    |         |     lane 1 m beside. Images of the two drives that see each
+//    61       40     other may have a pair.
 //    |         |
 //    80 .. 1 -> 20
 constexpr int kNumImages = 80;
@@ -63,7 +63,7 @@ void AddPair(image_t i, image_t j, const Rigid3d& motion, Drives* drives) {
   drives->graph.edges.insert(place, edge);
 }
 
-// Sensors on the first drive only.
+// Only the first drive has sensors.
 Drives BuildDrives(double scale_of_second = 1.0,
                    image_t num_images = kNumImages, int side_length = kSide) {
   Drives drives;
@@ -88,8 +88,8 @@ Drives BuildDrives(double scale_of_second = 1.0,
   return drives;
 }
 
-// Pairs of the images at k in the first drive and k + shift in the second, and
-// what they say: that they lie at k and k + apparent.
+// Adds pairs of image k in the first drive and image k + shift in the second.
+// The pairs' poses place the images at k and k + apparent.
 void AddPlace(int begin, int end, int shift, int apparent, Drives* drives,
               int side_length = kSide) {
   for (int k = begin; k < end; ++k) {
@@ -108,7 +108,7 @@ void AddTruePlace(int begin, int end, Drives* drives) {
   AddPlace(begin, end, 0, 0, drives);
 }
 
-// The chain of the sensors, and of the second drive's neighbours.
+// Chains the sensors' steps and the second drive's consecutive pairs.
 LoopClosureReport Filter(Drives* drives,
                          const LoopClosureOptions& options = {}) {
   std::vector<RelativePosePrior> steps = drives->priors;
@@ -174,8 +174,8 @@ TEST(FilterLoopClosures, ASecondPlaceBehindATurnConfirms) {
   }
 }
 
-// Facades that repeat give false pairs all along two parallel streets, which
-// agree with each other however many there are.
+// Repetitive facades give false pairs all along two parallel streets. Such
+// pairs are consistent with each other, however many there are.
 TEST(FilterLoopClosures, AStraightStreetConfirmsNothing) {
   for (const int num_images : {20, 150}) {
     Drives drives = BuildDrives(1.0, num_images, 1000);
@@ -194,9 +194,9 @@ TEST(FilterLoopClosures, LongRunsAroundCornersConfirmThemselves) {
   EXPECT_EQ(CountKeptJoins(drives.graph), 90);
 }
 
-// Places that look alike agree neither with true ones nor with each other.
+// Aliased places are consistent neither with true ones nor with each other.
 TEST(FilterLoopClosures, FalsePlacesGo) {
-  // The second image stands a street further than the pair says.
+  // The second image is one street further than the pair's pose states.
   Drives drives = BuildDrives();
   AddPlace(4, 12, 22, 2, &drives);
   AddPlace(64, 72, -21, -1, &drives);
@@ -242,12 +242,12 @@ TEST(FilterLoopClosures, SensorsAndNeighboursMakeOnePart) {
       ComputeCam2FromCam1(PoseOf(kNumImages), PoseOf(kSecond + 1));
   EXPECT_EQ(Filter(&joined).num_segments, 1);
   EXPECT_EQ(CountKeptJoins(joined.graph), 14);
-  // A rotation alone leaves the places open.
+  // A rotation alone does not constrain the place.
   Drives turned = drives;
   turned.priors.push_back(joined.priors.back());
   turned.priors.back().flags = kPriorRotation;
   EXPECT_EQ(Filter(&turned).num_segments, 2);
-  // Ids that follow each other.
+  // Consecutive ids within max_sequence_gap.
   LoopClosureOptions options;
   options.max_sequence_gap = kSecond + 1 - kNumImages;
   AddPair(kNumImages, kSecond + 1,
@@ -256,7 +256,7 @@ TEST(FilterLoopClosures, SensorsAndNeighboursMakeOnePart) {
   EXPECT_EQ(Filter(&drives, options).num_segments, 1);
 }
 
-// Every field decides something.
+// Each option changes the outcome.
 TEST(FilterLoopClosures, JoinOptionsDecide) {
   // The second place is turned by 8 degrees.
   const auto build = [](double angle_rad, double scale) {
