@@ -8,7 +8,8 @@
 namespace adasfm {
 namespace {
 
-// Poses of a part in its own frame and in the merged one, a fifth of them wild.
+// Poses of a part in its own frame and in the merged one, a fifth of them
+// outliers.
 std::vector<PosePair> MakePosePairs(int num_poses) {
   Random random(1);
   std::vector<PosePair> poses;

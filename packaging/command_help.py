@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Reads what the commands say of themselves: `colmap help`, `colmap X -h`."""
+"""Reads the commands' own help: `colmap help`, `colmap X -h`."""
 import collections
 import re
 import subprocess
@@ -14,8 +14,8 @@ def run(*arguments, stderr=subprocess.DEVNULL):
 
 
 def parse_options(text):
-    """Options of boost::program_options' help, in its order; also those of
-    COLMAP's own commands. Help that wraps is joined."""
+    """Options in a help text of boost::program_options, in its order, of our
+    commands or COLMAP's. Help of several lines is joined."""
     options = []
     for line in text.splitlines():
         match = re.match(
@@ -29,7 +29,7 @@ def parse_options(text):
 
 
 def read_commands(colmap):
-    """Our commands, with all that their help says."""
+    """Our commands, with all information of their help."""
     commands = []
     for name, summary in re.findall(r'^  (adasfm_\w+)\s+(\S.*)$',
                                     run(colmap, 'help'), re.MULTILINE):

@@ -1,15 +1,15 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: BSD-3-Clause
 # Cleans the matches of a COLMAP database of any version, for COLMAP's own
-# mappers: a copy of it gets the sensors' priors, and adasfm_global rewrites
-# there which pairs match, how, and with which relative pose. The database itself
+# mappers: a copy of the database gets the sensors' priors, and adasfm_global
+# rewrites the copy's pairs, their matches and relative poses. The database itself
 # stays as it is (docs/guide/cleaner.md).
 #
 #   scripts/clean_database.sh DATABASE CLEANED [SENSORS]
 #
 #   DATABASE   matched and verified, by any COLMAP from 3.6 on
 #   CLEANED    the copy to make; CLEANED.coarse becomes the coarse model, and
-#              CLEANED.options what COLMAP's mapper has to be told, if anything
+#              CLEANED.options the options that COLMAP's mapper needs, if any
 #   SENSORS    folder with imu.csv, wheel.csv, times.csv and sensors.yaml;
 #              leave it out when there are none
 #
@@ -20,7 +20,7 @@ colmap=${COLMAP:-colmap}
 database=$1 cleaned=$2 sensors=${3:-}
 if [ -e "$cleaned" ]; then echo "$cleaned is there already" >&2; exit 1; fi
 
-# A copy of what is in the write-ahead log too.
+# The copy includes the contents of the write-ahead log.
 python3 - "$database" "$cleaned" <<'COPY'
 import pathlib, sqlite3, sys
 source = sqlite3.connect(pathlib.Path(sys.argv[1]).absolute().as_uri() +
@@ -36,7 +36,8 @@ if [ -n "$sensors" ]; then
     --sensors_path "$sensors/sensors.yaml"
 fi
 
-# COLMAP 4's table of priors takes positions and the direction of gravity.
+# Positions and the direction of gravity are written if the database has
+# COLMAP 4's table of priors.
 priors=0
 if python3 - "$cleaned" <<'TABLE'
 import sqlite3, sys
@@ -49,7 +50,8 @@ mkdir -p "$cleaned.coarse"
 "$colmap" adasfm_global --database_path "$cleaned" \
   --output_path "$cleaned.coarse" --AdaSfmGlobal.write_pose_priors "$priors"
 
-# Joins that vision cannot measure: COLMAP's mappers have no sensors for them.
+# Removes joins that vision cannot measure, since COLMAP's mappers have no sensors
+# to bridge them.
 scripts=$(dirname "${BASH_SOURCE[0]}")
 "$scripts/drop_weak_joins.py" "$cleaned"
 "$scripts/mapper_start.py" "$cleaned" "$cleaned.coarse/summary.json" \

@@ -1,19 +1,19 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSD-3-Clause
-"""Leaves out the verified pairs that alone hold two parts of a scene together.
+"""Removes the verified pairs that alone connect two parts of a scene.
 
   scripts/drop_weak_joins.py DATABASE [--min_num_matches N] [--min_num_images N]
 
 Where a few pairs with few matches join two parts (across a tunnel, say), vision
-does not know how large and how far away one part is beside the other. COLMAP's
-mappers believe such pairs all the same: global_mapper then bends a model of two
-good halves by tens of metres. Without them each part becomes a model of its
-own. adasfm_mapper needs no such step: sensors bridge the gap there.
+does not determine the relative scale and position of the parts. COLMAP's
+mappers use such pairs all the same: global_mapper then deforms a model of two
+good halves by tens of metres. Without these pairs each part becomes a separate
+model. adasfm_mapper needs no such step: sensors bridge the gap there.
 
 Method: pairs join images in the order of their matches, most first (a maximum
 spanning forest). When a pair joins two parts of at least --min_num_images
 images and all pairs between both have fewer than --min_num_matches matches in
-total, these pairs go from two_view_geometries; `matches` keeps them.
+total, these pairs are deleted from two_view_geometries; `matches` keeps them.
 """
 
 import argparse

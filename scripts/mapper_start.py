@@ -1,13 +1,13 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSD-3-Clause
-"""Prints the options with which COLMAP's mapper begins well on a cleaned database.
+"""Prints options for the initial pair of COLMAP's mapper on a cleaned database.
 
   scripts/mapper_start.py DATABASE SUMMARY
 
 DATABASE is the one that adasfm_global has cleaned, SUMMARY its summary.json.
-Prints nothing where the mapper finds a beginning itself, or where the verified
-pairs hold more than one part together: a pair named by options serves one model.
-docs/guide/cleaner.md says why it may have to be told.
+Prints nothing if the mapper finds an initial pair itself, or if the verified
+pairs form more than one part: an initial pair in options serves one model.
+docs/guide/cleaner.md explains why the mapper may need the options.
 """
 
 import argparse
@@ -20,7 +20,7 @@ MIN_NUM_IMAGES = 10  # of a model that COLMAP's mapper keeps
 
 
 def count_parts(pairs):
-  """How many parts of MIN_NUM_IMAGES images the ids of pairs join."""
+  """Number of parts of at least MIN_NUM_IMAGES images that the pairs form."""
   part_of = {}
   for pair_id in pairs:
     first, second = divmod(pair_id, MAX_NUM_IMAGES)
@@ -34,11 +34,11 @@ def count_parts(pairs):
 
 
 def options_of(start):
-  """Of the `mapper_start` of a model's summary."""
+  """The options, from the `mapper_start` of a model's summary."""
   options = {'init_image_id1': start['image_id1'],
              'init_image_id2': start['image_id2'],
              'init_max_forward_motion': 1,
-             # Half of the pair's: its points are to pass too.
+             # Half of the pair's parallax, so that its points pass, too.
              'init_min_tri_angle': round(min(start['parallax_deg'] / 2, 16), 3),
              # A second model would begin with the same pair.
              'multiple_models': 0}

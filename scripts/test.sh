@@ -3,8 +3,8 @@
 # Sets up what is missing and runs all tests: format, layers, unit and
 # command-line tests with warnings as errors, the report in a browser, the
 # packages, the documentation's commands, and once more under AddressSanitizer and
-# UBSan the tests of core, sensors and partition. Says at the end what was tested in
-# which half hour, and which tests took longest.
+# UBSan the tests of core, sensors and partition. Lists at the end what was tested in
+# which half hour, and the slowest tests.
 #
 #   scripts/test.sh [--no-sanitizers]
 set -euo pipefail
@@ -15,7 +15,7 @@ build=${ADASFM_BUILD_DIR:-build}
 steps=$(mktemp)
 logs=()
 
-# Also when a test fails.
+# Runs at the exit, also after a failed test.
 report() {
   if [ ${#logs[@]} != 0 ]; then
     printf '\n== What was tested when\n'
@@ -47,15 +47,15 @@ step 'Running all tests'
 run_tests "$build"
 
 if [ "${1:-}" != --no-sanitizers ]; then
-  # Sensors read what users bring; the chain runs the other layers
+  # sensors parses users' files; the chain covers the other layers
   # (scripts/checks/sanitized_chain.sh).
   layers=(core sensors partition)
   step 'Building with sanitizers (about 8 minutes the first time)'
   scripts/checks/sanitized_chain.sh build address build-sanitize \
     "${layers[@]/#/test_}"
   step 'Running unit tests under AddressSanitizer and UBSan'
-  # Statistics of long drives and many seeds take ten times as long as without
-  # sanitizers, and run the code that shorter tests run.
+  # Excluded are statistical tests of long drives and many seeds: with sanitizers
+  # they take ten times as long, and shorter tests run the same code.
   statistics='JitterOfTheImages|OnAStraightRoad|ShiftsAreExact|Honesty'
   statistics+='|RealRoad|IsNotFoundWhereThereIsNone|OverTwentySeeds|ALongDrive'
   statistics+='|AreNamed/(SwappedAxes|OneSecond)'

@@ -1,12 +1,12 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSD-3-Clause
-"""Makes the tables of README.md and docs that compare, one version for all.
+"""Makes the comparison tables of README.md and docs, all from one version.
 
-scripts/benchmark/all.sh calls it on a build of these sources. Each table is a
-step; its rows are kept in OUTPUT/STEP/rows.jsonl with the version of the
-sources and the machine, are not run again for the same version and machine, and
-are never mixed with those of another. Figures go to benchmark/results, tables
-into the pages between markers.
+scripts/benchmark/all.sh calls this script on a build of these sources. Each
+table is a step. Its rows are kept in OUTPUT/STEP/rows.jsonl with the version of
+the sources and the machine; rows of the same version and machine are not run
+again, and a table never mixes rows of two versions or machines. Figures go to
+benchmark/results, tables into the pages between markers.
 """
 
 import argparse
@@ -41,10 +41,10 @@ README_SETS = {
 }
 CLEANER_SETS = ['world-alias-300', 'world-hard-400', 'world-clean-300',
                 'kitti06-51', 'kitti07-160']
-# Look-alikes, nothing hard, few good matches, and two real motions.
+# Perceptual aliasing, a clean world, few good matches, and two real motions.
 ABLATION_SETS = ['alias-300', 'clean-500', 'noisy-500', 'outliers-500',
                  'world-hard-400', 'kitti07-160', 'world-kitti10-592']
-# Worlds full of look-alikes that forty seeds can be made of.
+# Worlds with much perceptual aliasing or many false pairs, for forty seeds.
 ALIKE_DIALS = ['parallel streets', 'parallel streets, half of the pairs false',
                'parallel streets, three blackouts',
                'half of the pairs spurious', '62 % of the pairs false']
@@ -71,7 +71,7 @@ def find_colmap4(args):
 
 
 def present(names, args):
-  """Those sets that can be made here; a line for each of the others."""
+  """The sets that can be made here; prints a line for each other set."""
   there = []
   for name in names:
     if is_world(name) or os.path.isdir(os.path.join(args.data_path, name)):
@@ -88,7 +88,7 @@ def call(script, arguments):
 
 
 class Benchmark:
-  """The step that runs COLMAP's mappers and ours side by side."""
+  """Steps that run COLMAP's mappers and ours side by side."""
 
   def __init__(self, args):
     self.args = args
@@ -212,7 +212,7 @@ STEPS = {
                                         '--data_path', args.data_path,
                                         '--features_path', os.path.join(
                                             args.output_path, 'features')),
-    # After readme and two_view, whose figures it takes.
+    # After readme and two_view, since it reads their figures.
     'paper': lambda args: run_script(
         args, 'paper', 'paper_figures.py', '--data_path', args.data_path,
         '--features_path', os.path.join(args.output_path, 'features'),

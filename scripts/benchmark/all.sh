@@ -1,10 +1,10 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: BSD-3-Clause
-# Makes every table of README.md and docs that compares from nothing (those of
-# matching.md are experiments of earlier builds): sets up, builds, runs what is not done yet with
-# this version on this machine, and writes the tables into the pages.
-# Interrupted, it goes on where it was. What is missing (the recordings, another
-# COLMAP) is left out with one line.
+# Makes every comparison table of README.md and docs from scratch, except those of
+# matching.md (experiments of earlier builds): sets up, builds, runs what is not
+# done yet with this version on this machine, and writes the tables into the pages.
+# After an interruption the script continues. Tables whose recordings or other
+# COLMAP are missing are left out with one line.
 #
 #   scripts/benchmark/all.sh --quick    README's table and COLMAP 4 beside it: 20 to
 #                                       40 minutes on two idle cores

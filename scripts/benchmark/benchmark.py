@@ -2,13 +2,13 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Runs COLMAP's mappers and AdaSfM side by side on the same databases.
 
-For each set it makes or copies a database and runs the methods in turn; with
---repeats the methods alternate. Each run appends a line to rows.jsonl and is not
-run again with the same version of the sources on the same machine, so a
-benchmark may be continued; results.json, results.md and the plots are drawn from
-all lines of today's version. Sets are made by `adasfm_synthesizer`; real
-sequences are used when a folder with them is given. all.sh calls this script for
-the tables of README.md and docs/.
+For each set the script makes or copies a database and runs the methods in turn;
+with --repeats the methods alternate. Each run appends a line to rows.jsonl and
+is not run again with the same version of the sources on the same machine, so a
+benchmark may be continued; results.json, results.md and the plots are made from
+all lines of the current version. Sets are made by `adasfm_synthesizer`; real
+sequences are used when a folder with them is given. all.sh calls this script
+for the tables of README.md and docs/.
 """
 
 import argparse
@@ -24,7 +24,7 @@ from benchmarking.figures import open_ledger  # noqa: E402
 from benchmarking.host_options import version_of  # noqa: E402
 from benchmarking.methods import ABLATIONS, METHODS, run_method  # noqa: E402
 
-# Sets beyond this size are run with AdaSfM alone unless --methods says more.
+# Sets beyond this size are run with AdaSfM alone unless --methods names others.
 LARGEST_SET_OF_PEERS = 4000
 
 
@@ -110,7 +110,7 @@ def methods_of(name, args):
 
 
 def spec_of(method, args):
-  """What a run depends on besides the product."""
+  """What a run depends on besides our sources."""
   executable, *how = args.peers.get(method, (args.host_colmap or args.colmap,))
   return [version_of(executable), args.seed, args.timeout, *how]
 

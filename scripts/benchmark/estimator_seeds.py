@@ -1,14 +1,14 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSD-3-Clause
-"""Do priors ever make the model worse, and is the adjustment honest?
+"""Do priors ever make the model worse, and is their chi-square consistent?
 
-Forty worlds with sensor models spoilt as real ones are: a standstill that is
-not quite still, wheels that differ by 0.4 %, noise figures wrong by a factor of
-three up or down. For each the final error with the priors in the adjustment and
-without them, the limit (the same final refinement from the true poses, with and
-without the priors), the chi-square of the priors and the keypoint sigma. Writes
-docs/results/estimator_seeds.md. Rows that are done are not run again. Needs
-only Python's standard library.
+Forty worlds have sensor errors as real drives do: a standstill with small
+motion, wheels that differ by 0.4 %, stated noise wrong by a factor of three up
+or down. For each world the table has the final error with the priors in the
+adjustment and without them, the limit (the same final refinement from the true
+poses, with and without the priors), the chi-square of the priors and the
+keypoint sigma. Writes docs/results/estimator_seeds.md. Rows that are done are
+not run again. Needs only Python's standard library.
 """
 
 import argparse
@@ -34,7 +34,7 @@ KINDS = {
 }
 SIZES = [200, 250, 300, 200, 250, 300, 400, 500]
 WITHOUT = {'mapper': ['--AdaSfmMapper.use_priors_in_adjustment', '0']}
-# The bars: with priors at most this share of the error without, and of the
+# Largest error with priors, as a ratio to the error without priors and to the
 # limit with the same priors.
 MAX_OF_WITHOUT = 1.02
 MAX_OF_LIMIT = 1.1
@@ -42,7 +42,8 @@ CHI2_RANGE = (0.8, 1.25)
 
 
 def ring(folder):
-  """While it stands the machine turns by 0.5 mrad/s and rings at 3 Hz."""
+  """Adds to the gyroscope's z axis, in the first 3 s, a rate of 0.5 mrad/s and
+  a decaying oscillation of 3 Hz."""
   def change(rows):
     begin = int(rows[0][0])
     for row in rows:

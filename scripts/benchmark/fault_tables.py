@@ -1,11 +1,11 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSD-3-Clause
-"""What faults do: campaigns of kills and damaged files, and spoilt IMU logs.
+"""Effects of faults: campaigns of kills and damaged files, spoilt IMU logs.
 
 Runs the campaigns of scripts/checks/faults.py, a row each, and the chain with
-IMU logs that are spoilt, or slower, on drives of `adasfm_synthesizer` and a real
-one. Writes docs/results/faults.md. Needs Python's standard library and a C
-compiler.
+IMU logs that are spoilt or have a lower rate, on drives of `adasfm_synthesizer`
+and a real drive. Writes docs/results/faults.md. Needs Python's standard library
+and a C compiler.
 """
 
 import argparse
@@ -25,7 +25,7 @@ from verdict_table import Chain, set_value, zero_samples
 
 FAULTS = os.path.join(os.path.dirname(os.path.abspath(__file__)), '..',
                       'checks', 'faults.py')
-# What is done, and how often (faults.py).
+# Campaigns of faults.py, with the number of trials.
 CAMPAIGNS = {
     'kills': ('kill -9 at a random time, then the same command', 200),
     'injections': ('a call for writing, fsync, rename, mmap, memory or a thread '
@@ -70,7 +70,7 @@ SPOILT = {
     '5 % of the samples missing': drop_samples,
 }
 SPOILT_SEEDS = (7, 8)
-# An IMU of 200 Hz (that of kitti01-51 has 96), every n-th sample of it.
+# Every n-th sample is kept of an IMU of 200 Hz (96 Hz in kitti01-51).
 STEPS = (1, 3, 4, 5, 8, 20, 40)
 RATE_DRIVES = {
     'town': ['--num_images', '100'],
@@ -109,7 +109,7 @@ def count_named(output):
 
 
 def map_drive(folder, args):
-  """Errors of the model of a drive with the logs that lie there."""
+  """Runs the chain in the folder of a drive; returns the model's errors."""
   chain = Chain(args.colmap, folder)
   imported = chain.importer({'sensors': ('imu.csv', 'wheel.csv')})
   record = {'named': count_named(imported.stdout)}
@@ -125,7 +125,7 @@ def map_drive(folder, args):
 
 
 def run_campaign(name, folder, args):
-  """Counts of each outcome; goes on where it was stopped."""
+  """Counts of each outcome; a stopped campaign continues."""
   journal = os.path.join(folder, 'journal-%s' % hash_sources(args.root))
   arguments = [sys.executable, FAULTS, args.colmap, '--seed', str(SEED),
                '--journal', journal]

@@ -1,12 +1,13 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSD-3-Clause
-"""What the coarse global stage is worth, and what each of its steps buys.
+"""Measures the coarse global stage and the effect of each of its steps.
 
-Makes drives with look-alike places, a blackout and wheel slips, runs
+Makes drives with perceptual aliasing, a blackout and wheel slips, runs
 `adasfm_global` on them as it is and with single steps switched off, then
-`adasfm_mapper`, and writes docs/results/global_results.md and the figures behind it
-(benchmark/results/global_results.json). Verified pairs and matches are compared with the
-truth before and after. Needs only Python's standard library.
+`adasfm_mapper`, and writes docs/results/global_results.md and the figures
+behind it (benchmark/results/global_results.json). Verified pairs and matches
+are compared with the truth before and after. Needs only Python's standard
+library.
 """
 
 import argparse
@@ -33,7 +34,7 @@ VARIANTS = {
     'no match refinement': ['refine_matches'],
     'without sensors': None,
 }
-# A world has failed when the model lacks images or errs by more.
+# A world has failed if its model lacks images or has a larger error.
 MAX_ERROR_M = 0.5
 
 
@@ -174,7 +175,7 @@ def ablation_table(records, args):
 
 
 def world_table(records):
-  """Every world as it is."""
+  """A line for each run of the variant 'as it is'."""
   lines = ['| world | images | coarse: m | scale off % | final: m | scale off % |'
            ' reported against it |', '|---|---|---|---|---|---|---|']
   for record in records:

@@ -2,10 +2,11 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Without sensors: AdaSfM beside `colmap mapper` on the same matches.
 
-Makes worlds, clean ones and some with look-alike places, runs `adasfm_global`
+Makes worlds, clean ones and some with perceptual aliasing, runs `adasfm_global`
 and `adasfm_mapper` without priors, and `colmap mapper`, and writes
 docs/results/global_without_sensors.md and the figures behind it
-(benchmark/results/global_without_sensors.json). Needs only Python's standard library.
+(benchmark/results/global_without_sensors.json). Needs only Python's standard
+library.
 """
 
 import argparse
@@ -29,7 +30,7 @@ WORLDS = {
     'look-alikes and two blackouts': ['--alias_ratio', '0.05',
                                       '--num_blackouts', '2'],
 }
-# A model that errs by more is folded or bent.
+# A model with a larger error is folded or bent.
 MAX_ERROR_M = 1.0
 
 
@@ -109,7 +110,7 @@ def ratio_to_mapper(records):
 
 
 def count_folded(records):
-  """Of all models, the folded ones; and those nothing is said against."""
+  """Numbers of folded coarse models, and of those without a warning."""
   folded = silent = 0
   for record in records:
     for model, suspected in zip(record.get('coarse', []),

@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSD-3-Clause
-"""Other worlds and worse sensors: where does the coarse global stage end?
+"""Other worlds and worse sensors: where does the coarse global stage fail?
 
-Makes drives with look-alike places, blackouts and wheel slips, spoils their
+Makes drives with perceptual aliasing, blackouts and wheel slips, spoils their
 logs, calibration or database (clocks, extrinsics, noise, rates, holes, focal
 length), runs the importer, `adasfm_global` and `adasfm_mapper` on them, and
 writes docs/results/global_worlds.md and the figures behind it
@@ -107,7 +107,7 @@ WORLDS = {
         {'spacing': 3, 'image_interval': 1, 'num_neighbors': 6}),
 }
 PLAIN = {'alias_ratio': 0.05, 'num_blackouts': 2, 'wheel_slips': 2}
-# A model that errs by more must come with a warning.
+# A model with a larger error must come with a warning.
 MAX_ERROR_M = 0.5
 
 
@@ -179,7 +179,7 @@ def cells(figures_of_model):
 
 
 def describe(record):
-  """What the commands said against the result."""
+  """The errors and warnings of the commands about the result, in short."""
   said = []
   if 'error' in record:
     said.append(record['error'])

@@ -4,9 +4,9 @@
 
 Makes a clean world of `adasfm_synthesizer` for each size, runs the three
 commands on its database, compares both models with the truth, and writes the
-table of docs/results/growth.md and docs/images/growth.svg. With --limits also
-the limit of those sizes: triangulation from the true poses and one adjustment
-to convergence. Needs matplotlib.
+table of docs/results/growth.md and docs/images/growth.svg. With --limits the
+table has the limit of those sizes, too: triangulation from the true poses and
+one adjustment to convergence. Needs matplotlib.
 """
 
 import argparse
@@ -27,7 +27,7 @@ from benchmarking.process import run
 
 STEPS = {'import': 'import', 'global': '`adasfm_global`',
          'mapper': '`adasfm_mapper`'}
-# Exponents are from here to the largest size.
+# Exponents are computed from this size on to the largest size.
 FIRST_OF_EXPONENTS = 1000
 
 
@@ -75,7 +75,8 @@ def peak_mb(record):
 
 
 def exponent(records, value):
-  """Between the first and the last of the sizes that count; None of one."""
+  """Slope of log(value) over log(images) between the first and the last size
+  from FIRST_OF_EXPONENTS on; None for less than two sizes."""
   counted = [r for r in records if r['num_images'] >= FIRST_OF_EXPONENTS]
   if len(counted) < 2:
     return None

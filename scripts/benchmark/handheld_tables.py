@@ -3,10 +3,11 @@
 """Recordings of phones and handheld cameras, beside COLMAP's mappers.
 
 Runs `adasfm_automatic_reconstructor` on each recording with its IMU and
-without, from a clock's offset of 0, and COLMAP's mappers on the database of the
-first run with the geometries as COLMAP verified them (`adasfm_restorer`).
-Writes docs/results/handheld.md. The recordings are clones that the user brings
-(benchmarking/handheld.py). Needs only Python's standard library.
+without, from an initial time offset of 0, and COLMAP's mappers on the database
+of the first run with the geometries as COLMAP verified them
+(`adasfm_restorer`). Writes docs/results/handheld.md. The user provides clones
+with the recordings (benchmarking/handheld.py). Needs only Python's standard
+library.
 """
 
 import argparse

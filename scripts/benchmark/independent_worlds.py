@@ -2,10 +2,11 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Worlds of a second generator, which shares nothing with adasfm_synthesizer.
 
-Its own streets, motion, sensors, visibility and noise; COLMAP itself verifies
-the matches. Writes into a folder what the three commands read (database.db,
-imu.csv, wheel.csv, times.csv, sensors.yaml), the truth (gt.txt) and what the
-world is like (world.json). docs/guide/synthetic.md describes it. Needs numpy.
+This generator has its own streets, motion, sensors, visibility and noise;
+COLMAP itself verifies the matches. Writes into a folder the input of the three
+commands (database.db, imu.csv, wheel.csv, times.csv, sensors.yaml), the truth
+(gt.txt) and a description of the world (world.json).
+docs/guide/synthetic.md describes the generator. Needs numpy.
 """
 
 import argparse
@@ -20,8 +21,8 @@ from independent import files, images, motion, streets
 MIN_NUM_MATCHES = 20
 # Grid of junctions [m] and their jitter, lateral distance of facades, their
 # height and distance from junctions, radius of corners [m], metres per image,
-# m/s under way. alias_classes: templates per street (below 1 some streets look
-# alike); alias_share: share of a street's landmarks that the template decides.
+# speed [m/s]. alias_classes: templates per street (below 1 some streets look
+# alike); alias_share: share of a street's landmarks with the template's looks.
 TOWN = dict(grid=(58.0, 47.0), jitter=7.0, setback=(5.0, 9.0), height=9.0,
             clear=7.0, corner=3.0, weave=0.35, hills=0.15, spacing=1.5,
             speed=8.0, camera_height=1.3, outlier_ratio=0.15, alias_classes=1.0,
@@ -57,7 +58,8 @@ def make_scene(kind, args, length_m, rng):
 
 
 def make_mounting(kind, rng):
-  """wheel_from_imu, a little turned, and wheel_from_cam, looking ahead."""
+  """wheel_from_imu with a small rotation, and wheel_from_cam of a camera that
+  looks ahead."""
   wheel_from_imu, wheel_from_cam = np.eye(4), np.eye(4)
   wheel_from_imu[:3, :3] = motion.euler(*rng.normal(0, np.radians(1.5), 3))
   wheel_from_imu[:3, 3] = [0.35, -0.12, 0.3]
@@ -69,7 +71,8 @@ def make_mounting(kind, rng):
 
 
 def image_times(kind, num_images):
-  """Evenly spread, but for holes, in each of which a twelfth is missing."""
+  """Image times [s], evenly spaced except for holes, each as long as a twelfth
+  of num_images."""
   missing = num_images // 12
   times = (motion.STANDSTILL_S + 0.2 + kind['spacing'] / kind['speed'] *
            np.arange(num_images + missing * kind['num_holes']))
@@ -80,7 +83,8 @@ def image_times(kind, num_images):
 
 
 def choose_blackouts(count, num_images, rng):
-  """First and last image of stretches without texture, one in each part."""
+  """First and last image of `count` intervals without texture, one in each of
+  `count` equal parts of the drive."""
   blackouts = []
   for i in range(count):
     begin = int((i + rng.uniform(0.3, 0.7)) * num_images / count)

@@ -5,9 +5,9 @@
     scripts/benchmark/match_exactly.py DATABASE MATCHES.txt [MAX_NUM_FEATURES]
 
 Exact nearest neighbours among the MAX_NUM_FEATURES (500) largest features of
-every image, with COLMAP's tests: angle at most 0.7 rad, ratio to the second best
-at most 0.8, best in both directions, 15 matches. On a CPU that is several times
-as fast as exhaustive_matcher, and repeatable. COLMAP verifies the result:
+every image, with COLMAP's tests: angle at most 0.7 rad, ratio to the second
+best at most 0.8, best in both directions, 15 matches. On a CPU this is several
+times as fast as exhaustive_matcher, and repeatable. COLMAP verifies the result:
 
     colmap matches_importer --match_type raw --match_list_path MATCHES.txt
 """
@@ -30,7 +30,7 @@ def scales(keypoints):
 
 
 def read_features(path, max_num_features):
-    """By name: indices of the largest features, unit descriptors."""
+    """{name: (indices of the largest features, unit descriptors)}."""
     database = sqlite3.connect('file:%s?mode=ro' % path, uri=True)
     features = {}
     for name, rows, columns, points, descriptors in database.execute(
@@ -48,7 +48,7 @@ def read_features(path, max_num_features):
 
 
 def best_in_rows(cosines):
-    """Index of each row's best, and whether it passes angle and ratio."""
+    """Index of each row's best match, and whether it passes both tests."""
     rows = np.arange(len(cosines))
     best = np.argmax(cosines, axis=1)
     first = np.arccos(np.minimum(cosines[rows, best], 1))

@@ -1,14 +1,14 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSD-3-Clause
-"""What share of the true pairs a pair list holds.
+"""Recall of a pair list: its share of the true pairs.
 
     scripts/benchmark/pair_recall.py EXHAUSTIVE.db PAIRS.txt
 
 EXHAUSTIVE.db has been matched exhaustively (match_exactly.py), or is that of
 adasfm_synthesizer: its verified pairs are the truth. PAIRS.txt is the output of
-adasfm_pair_generator. Prints the recall for pairs of at least 15, 30, 60, 120 and
-240 verified matches, of all pairs and of those more than 10 images apart (in the
-order of the names), and the recall of the best list that has as many partners
+adasfm_pair_generator. Prints the recall for pairs of at least 15, 30, 60, 120
+and 240 verified matches, for all pairs and for pairs more than 10 images apart
+(in the order of the names), and the recall of the best list with 30 partners
 for every image.
 """
 import sqlite3
@@ -37,7 +37,7 @@ def read_pairs(path, rank):
 
 
 def best_recall(truth, num_similar):
-    """Of a list with each image's num_similar best true partners."""
+    """Recall of a list of each image's num_similar best true partners."""
     partners = {}
     for pair, rows in truth.items():
         for image in pair:

@@ -2,13 +2,13 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The tables and figures of the AdaSfM paper (ICRA 2023) on our sets.
 
-Table I's histograms of inlier ratios, Tables II and III in form, the view graph
-with and without augmentation, merge trials with fixed and adaptive thresholds,
-and match refinement on look-alike, mirrored and hardly textured pairs. COLMAP's
-mapper, the coarse model and AdaSfM in Tables II and III are the runs of README's
-table (step readme of all.py), the histograms those of two_view_tables.py; the
-others are run here. Writes docs/results/paper.md and docs/images/paper_*. Needs
-numpy and matplotlib.
+These are Table I's histograms of inlier ratios, tables in the form of Tables II
+and III, the view graph with and without augmentation, merge trials with fixed
+and adaptive thresholds, and match refinement on aliased, mirrored and hardly
+textured pairs. COLMAP's mapper, the coarse model and AdaSfM in Tables II and
+III are the runs of README's table (step readme of all.py); the histograms are
+those of two_view_tables.py; everything else is run here. Writes
+docs/results/paper.md and docs/images/paper_*. Needs numpy and matplotlib.
 """
 
 import argparse
@@ -27,12 +27,12 @@ from benchmarking.process import run
 from benchmarking.sets import REAL_SETS, make_database
 from benchmarking.view_graph import run_view_graph
 
-# Fragments, revisits that look alike, wheels that slip: the world of the view
-# graph and of the merge trials.
+# The world of the view graph and of the merge trials: fragments, perceptual
+# aliasing, wheel slips.
 WORLD = ['--num_images', '250', '--alias_ratio', '0.05', '--num_blackouts', '2',
          '--wheel_slips', '2']
-# hierarchical_mapper is not run where COLMAP's mapper takes longer than all that
-# is run here.
+# Sets without a run of hierarchical_mapper: COLMAP's mapper alone takes longer
+# there than everything that this script runs.
 TOO_LONG = ('world-kitti10-592',)
 
 
@@ -90,7 +90,7 @@ def read_figures(path):
 
 
 def check_version(benchmark, stamp, args):
-  """The rows of README's table are of the same sources and machine."""
+  """Raises MixedVersions if README's table is of other sources or machine."""
   for key in ('sources', 'machine'):
     if benchmark['stamp'][key] != stamp[key]:
       raise MixedVersions('%s is of other %s: run the step readme first' % (

@@ -2,11 +2,11 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Real photos from an empty workspace to a model, beside COLMAP's mappers.
 
-Runs `adasfm_automatic_reconstructor` on each set of photos, with its logs where
-there are any, as it is and with cheaper features; then on its database the
-mapper with parts of at most 50 images, and, with the geometries as COLMAP
-verified them, the mappers of COLMAP 3.8 and 4. Writes docs/results/photos.md.
-Needs only Python's standard library.
+Runs `adasfm_automatic_reconstructor` on each set of photos, with logs if the
+set has them, as it is and with cheaper features. On the resulting database it
+runs adasfm_mapper with parts of at most 50 images and, with the geometries as
+COLMAP verified them, the mappers of COLMAP 3.8 and 4. Writes
+docs/results/photos.md. Needs only Python's standard library.
 """
 
 import argparse
@@ -23,8 +23,8 @@ from benchmarking.methods import SMALL_PARTS, log_options, run_mapper
 from benchmarking.process import Failed, run
 from benchmarking.sets import camera_params
 
-# Sets, and the camera's options: None: those of sensors.yaml, with its logs;
-# none: EXIF's focal length, which is refined.
+# Sets and their camera options. None: parameters of sensors.yaml, with the set's
+# logs; empty: EXIF's focal length, which is refined.
 PHOTOS = {
     'kitti01-51': None,
     'kitti06-51': None,
@@ -42,7 +42,7 @@ PARTS_NAME = 'mapper alone, parts of 50'
 
 
 def options_of(name, args):
-  """What the command gets besides paths of photos and workspace."""
+  """Options of the command besides the paths of photos and workspace."""
   source = os.path.join(args.data_path, name)
   options = PHOTOS[name]
   if options is None:
@@ -53,13 +53,13 @@ def options_of(name, args):
 
 
 def count(model, file):
-  """The number that a file of COLMAP's binary models begins with."""
+  """The count at the beginning of a file of COLMAP's binary models."""
   with open(os.path.join(model, file), 'rb') as stream:
     return struct.unpack('<Q', stream.read(8))[0]
 
 
 def outcome(output, source, usage, args, log_path):
-  """The largest model's images, points and error, and what it took."""
+  """Images of all models, points and error of the largest, CPU time, memory."""
   result = {'cpu_s': round(usage.cpu_seconds, 1),
             'peak_mib': round(usage.peak_mib)}
   models = [os.path.join(output, name) for name in sorted(os.listdir(output))
@@ -106,7 +106,7 @@ def run_parts(name, workspace, folder, args):
 
 
 def run_peer(source, fixed, command, executable, workspace, folder, args):
-  """On the geometries as they were before adasfm_global."""
+  """Runs a mapper of COLMAP on the geometries as before adasfm_global."""
   log_path = folder + '.log'
   os.makedirs(folder)
   database = os.path.join(folder, 'database.db')

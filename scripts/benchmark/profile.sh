@@ -1,8 +1,8 @@
-#!/bin/bash
+#!/usr/bin/env bash
 # SPDX-License-Identifier: BSD-3-Clause
 # Profiles the three commands on a clean world with perf (Debian's linux-perf):
-# profile.sh [images]. The symbols with most CPU time of their own, per command,
-# go to adasfm-benchmark/profile-IMAGES/profile.md.
+# profile.sh [images]. Writes the symbols with most own CPU time, per command, to
+# adasfm-benchmark/profile-IMAGES/profile.md.
 # Environment: COLMAP, the executable (default: setup.sh's).
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/../.."
@@ -26,8 +26,8 @@ mkdir -p "$folder"
 printf '# Profile of %s images\n\nCommit %s, %s.\n' "$images" \
   "$(git describe --always --dirty 2> /dev/null || echo unknown)" "$(nproc) cores" > "$folder/profile.md"
 
-# Runs one command under perf and appends its table. Sampling by the CPU's clock
-# works in virtual machines too.
+# Runs one command under perf and appends its table. Sampling by cpu-clock works
+# in virtual machines, too.
 profile() {
   local name=$1
   shift

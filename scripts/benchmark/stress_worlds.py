@@ -1,14 +1,14 @@
 #!/usr/bin/python3
 # SPDX-License-Identifier: BSD-3-Clause
-"""One world for each thing that can go wrong: what it has, and what comes out.
+"""One world for each difficulty (dial): its figures and the resulting models.
 
-Makes each dial's world with `adasfm_synthesizer`, reads from its world.json what
-the world really has, runs `adasfm_prior_importer`, `adasfm_global` and
-`adasfm_mapper` on it, or `adasfm_automatic_reconstructor` where the world has
-photos, and all but the importer again without any log, compares all
-models with the truth, and writes a table: one row a dial and seed. A model is
-folded when its camera centres err by more than a bar after a similarity; a fold
-without a warning is the one thing that must not happen. Needs numpy.
+Makes each dial's world with `adasfm_synthesizer` and reads the world's figures
+from its world.json. Runs `adasfm_prior_importer`, `adasfm_global` and
+`adasfm_mapper` on the world, or `adasfm_automatic_reconstructor` if the world
+has photos, then the same without any log and importer. Compares all models with
+the truth and writes a table of one row per dial and seed. A model is folded if
+its camera centres err by more than a bar after a similarity; a folded model
+must come with a warning. Needs numpy.
 """
 
 import argparse
@@ -43,7 +43,7 @@ def list_models(folder):
 
 
 def map_world(folder, logs, args):
-  """Imports the logs, runs both commands; returns what came out."""
+  """Imports the logs and runs both commands; returns read_outcome()."""
   suffix = 'with' if logs else 'without'
   log_path = os.path.join(folder, suffix + '.log')
   database = os.path.join(folder, suffix + '.db')
@@ -71,7 +71,7 @@ def map_world(folder, logs, args):
 
 
 def map_photos(folder, logs, args):
-  """From photos to a model by one command; returns what came out."""
+  """Runs one command from photos to models; returns read_outcome()."""
   suffix = 'with' if logs else 'without'
   log_path = os.path.join(folder, suffix + '.log')
   workspace = os.path.join(folder, suffix)
@@ -116,7 +116,8 @@ def judge(outcome, bar_m, num_images):
   if outcome['rmse_m'] is None:
     return 'no model'
   is_folded = outcome['rmse_m'] > bar_m
-  # What is left out or stays apart says nothing of the models that there are.
+  # Warnings about images left out or models kept apart are not about the models
+  # that exist.
   is_told = any(not any(words in text for words in NOT_ABOUT_A_MODEL)
                 for text in outcome['warnings'])
   if is_folded:
@@ -125,7 +126,7 @@ def judge(outcome, bar_m, num_images):
 
 
 def describe_failure(error, folder):
-  """The last error of the logs: a command that refuses a world says why."""
+  """The last ERROR line of the logs, or the exception without one."""
   said = []
   for name in ('with.log', 'without.log'):
     path = os.path.join(folder, name)
@@ -171,7 +172,7 @@ def run_dial(name, seed, args):
 
 
 def format_figures(record):
-  """What the world has, or why there is none."""
+  """The world's figures, or why there is no world."""
   world = record.get('world', {})
   return record.get('error', ', '.join(
       format_figure(key, world[key]) for key in DIALS[record['dial']]['figures']
@@ -186,7 +187,7 @@ def count_silent(records):
 
 
 def format_pairs(pairs):
-  """Lost of the true ones, of those the ones of right pose; kept false ones."""
+  """Lost true pairs (of right pose) of all, and kept false pairs of all."""
   if not pairs:
     return '-'
   return '%d (%d) of %d, %d of %d' % (
@@ -235,8 +236,8 @@ def report(records, args):
 
 
 def summary_cells(outcomes):
-  """Of all seeds: how many of each verdict, and the errors. A world that could
-  not be made counts as refused."""
+  """Number of each verdict over all seeds, and the errors. Failed commands,
+  runs without a model and worlds that could not be made count as refused."""
   verdicts = collections.Counter(o.get('verdict', 'not made')
                                  for o in outcomes)
   errors = sorted(o['rmse_m'] for o in outcomes if o.get('rmse_m') is not None)
@@ -249,7 +250,7 @@ def summary_cells(outcomes):
 
 
 def report_summary(records, args):
-  """A row a dial and kind of run, over the seeds."""
+  """A row for each dial and kind of run, over the seeds."""
   lines = ['Written by `scripts/benchmark/stress_worlds.py --summary 1 --seeds '
            '%s`: worlds whose models are whole, miss images, err by more than '
            'the bar with a warning about a model or without any word, and those '

@@ -2,11 +2,11 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Relative poses of photos: COLMAP's RANSAC, and after the coarse stage.
 
-The form of the paper's Table I and of its inlier histograms, on SIFT features
-of photos, real and rendered, which COLMAP extracts, matches and verifies: for
-the pairs as COLMAP verified them, those that `adasfm_global` keeps, and these
-with the matches and poses that it writes. Writes docs/results/two_view.md.
-Needs only Python's standard library.
+Tables and inlier histograms in the form of the paper's Table I, on SIFT
+features of real and rendered photos, which COLMAP extracts, matches and
+verifies. They cover all pairs as COLMAP verified them, the pairs that
+`adasfm_global` keeps, and the kept pairs with the matches and poses that it
+writes. Writes docs/results/two_view.md. Needs only Python's standard library.
 """
 
 import argparse

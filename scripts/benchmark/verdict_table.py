@@ -1,22 +1,22 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSD-3-Clause
-"""Verdict against error: is a model that is called good a good one?
+"""Verdict against error: are models with the verdict "good" accurate?
 
-Runs the chain on synthetic worlds, as they are, hard, and spoilt in ways that
-users spoil them, and writes a table of the verdict of adasfm_mapper beside the
-model's error and two limits, each the error of the mapper from the true poses:
-with the run's own imported data and priors (and the metres that adasfm_global
-found by its accelerometer, if any), and with the unspoilt data. Errors
-are in metres where the model claims metres, of the shape (after a similarity)
-otherwise. Fails when a model is called good that errs
-- by more than MAX_RATIO times its own limit, or
-- by more than MAX_RATIO times the unspoilt limit in its shape: what spoilt data
-  do to a limit, too, excuses nothing, or
-- in metres by more than MAX_SIGMAS of the relative sigma that the verdict states
-  (`metric_sigma`); the unspoilt limit's metres are another draw of that sigma,
-  perhaps near zero, so that they are printed and not judged by,
-or when one is called failed, though not for lost images, whose error is within
-MAX_RATIO of the unspoilt limit or whose shape and metres are right by the above.
+Runs the chain on synthetic worlds: as they are, hard, and with faults that
+users make. Writes a table of the verdict of adasfm_mapper beside the model's
+error and two limits. A limit is the error of the mapper from the true poses:
+the own limit uses the run's own imported data and priors (and the metric scale
+that adasfm_global found by the accelerometer, if any), the unspoilt limit the
+unspoilt data. Errors are in metres if the model is metric, else of the shape
+(after a similarity). Fails if a model with the verdict "good" has
+- an error above MAX_RATIO times its own limit, or no own limit, or
+- a shape error above MAX_RATIO times the unspoilt limit's, since spoilt data
+  may raise the own limit as well, or
+- a scale error above MAX_SIGMAS of the relative sigma that the verdict states
+  (`metric_sigma`). The unspoilt limit's scale error is another draw of that
+  sigma, perhaps near zero, so its error in metres is printed, not judged by.
+Also fails if a model with the verdict "failed", other than for lost images, has
+an error within MAX_RATIO of the unspoilt limit, or passes the last two tests.
 Needs only Python's standard library.
 """
 
@@ -40,14 +40,14 @@ from global_worlds import PLAIN, WORLDS, world
 
 MAX_RATIO = 3.0
 MAX_SIGMAS = 3.0
-# So that few images have room for it: streets are driven once.
+# Streets are driven once, so that the worlds fit into few images.
 BASE = dict(PLAIN, alias_ratio=0, num_blackouts=1, blackout_images=6)
-# Of worlds that ask for look-alikes or longer blackouts.
+# Worlds with perceptual aliasing or longer blackouts have at least this many.
 MIN_IMAGES_OF_LARGE = 200
 LARGE = {'alias_ratio', 'blackout_images'}
-# The first reason of a verdict that is not about the error.
+# The first reason of a verdict "failed" that is not about the error.
 LOST_IMAGES = re.compile(r'failed: \d+ of \d+ images are lost')
-# What a figure of a few decimetres of drive is worth at best [m].
+# Smallest limit that ratios are formed with, for short drives [m].
 LEAST_LIMIT_M = 0.01
 
 
@@ -124,9 +124,9 @@ WRONG = {
 }
 
 
-# Errors of a model: of its shape and in metres as they are (of the shape when
-# there are none) [m], true metres per metre, and their stated relative sigma;
-# None: no metres, or no stated sigma.
+# Errors of a model: after a similarity [m], after a rigid alignment [m] (after a
+# similarity if the model is not metric), scale (true metres per metre; None: not
+# metric) and the stated relative sigma of the scale (None: not stated).
 Errors = collections.namedtuple('Errors', 'shape_m metric_m scale sigma')
 
 
@@ -176,10 +176,11 @@ class Chain:
 
 
 def limit_of(chain, name):
-  """Errors from the true poses with the database as it is; None: no model."""
+  """Errors of the mapper from the true poses, with the database as it is; None
+  without a model."""
   write_true_poses(chain.path('database.db'), chain.path('gt.txt'),
                    chain.path('truth'), matched_only=False)
-  # Its own verdict may be "failed", with a model all the same.
+  # The mapper's verdict may be "failed" although it writes a model.
   chain.mapper('truth', name, {})
   if not os.path.exists(chain.path(name + '/summary.json')):
     return None
@@ -191,7 +192,7 @@ Run = collections.namedtuple('Run', 'result said errors own unspoilt',
 
 
 def run_world(colmap, folder, options, images, seed):
-  """Verdict and last line, Errors of the model and of both limits."""
+  """Makes and maps one world; returns a Run."""
   shutil.rmtree(folder, ignore_errors=True)
   chain = Chain(colmap, folder)
   arguments = dict(BASE, **options['synthesizer'])
@@ -225,7 +226,8 @@ def run_world(colmap, folder, options, images, seed):
     return Run('no model', done.stderr, None, own, unspoilt)
   errors = chain.errors('m')
   if errors.scale is not None and own and own.scale is None:
-    # Metres that an accelerometer tells come by adasfm_global: so do the limit's.
+    # The metric scale from the accelerometer was added by adasfm_global, so the
+    # limit must be computed after it.
     own = limit_of(chain, 'own_in_metres')
   return Run(verdict['result'], verdict['line'], errors, own, unspoilt)
 
@@ -235,7 +237,7 @@ def ratio(error_m, limit_m):
 
 
 def error_ratio(errors, limit):
-  """In metres where the model claims them, of the shapes otherwise."""
+  """Ratio of errors in metres if the model is metric, else of shape errors."""
   if errors.scale is None:
     return ratio(errors.shape_m, limit.shape_m)
   return ratio(errors.metric_m, limit.metric_m)
@@ -263,7 +265,7 @@ def judge(run):
 
 
 def to_record(name, seed, run, folder):
-  """For a file that may be read elsewhere: without this machine's paths."""
+  """The run as JSON, without paths of this machine."""
   said = (run.said.strip().splitlines() or [''])[-1]
   return dict(name=name, seed=seed, result=run.result,
               said=said.replace(folder + '/', ''), **{
@@ -289,7 +291,7 @@ def table_row(record, run, judgement):
 
 
 def summary(rows):
-  """How many verdicts of each kind err by how much of their own limit."""
+  """Numbers of verdicts of each kind by the ratio of error to own limit."""
   lines = ['%d runs; wrong: %d; without a model: %d.' % (
       len(rows), sum(judgement.wrong for _, judgement in rows),
       sum(run.errors is None for run, _ in rows)), '',

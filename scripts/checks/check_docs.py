@@ -1,19 +1,19 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSD-3-Clause
-"""Checks that README.md and docs/ say what the program does:
+"""Checks README.md and docs/ against the program:
 
   scripts/checks/check_docs.py COLMAP [--run] [FILE...]
 
 Every `colmap` command of the text must exist and have the options that it is
 shown with; every `--option` and `Group.option` named anywhere must exist; links
-to files must lead somewhere; and each option's help must explain it, with a unit
-and a default. Blocks of commands are ```sh, which --run runs in the order of the
-text, in a stand-in for a checkout, with a small rendered drive under the names
-that the documentation uses; SMALLER lists the arguments that keep this short.
-```console REASON is shown only, and listed. ```python is run as well where the
-modules that it wants are installed, ```cmake in a project of its own against what
-`cmake --install` has installed before. With a host COLMAP (ADASFM_HOST_COLMAP) of 3.13
-or later the options of NEWER_NAMES are spelt as that one does."""
+to files must lead to a file; and each option's help must explain it, with a
+unit and a default. --run runs blocks of ```sh in the order of the text, in a
+stand-in for a checkout, with a small rendered drive under the names that the
+documentation uses; SMALLER lists the arguments that keep the runs short.
+```console REASON is shown only, and listed. --run also runs ```python if the
+modules that it imports are installed, and ```cmake in a separate project
+against what an earlier `cmake --install` has installed. With a host COLMAP
+(ADASFM_HOST_COLMAP) of 3.13 or later, options of NEWER_NAMES get its names."""
 import argparse
 import importlib.util
 import os
@@ -31,19 +31,18 @@ from command_help import read_commands, read_host_options  # noqa: E402
 from docs_drive import (  # noqa: E402
     make_checkout, make_drive, write_program)
 
-# Options of other programs that the text may name; those of our scripts are read
-# from them.
+# Options of other programs that the text may name; the options of our scripts
+# are read from the scripts.
 OTHER_OPTIONS = {
     'Group.name', 'option', 'install', 'prefix', 'build', 'target', 'simulate',
     'benchmark_filter'}
-# What the first word of a shown command may be, besides ours and paths in this
-# repository.
+# Programs that the text may call, besides ours and paths in this repository.
 OTHER_PROGRAMS = {
     'cmake', 'export', 'sudo', 'cd', 'cp', 'cpack', 'mkdir', 'sqlite3'}
 COMMAND = re.compile(
     r'((colmap|colmap-adasfm|cmake|cpack|sudo)\s|scripts/\w'
     r'|[\w./$"-]*/bin/\w)')
-# What is appended to a command when it is run, so that it takes seconds.
+# Arguments appended to a command that is run, so that it takes seconds.
 SMALLER = {
     'scripts/benchmark/benchmark.py':
         '--max_num_images 100 --methods adasfm_no_candidates',
@@ -65,15 +64,16 @@ SMALLER = {
 # Options that COLMAP 3.13 has moved, which the text names beside the older ones.
 NEWER_NAMES = {'SiftExtraction.use_gpu': 'FeatureExtraction.use_gpu',
                'SiftMatching.use_gpu': 'FeatureMatching.use_gpu'}
-# Run where nothing has been built yet.
+# Commands that run in fresh/, where nothing has been built yet.
 FRESH = re.compile(r'scripts/setup\.sh|cmake -[SB]')
-# Blocks that are left out, and said to be, where what they need is missing.
+# Blocks with the word are left out, with a message, if the command fails.
 NEEDS = [('clang++', ['clang++', '--version']),
          ('profile.sh', ['perf', 'record', '-q', '-e', 'cpu-clock', '-o',
                          '/dev/null', 'true'])]
-# What our program says when it was built without an optional library.
+# The message of our program when it was built without an optional library.
 NOT_BUILT = 'this build cannot read ROS bags'
-# Of several that fit a name the longest counts: _m_s is no _s.
+# Units by the suffix of an option's name; the longest suffix that fits counts,
+# so _m_s is not _s.
 UNITS = {'px': r'\[px', 'deg': r'\[deg', 'm': r'\[m', 's': r'\[s',
          'm_s': r'\[m/s', 'm_s2': r'\[m/s\^2', 'rad_s': r'\[rad/s', 'per_m': r'/m\]',
          'm_s_sqrt_hz': r'\[m/s/sqrt\(Hz', 'rad_sqrt_s': r'\[rad/sqrt\(s',
@@ -110,7 +110,7 @@ def read_blocks(path):
 
 
 def spell_for(colmap):
-    """A function that gives lines the host's names of options."""
+    """A function that replaces option names in a line by the host's names."""
     is_newer = ('FeatureExtraction.use_gpu' in
                 set(read_host_options(colmap, 'feature_extractor')))
 
@@ -270,13 +270,13 @@ class Runner:
         programs = folder / 'programs'
         programs.mkdir()
         (programs / 'colmap').symlink_to(colmap)
-        # Nothing is installed into the system: neither by apt ...
+        # Commands run without root; apt only simulates (SMALLER).
         write_program(programs / 'sudo', 'exec "$@"')
         self.environment = dict(
             os.environ, PATH='%s:%s' % (programs, os.environ['PATH']),
-            # ... nor by cmake --install.
+            # cmake --install installs into the folder, not into the system.
             DESTDIR=str(folder / 'installed'),
-            # The next run finds what this one compiled, wherever that was.
+            # ccache reuses objects of a run in another folder.
             CCACHE_BASEDIR=str(folder), CCACHE_NOHASHDIR='1')
         for name in ('ADASFM_BUILD_DIR', 'COLMAP'):
             self.environment.pop(name, None)

@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: BSD-3-Clause
-# Fails when a source file is not as clang-format writes it, or lacks its
-# licence line. With --fix the format is mended.
+# Fails if a source file is not formatted by clang-format, or lacks its licence
+# line. --fix corrects the format.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/../.."
 

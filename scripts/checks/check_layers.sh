@@ -1,12 +1,12 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: BSD-3-Clause
-# Fails when a room (a folder of sources) includes what it may not know, or when
-# a file outside colmap_ext/host/v*/ includes a COLMAP header.
+# Fails if a room (a folder of sources) includes a room that it may not include,
+# or if a file outside colmap_ext/host/v*/ includes a COLMAP header.
 #
 # The table below is the architecture: a room, and the rooms whose headers it
 # may include besides its own. A room with a trailing /... stands for all rooms of
-# that layer. A room stands below those that it may include, so the order of the
-# table is a proof that there is no cycle.
+# that layer. Each room is listed below the rooms that it may include, so the order
+# of the table proves that there is no cycle.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/../.."
 
@@ -68,7 +68,7 @@ fail() {
   failed=1
 }
 
-# The includes of the sources right in a folder: FILE:"HEADER.
+# The includes of the sources directly in a folder, as FILE:"HEADER.
 includes() {
   grep -HoE '^[[:space:]]*#[[:space:]]*include[[:space:]]*[<"][^>"]+' \
     "$1"/*.h "$1"/*.cc 2> /dev/null | sed -E 's/:[^<"]*[<"]/:/' || true

@@ -27,7 +27,7 @@ def call(colmap, folder, *arguments):
 
 def make_drive(colmap, folder):
     """Photos, logs and calibration under the names of the documentation, and
-    what learned models would give; returns the camera's parameters."""
+    stand-ins for outputs of learned models; returns the camera's parameters."""
     call(colmap, folder, 'adasfm_synthesizer', '--output_path', '.',
          '--num_images', str(NUM_RENDERED), '--seed', str(SEED), '--image_width',
          '400', '--image_height', '250', '--render', '1')
@@ -54,9 +54,10 @@ def make_drive(colmap, folder):
 
 
 def make_checkout(root, folder, build):
-    """Links to all of the repository but for what the commands write. build/ has
-    links to the build, so that packages end up here; in fresh/ there is none, as
-    after a clone. setup.sh has been run in the one and not in the other."""
+    """Links to the repository, except to what the commands write. The folder is
+    like a checkout after setup.sh: build/ has links to the build, so that
+    packages end up here, and its setup.sh does nothing. fresh/ is like a new
+    clone: it has no build, and the real setup.sh."""
     fresh = folder / 'fresh'
     fresh.mkdir()
     for item in root.iterdir():
@@ -82,8 +83,9 @@ def write_program(path, text):
 
 
 def write_learned(colmap, folder, camera):
-    """features/, matches.txt, vectors.txt and an HDF5 file as if made by
-    networks; they are SIFT's, and descriptors that go by the order."""
+    """features/, matches.txt, vectors.txt and, with h5py, an HDF5 file as if
+    made by networks. Features and matches are SIFT's; the global descriptors
+    depend only on the order of the images."""
     extraction, matching = feature_groups(os.path.abspath(colmap))
     call(colmap, folder, 'feature_extractor', '--database_path', 'learned.db',
          '--image_path', 'photos', '--ImageReader.single_camera', '1',

@@ -9,13 +9,16 @@ Campaigns on a world of 30 images, in every command that writes:
   limits      files may not grow beyond a size
   twice       the same command two times at once
   files       a database, model, checkpoint or log is damaged
-After all but the last the same command again must end as undisturbed, byte by
-byte. A disturbed command ends in time with exit code 0 and the undisturbed
-result, or with 1 and an ERROR line. On damaged files a command does so too,
-with whatever result and without using much more memory than usual.
+After all but the last, the same command again must end with the undisturbed
+result, byte by byte except for logs, times and SQLite's layout of databases. A
+disturbed command ends in time with exit code 0 and the undisturbed result, or
+with 1 and an ERROR line. On damaged files a command may end with any result,
+except that damaged checkpoints must give the undisturbed model; it must not use
+much more memory than usual.
 
-Prints what went wrong with what repeats it, and a line of counts; fails when
-anything did. Needs Python's standard library and a C compiler.
+Prints each error with the arguments that repeat it, and a line of counts per
+campaign; fails after any error. Needs Python's standard library and a C
+compiler.
 """
 
 import argparse
@@ -31,7 +34,7 @@ from faulting.trials import (Injections, try_file, try_kill, try_limit,
                              try_two)
 from faulting.world import CASES, World, Wrong
 
-# How many make a long run.
+# Numbers of trials of a long run.
 CAMPAIGNS = {'kills': 200, 'injections': 500, 'limits': 100, 'twice': 50,
              'files': 10000}
 
@@ -101,7 +104,7 @@ class Runner:
     self.write_journal(campaign, number, outcome)
 
   def run_all(self):
-    """The campaign that lacks most of its share is next."""
+    """Runs next the campaign with the smallest share of its trials done."""
     started = time.monotonic()
     wanted = {name: getattr(self.args, name) for name in CAMPAIGNS
               if getattr(self.args, name) > 0}

@@ -1,17 +1,17 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: BSD-3-Clause
 # Builds all our code with sanitizers and runs the whole chain on a small world
-# and on photos with four threads; fails when a command does, as it does on a finding.
+# and on photos with four threads; fails when a command fails, as after a finding.
 #
 #   scripts/checks/sanitized_chain.sh address|thread [BUILD_FOLDER]
 #   scripts/checks/sanitized_chain.sh build address|thread BUILD_FOLDER TARGET...
-#                                                     only the build, of those
+#                                                     only builds these targets
 #   scripts/checks/sanitized_chain.sh run COLMAP      only the chain
 #
-# address: AddressSanitizer and UBSan; thread: ThreadSanitizer. The first build of
-# 54 rooms takes long. COLMAP and the system's libraries are not
-# instrumented, so ThreadSanitizer knows nothing of how these synchronise:
-# tsan.supp beside this file names what of theirs is passed over.
+# address: AddressSanitizer and UBSan; thread: ThreadSanitizer. The first build
+# takes long. COLMAP and the system's libraries are not instrumented, so
+# ThreadSanitizer does not see how they synchronise: tsan.supp beside this file
+# lists the reports about them that are ignored.
 # COLMAP_DIR names COLMAP's CMake package (scripts/setup.sh says where it lies).
 set -euo pipefail
 here=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
@@ -24,7 +24,7 @@ usage() { sed -n '3,18s/^# \?//p' "${BASH_SOURCE[0]}" >&2; exit 2; }
 build() {
   local sanitize=thread folder=$2
   [ "$1" = thread ] || sanitize=ON
-  # Compiling is what takes long, so only line numbers and few optimisations.
+  # Only line numbers and few optimisations, since compiling takes most of the time.
   cmake -S "$root" -B "$folder" -G Ninja -DCMAKE_BUILD_TYPE=RelWithDebInfo \
     -DCMAKE_CXX_FLAGS_RELWITHDEBINFO='-O1 -g1' -DADASFM_UNITY=ON \
     -DCOLMAP_DIR="${COLMAP_DIR:-$host/share/colmap}" \
@@ -49,9 +49,9 @@ esac
 world=$(mktemp -d)
 trap 'rm -rf "$world"' EXIT
 cd "$world"
-# COLMAP's own leaks are none of ours; a container overflow is reported wrongly
-# where only one side of a std::vector is instrumented. COLMAP's headers turn
-# vectors of Eigen's small types into ones that free() what others' new made.
+# COLMAP's own leaks are ignored. A container overflow is reported wrongly where
+# only one side of a std::vector is instrumented. COLMAP's headers make vectors of
+# Eigen's small types free() memory that other code has allocated with new.
 export ASAN_OPTIONS=detect_leaks=0:detect_container_overflow=0:alloc_dealloc_mismatch=0
 export UBSAN_OPTIONS=halt_on_error=1:print_stacktrace=1
 export TSAN_OPTIONS=halt_on_error=1:second_deadlock_stack=1:suppressions=$here/tsan.supp

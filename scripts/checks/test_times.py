@@ -1,13 +1,13 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSD-3-Clause
-"""Says what was tested in which half hour, and which tests took longest.
+"""Lists what was tested in which half hour, and the slowest tests.
 
   scripts/checks/test_times.py STEPS LOG...
 
 STEPS holds a line `seconds<TAB>what` (seconds since 1970) for the beginning of
-each step of scripts/test.sh; each LOG is what ctest left as
-Testing/Temporary/LastTest.log, or as LastTest.log.tmp when it was stopped.
-Tests that an earlier run left there are not counted.
+each step of scripts/test.sh; each LOG is ctest's
+Testing/Temporary/LastTest.log, or LastTest.log.tmp if ctest was stopped.
+Tests of an earlier run in these logs are not counted.
 """
 
 import os
@@ -36,7 +36,8 @@ def read_steps(path):
 
 
 def seconds_of(minute):
-  """Of `Nov 22 11:20 UTC`, which has no year: the last one that is over."""
+  """Seconds since 1970 of `Nov 22 11:20 UTC`, which has no year: of the last
+  such time, read as local time."""
   now = time.localtime()
   text = minute.rsplit(' ', 1)[0]
   for year in (now.tm_year, now.tm_year - 1):
@@ -48,10 +49,10 @@ def seconds_of(minute):
 
 
 def read_tests(path):
-  """Of a ctest log; the output of a test may hold anything."""
+  """The tests of a ctest log; the output of a test may contain any text."""
   build = pathlib.Path(path).absolute().parents[2].name
   tests, name, program, seconds = [], None, '', 0.0
-  # While ctest runs, the log of the run before stands beside its own.
+  # While ctest runs, the log without .tmp is that of the run before.
   if os.path.exists(path + '.tmp'):
     path += '.tmp'
   with open(path, errors='replace') as file:
@@ -71,7 +72,7 @@ def read_tests(path):
       elif duration:
         seconds = float(duration.group(1))
       elif end:
-        # What a script tests stands in its name.
+        # For tests by scripts, the test's name tells what is tested.
         what = program if program.startswith('test_') else name
         tests.append(Test(name, '%s of %s' % (what, build), seconds_of(end),
                           seconds))
@@ -104,7 +105,7 @@ def main():
   if len(sys.argv) < 3:
     sys.exit(__doc__)
   steps = read_steps(sys.argv[1])
-  # The logs say whole minutes.
+  # The logs have whole minutes.
   tests = [test for path in sys.argv[2:] for test in read_tests(path)
            if test.end_s >= steps[0][0] - 60]
   print('\n'.join(describe_half_hours(steps, tests)))

@@ -3,9 +3,9 @@
 # The whole chain on a cluster with Slurm, or on one machine without it
 # (docs/guide/cluster.md):
 #
-#   adasfm_slurm.sh submit WORKSPACE [options]   queues all that is left to do
+#   adasfm_slurm.sh submit WORKSPACE [options]   queues all remaining tasks
 #   adasfm_slurm.sh status WORKSPACE             one table of progress
-#   adasfm_slurm.sh cancel WORKSPACE             takes the jobs back
+#   adasfm_slurm.sh cancel WORKSPACE             cancels the jobs
 #   adasfm_slurm.sh local  WORKSPACE [options]   the same tasks without Slurm
 #
 # `adasfm_slurm.sh submit -h` lists the options. Environment: COLMAP, the

@@ -1,8 +1,9 @@
 #!/usr/bin/python3
 # SPDX-License-Identifier: BSD-3-Clause
-"""Opens a report in headless Chromium and checks that it loads without errors
-and without asking for anything else, that its controls work, and that nothing is
-wider than a phone.
+"""Checks a report in headless Chromium.
+
+The report must load without errors and without requesting anything else, its
+controls must work, and nothing may be wider than a phone.
 
   scripts/report/look_at_report.py REPORT.html [--screenshots FOLDER] [--sections ID...]
 
@@ -109,7 +110,7 @@ def check_sections(browser, expected):
 
 
 def picture_of(browser, canvas):
-    # What is drawn, after the frame in which it is drawn.
+    # Reads the canvas one frame later, when it has been drawn.
     return browser.execute_async_script(
         'requestAnimationFrame(() => requestAnimationFrame(() => '
         'arguments[1](document.getElementById(arguments[0]).toDataURL())))',
@@ -195,7 +196,7 @@ def check_examples(browser):
 
 
 def check_pointing(browser):
-    # Selenium's offsets start at the centre; an image lies somewhere near it.
+    # Selenium moves the pointer to the centre of the first circle.
     chart = browser.find_element(By.CSS_SELECTOR, '#trajectory circle')
     webdriver.ActionChains(browser).move_to_element(chart).perform()
     check('Image ' in browser.find_element(By.ID, 'image-status').text,
@@ -225,7 +226,7 @@ def save(browser, path, section=None, max_height=None):
 
 
 def check_report(browser, report, expected):
-    # What the browser's own first page did.
+    # Discards the log entries of the browser's first page.
     browser.get('about:blank')
     browser.get_log('browser'), browser.get_log('performance')
     show(browser, report, DESKTOP)
@@ -256,7 +257,7 @@ def save_screenshots(browser, report, folder):
     show(browser, report, DESKTOP)
     save(browser, folder / 'report_desktop.png', max_height=1350)
     save(browser, folder / 'report_pairs.png', 's-pairs')
-    # Photos and points are no lines: PNG would be ten times as large.
+    # JPEG, since PNG of photos and points would be ten times as large.
     save(browser, folder / 'report_space.jpg', 's-space')
     save(browser, folder / 'report_examples.jpg', 's-examples', 800)
     show(browser, report, PHONE[:2] + (1.5,))

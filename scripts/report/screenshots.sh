@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: BSD-3-Clause
-# Makes the pictures of the report from the demo's drive, which it runs unless the
+# Makes the pictures of the report from the demo's drive; runs the demo unless its
 # folder is there.
 #
 #   scripts/report/screenshots.sh [DEMO_FOLDER [PICTURES]]
@@ -16,8 +16,8 @@ colmap=${COLMAP:-${ADASFM_BUILD_DIR:-$root/build}/bin/colmap}
 [ -n "${COLMAP:-}" ] || "$root/scripts/setup.sh" --for-tests
 [ -e "$demo/workspace/coarse/0" ] || "$root/scripts/demo.sh" "$demo"
 colmap=$(realpath "$colmap")
-# Several parts, to show their colours; from inside the folder, as the page names
-# the paths that it was made from.
+# Maps in several parts, to show their colours. Runs inside the folder, since the
+# page names the paths that it was made from.
 cd "$demo"
 database=workspace/database.db
 "$colmap" adasfm_mapper --database_path "$database" --input_path workspace/coarse/0 \

@@ -24,7 +24,8 @@ Eigen::SparseMatrix<double> MakeMatrix(int size, int seed) {
   return matrix.sparseView();
 }
 
-// With Debian's OpenBLAS without locks 3 of the first 20,000 were wrong.
+// With Debian's OpenBLAS without locks 3 of the first 20,000 factorisations
+// were wrong.
 TEST(ParallelLibraries, FactorisationsSideBySideAreThoseOfOneThread) {
   constexpr int kSize = 96;
   constexpr int kNumMatrices = 4;
@@ -52,7 +53,7 @@ TEST(ParallelLibraries, FactorisationsSideBySideAreThoseOfOneThread) {
   EXPECT_EQ(num_wrong, 0) << "of " << kNumMatrices * kNumRepetitions;
 }
 
-// As CHOLMOD does, some ask for a number of threads.
+// Even loops that ask for a number of threads, as in CHOLMOD.
 TEST(ParallelLibraries, OpenMpLoopsStayOnTheThreadsOfParallelFor) {
   omp_set_num_threads(3);
   const int max_active_levels = omp_get_max_active_levels();

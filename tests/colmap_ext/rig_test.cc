@@ -51,8 +51,8 @@ class RigTest : public CommandLineTest {
     ASSERT_EQ(model_.NumRegImages(), 2 * num_frames_);
   }
 
-  // Image k of cam0 and k + num_frames_ of cam1 are a frame: their relative
-  // pose is one and the same.
+  // Image k of cam0 and image k + num_frames_ of cam1 form a frame. Their
+  // relative pose is the same in all frames.
   Rigid3d CamFromRig(image_t image_id) const {
     return ComputeCam2FromCam1(
         CamFromWorld(model_.Image(image_id)),
@@ -66,8 +66,8 @@ class RigTest : public CommandLineTest {
     }
   }
 
-  // Gives the second camera a focal length that is so many times too long and
-  // that nobody measured; the parameters of the first camera, which is known.
+  // Makes the focal length of the second camera `ratio` times too long and not
+  // measured. Returns the parameters of the first camera, which is known.
   std::vector<double> MistakeSecondLens(double ratio) {
     SqliteConnection database(database_, SqliteConnection::Mode::kWrite);
     std::vector<double> params;
@@ -103,7 +103,8 @@ class RigTest : public CommandLineTest {
     return bytes;
   }
 
-  // How many times too long the way from the first camera to each other one is.
+  // The ratio of estimated to true distances from the first image to the
+  // others.
   double Scale() const {
     const StatusOr<NamedPoses> truth =
         ReadGroundTruth(folder_.File("gt.txt"), {}, {});
@@ -137,7 +138,7 @@ TEST_F(RigTest, TheBaselineAloneGivesMetres) {
   Reconstruct();
   ExpectRigidFrames();
   EXPECT_NEAR(CamFromRig(1).translation.norm(), 0.5, 0.004);
-  // The baseline's 2 mm of 0.5 m are 0.4 %, vision adds some.
+  // The baseline is known to 2 mm of 0.5 m, or 0.4 %; vision adds some error.
   EXPECT_NEAR(Scale(), 1.0, 0.02);
   // COLMAP 3.12 and later read the rig: one, of two cameras.
   const std::string rigs = ReadBytes(sparse_ + "/rigs.bin");
@@ -165,8 +166,8 @@ TEST_F(RigTest, LogsMoveTheFrames) {
   EXPECT_NEAR(Scale(), 1.0, 0.01);
 }
 
-// The two lenses are the same, and one is known: it stays as it is, to the last
-// bit, and the other is found.
+// Both lenses are the same, and one is known: its parameters stay exactly as
+// they are, and the other lens is estimated.
 TEST_F(RigTest, AnUnknownLensIsRefinedBesideAKnownOne) {
   Synthesize(40);
   const std::vector<double> known = MistakeSecondLens(1.1);
@@ -180,8 +181,8 @@ TEST_F(RigTest, AnUnknownLensIsRefinedBesideAKnownOne) {
   ExpectRigidFrames();
 }
 
-// Where a database has no rigs, the calibration brings it; COLMAP 3.12 and
-// later have it in tables of their own.
+// If a database has no rigs, the calibration defines the rig. COLMAP 3.12 and
+// later have tables for it.
 TEST_F(RigTest, AllFormsGiveTheSameModels) {
   Synthesize(12);
   const std::string world = database_;
@@ -238,7 +239,7 @@ TEST_F(RigTest, UnknownExtrinsicsAreEstimated) {
     return ReadCameraRigs(&database);
   }();
   EXPECT_EQ(rigs.images.size(), 2 * num_frames_);
-  // In the truth the second camera is to the right, turned by half a degree.
+  // In the truth the second camera is to the right, rotated by half a degree.
   EXPECT_NEAR(CamFromRig(1).translation.normalized().x(), -1.0, 0.01);
   EXPECT_LT(Eigen::AngleAxisd(CamFromRig(1).rotation).angle(), 0.015);
   EXPECT_GT(Eigen::AngleAxisd(CamFromRig(1).rotation).angle(), 0.007);

@@ -47,8 +47,8 @@ class SchemasTest : public testing::Test {
     EXPECT_TRUE(status.ok()) << status.message();
   }
 
-  // What COLMAP 4.2 makes of the rows of a database when it opens it, with
-  // their originals back afterwards where adasfm_global had rewritten them.
+  // The rows of a copy of the database after COLMAP 4.2 has opened it. With
+  // `restore`, rows that adasfm_global had rewritten are restored afterwards.
   std::string DumpMigrated(const std::string& path, bool restore) {
     const std::string migrated = path + ".migrated";
     std::filesystem::copy_file(path, migrated);
@@ -65,7 +65,7 @@ class SchemasTest : public testing::Test {
     return dump;
   }
 
-  // The coarse model and the model of the database in a form of its own.
+  // Makes the coarse model and the final model of the database in this form.
   void Reconstruct(const std::string& form, const std::string& output) {
     database_ = output + ".db";
     std::filesystem::copy_file(folder_.File("world.db"), database_);
@@ -129,7 +129,7 @@ TEST_F(SchemasTest, AllFormsGiveTheSameModelsAndGetTheirOriginalsBack) {
     ASSERT_TRUE(restored.ok()) << restored.status().message();
     EXPECT_GT(restored->num_restored, 0);
     EXPECT_EQ(restored->num_outdated, 0);
-    // COLMAP 3.6 gets the columns that later versions add, empty.
+    // A database of COLMAP 3.6 gets the columns that later versions add, empty.
     std::string now = DumpGeometries(database_);
     if (form == "3.6") {
       for (size_t at; (at = now.find("NULL|NULL|\n")) != std::string::npos;) {

@@ -51,8 +51,8 @@ TEST_F(StageMemoryTest, LogsCountByTheirSize) {
   EXPECT_LT(some, none + 20e6);
 }
 
-// Peaks that were measured (docs/results/growth.md): none is beyond its
-// estimate, and no estimate beyond twice the peak.
+// Measured peaks (docs/results/growth.md): no peak exceeds its estimate, and no
+// estimate exceeds twice the peak.
 TEST(EstimateMemoryTest, CoversWhatWasMeasured) {
   struct Peak {
     SceneSize size;

@@ -15,8 +15,8 @@ namespace {
 const Rigid3d kCam2FromCam1(ExpSo3(Eigen::Vector3d(0.02, -0.4, 0.01)),
                             Eigen::Vector3d(-0.5, 0.02, 0.1));
 
-// Frames 1, 2, ... with the images k of camera 1, the reference, and 100 + k of
-// camera 2.
+// Frame k = 1, 2, ... has image k of camera 1, the reference, and image 100 + k
+// of camera 2.
 CameraRigs MakeRigs(int num_frames) {
   CameraRigs rigs;
   rigs.cameras[1].is_reference = true;
@@ -47,8 +47,8 @@ TEST(CameraRig, FramesHaveOnePriorForEachFurtherImage) {
   EXPECT_DOUBLE_EQ(priors[1].covariance(5, 5), 4e-6);
 }
 
-// Where the reference camera's image is missing, the leader's own pose has
-// errors, too: the covariance is that of drawn errors of both cameras.
+// Without the reference camera the leader's calibrated pose has errors, too:
+// the covariance must agree with drawn errors of both cameras.
 TEST(CameraRig, CovarianceHasTheErrorsOfTheLeader) {
   constexpr int kNumDraws = 20000;
   CameraRigs rigs = MakeRigs(1);
@@ -82,8 +82,8 @@ TEST(CameraRig, CovarianceHasTheErrorsOfTheLeader) {
           drawn.translation - priors[0].cam2_from_cam1.translation;
       sum += error * error.transpose() / kNumDraws;
     }
-    // In units of the stated sigmas: entries of a sample covariance vary by at
-    // most sqrt(2 / n), here by 0.01.
+    // In units of the stated sigmas. Entries of a sample covariance vary by at
+    // most sqrt(2 / n), here 0.01; the tolerance is five times that.
     const Eigen::Matrix<double, 6, 6> whitening =
         priors[0].covariance.llt().matrixL().solve(
             Eigen::Matrix<double, 6, 6>::Identity());

@@ -11,7 +11,7 @@
 namespace adasfm {
 namespace {
 
-// What the motion says of the world does not depend on the camera's axes.
+// The motion in world axes must not depend on the axes of the camera.
 TEST(RotateInertialMotion, SaysTheSameOfTheWorld) {
   for (const uint64_t seed : {1, 2, 3}) {
     Random random(seed);
@@ -63,7 +63,7 @@ RelativePosePrior MakePrior(image_t image_id1, image_t image_id2,
 }
 
 TEST(AddInertialLengths, OnlyToPriorsOfTheSameImagesWithoutLength) {
-  // 3-2 is the wrong way round, 4-5 is no prior.
+  // Pair 3-2 is reversed, pair 4-5 has no prior.
   const std::vector<InertialLength> lengths = {{1, 2, 1.5, 0.1, 0.02},
                                                {3, 2, 1.5, 0.1, 0.07},
                                                {3, 4, 1.5, 0.1, 0.08},
@@ -77,7 +77,7 @@ TEST(AddInertialLengths, OnlyToPriorsOfTheSameImagesWithoutLength) {
   priors[0].covariance.topRightCorner<3, 3>().setConstant(0.1);
   priors[0].covariance.bottomLeftCorner<3, 3>().setConstant(0.1);
   const std::vector<RelativePosePrior> before = priors;
-  // The largest of those that were given.
+  // The largest unit sigma of the lengths that were added.
   EXPECT_EQ(AddInertialLengths(lengths, &priors), 0.02);
 
   constexpr uint32_t kFlags =
@@ -113,7 +113,7 @@ TEST(AddInertialLengths, BridgesAreMeasurementsOfTheirMotion) {
   EXPECT_EQ(priors[0].cam2_from_cam1.translation, length.bridge->translation);
   EXPECT_EQ(priors[0].covariance(5, 5), 0.03);
   EXPECT_EQ(priors[0].covariance(0, 0), 1.0);
-  // Vision's.
+  // Without a bridge the length is vision's, not a measurement of its own.
   EXPECT_TRUE(priors[1].HasLength());
   EXPECT_FALSE(priors[1].HasOwnLength());
 }

@@ -11,7 +11,7 @@
 namespace adasfm {
 namespace {
 
-// Also of matrices that mirror.
+// Also for matrices with a negative determinant.
 TEST(NearestRotation, IsARotationAndNoneIsNearer) {
   for (const uint64_t seed : {1, 2, 3, 4, 5}) {
     Random random(seed);

@@ -29,7 +29,7 @@ TEST(ParallelFor, CallsEveryIndexOnce) {
   }
 }
 
-// A stack is memory: with little of it few threads begin.
+// With little memory for stacks few threads start, and these do all work.
 TEST(ParallelFor, DoesTheWorkOnTheThreadsThatThereAre) {
 #ifdef __SANITIZE_ADDRESS__
   GTEST_SKIP() << "AddressSanitizer itself needs more address space than this "

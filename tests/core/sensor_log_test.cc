@@ -10,7 +10,7 @@ namespace {
 
 constexpr timestamp_t kMs = 1'000'000;
 
-// Each 10 ms up to 1 s, but for those from 0.5 s to before 0.7 s.
+// Samples every 10 ms up to 1 s, without those from 0.5 s to before 0.7 s.
 std::vector<ImuSample> SamplesWithAGap() {
   std::vector<ImuSample> samples;
   for (timestamp_t time_ms = 0; time_ms <= 1000; time_ms += 10) {

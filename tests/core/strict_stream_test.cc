@@ -12,7 +12,7 @@
 namespace adasfm {
 namespace {
 
-// Two lines, and then no memory.
+// A stream buffer that throws std::bad_alloc after two lines.
 class ShortOfMemory : public std::streambuf {
  public:
   ShortOfMemory() { setg(text_, text_, text_ + sizeof(text_) - 1); }
@@ -31,7 +31,7 @@ int CountLines(std::istream* stream) {
 TEST(ThrowOnFailure, ShortMemoryIsNotTheEndOfTheText) {
   ShortOfMemory buffer;
   std::istream stream(&buffer);
-  EXPECT_EQ(CountLines(&stream), 2);  // what streams do by themselves
+  EXPECT_EQ(CountLines(&stream), 2);  // default of streams
   ShortOfMemory same;
   std::istream strict(&same);
   ThrowOnFailure(&strict);

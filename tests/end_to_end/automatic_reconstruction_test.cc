@@ -149,7 +149,7 @@ TEST_F(AutomaticTest, PhotosAndSensorsThenAgainThenWithOtherOptions) {
   EXPECT_NE(fs::last_write_time(workspace_ + "/sparse/0/images.bin"),
             model_time);
   ExpectModel();
-  // Without any sensor: their priors go.
+  // Without any sensor: the priors are removed.
   run = ExpectSuccess(Photos());
   EXPECT_TRUE(Contains(run.out, "WARNING: the database has no sensor"));
   EXPECT_TRUE(
@@ -173,7 +173,7 @@ TEST_F(AutomaticTest, PhotosOfAnotherSizeThanCalibratedAreAnError) {
 
 TEST_F(AutomaticTest, TheUsersColmapExtractsAndMatches) {
   const std::string host = HostPath();
-  // It fails half-way: one line, which names the log.
+  // COLMAP fails half-way: one line, which names the log.
   const std::string wrapper = WriteScript(
       "[ \"$1\" = matches_importer ] && [ \"$2\" != -h ] && "
       "echo broken && exit 3\nexec " +
@@ -205,7 +205,7 @@ TEST_F(AutomaticTest, TheWorkspaceMayLieAmongThePhotos) {
   Run run = ExpectSuccess(command);
   EXPECT_TRUE(Contains(run.out, "not images: 1 of ")) << run.out;
   ExpectModel();
-  // What it wrote is taken for no photo.
+  // Files that the command wrote are not taken for photos.
   run = ExpectSuccess(command);
   EXPECT_TRUE(Contains(run.out, "features: done before")) << run.out;
   ExpectError("adasfm_automatic_reconstructor --image_path '" + photos +
@@ -263,7 +263,7 @@ TEST_F(AutomaticTest, EurocRecording) {
   EXPECT_EQ(tables->tables.gravity.size(), kNumImages);
 }
 
-// Starts the command, and sends a signal when its output holds `word`.
+// Starts the command, and sends a signal when its output contains `word`.
 int InterruptAt(const std::string& arguments, const std::string& word,
                 int signal_number, const std::string& out,
                 const std::string& err) {
@@ -307,8 +307,7 @@ TEST_F(AutomaticTest, InterruptionKeepsWhatIsDone) {
   ExpectModel();
 }
 
-// A program that extracts without the processor, as on a GPU, leaves it to the
-// matching.
+// Matching uses the processor while an extractor, as on a GPU, does not.
 TEST_F(AutomaticTest, MatchingBeginsWhileTheExtractorIsIdle) {
   const std::string wrapper =
       WriteScript(HostPath() +

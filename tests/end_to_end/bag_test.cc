@@ -57,7 +57,7 @@ class BagTest : public CommandLineTest {
     return run;
   }
 
-  // Root mean square of the camera centres, metric as the model is.
+  // The RMS error of the camera centres, aligned without scale.
   double ErrorOfModel(const std::string& model_path) {
     ExpectSuccess("adasfm_evaluator --input_path " + model_path +
                   " --ground_truth_path " + drive_->File("gt.txt") +
@@ -89,7 +89,7 @@ TEST_F(BagTest, OneCommandMakesAModelAsGoodAsFromFiles) {
   EXPECT_TRUE(Contains(run.out, "the bag does not tell the IMU's noise"))
       << run.out;
   const double error_m = ErrorOfModel(workspace_ + "/sparse");
-  // The same of the drive's files.
+  // The same reconstruction from the drive's files.
   const std::string reference = folder_.File("reference");
   ExpectSuccess("adasfm_automatic_reconstructor --image_path " +
                 drive_->File("images") + " --workspace_path " + reference +
@@ -108,7 +108,7 @@ TEST_F(BagTest, OneCommandMakesAModelAsGoodAsFromFiles) {
   run = ExpectSuccess(FromBag(bag));
   EXPECT_TRUE(Contains(run.out, "bag: done before")) << run.out;
   EXPECT_TRUE(Contains(run.out, "report: done before")) << run.out;
-  // Without the database what was taken out of the bag still is there.
+  // Without the database, the files extracted from the bag are still used.
   fs::remove(workspace_ + "/database.db");
   run = ExpectSuccess(FromBag(bag));
   EXPECT_TRUE(Contains(run.out, "bag: done before")) << run.out;
@@ -124,7 +124,7 @@ TEST_F(BagTest, RawPhotosOfADb3BagKeepTheirPixels) {
   DriveBagOptions options;
   options.has_raw_images = true;
   const std::string bag = WriteBag("drive.db3", options);
-  // Every third photo; the model of so few is none of this test's.
+  // Every third photo. The model of so few photos is not tested.
   Call(FromBag(bag) + " --image_step 3");
   const fs::path folder = workspace_ + "/bag/images";
   int num_photos = 0;
@@ -199,7 +199,7 @@ TEST_F(BagTest, AVideoBecomesPhotosWithItsTimes) {
       "adasfm_automatic_reconstructor --video_path '" + video +
       "' --workspace_path " + workspace_ +
       " --max_num_features 100 --video_start_ns 7000000000";
-  // The model of so few features is none of this test's.
+  // The model of so few features is not tested.
   Run run = Call(command);
   EXPECT_TRUE(Contains(run.out, "video: 14 of 14 frames")) << run.out;
   std::vector<fs::path> truths;

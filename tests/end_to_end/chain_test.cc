@@ -63,7 +63,7 @@ class ChainTest : public CommandLineTest {
         .Execute(statement);
   }
 
-  // Those of the database.
+  // Scales the focal lengths in the database.
   void ScaleFocalLengths(double factor) {
     SqliteConnection database(database_, SqliteConnection::Mode::kWrite);
     for (auto& [camera_id, camera] : ReadCameras(&database)) {
@@ -77,7 +77,7 @@ class ChainTest : public CommandLineTest {
     }
   }
 
-  // What COLMAP guesses of an image without EXIF.
+  // Sets the cameras to COLMAP's guess for images without EXIF.
   void ForgetTheCamera() {
     SqliteConnection database(database_, SqliteConnection::Mode::kWrite);
     for (auto& [camera_id, camera] : ReadCameras(&database)) {
@@ -120,8 +120,8 @@ int CountOf(const std::string& text, const std::string& word) {
   return count;
 }
 
-// The wheel scale is known to 1 % beforehand, and 0.5 px over 100 m of drive
-// leave a few centimetres (measured: 0.03 m on such worlds).
+// The wheel scale is known to 1 % beforehand. Keypoint noise of 0.5 px over a
+// drive of 100 m leaves a few centimetres (measured: 0.03 m on such worlds).
 void ExpectGoodMetricModel(const nlohmann::json& evaluation, int num_images) {
   EXPECT_EQ(evaluation["num_images"], num_images);
   EXPECT_LT(evaluation["sim3_least_squares"]["translation_rmse_m"], 0.15);
@@ -141,8 +141,8 @@ TEST_F(ChainTest, AliasedDriveWithBlackoutEndsInOneMetricModel) {
   EXPECT_FALSE(summary.empty());
 }
 
-// Each floor looks like the next, 3 m above after 200 m of ramp: a climb of
-// 0.9 deg, where the direction of driving is known to 0.35 deg beforehand.
+// Each floor is aliased with the next, 3 m above after 200 m of ramp: a climb
+// of 0.9 deg, while the direction of driving is known to 0.35 deg beforehand.
 TEST_F(ChainTest, FloorsThatLookAlikeStayApart) {
   for (const std::string seed : {"1", "2", "3"}) {
     Make(
@@ -158,8 +158,8 @@ TEST_F(ChainTest, FloorsThatLookAlikeStayApart) {
   }
 }
 
-// Without wheels: the sigma says how far the accelerometer's metres may be off.
-// A second run measures them anew.
+// Without wheels the sigma states how far the accelerometer's metres may be
+// off. A second run measures them anew.
 TEST_F(ChainTest, AnImuAloneTellsMetres) {
   Make("--num_images 160 --seed 5");
   ExpectSuccess("adasfm_prior_importer --database_path " + database_ +
@@ -185,8 +185,8 @@ TEST_F(ChainTest, AnImuAloneTellsMetres) {
               1e-6);
 }
 
-// Look-alike places on one street, left in the database: the parts are folded
-// there, the priors are torn, and the coarse poses take over.
+// Aliased pairs on one street stay in the database: the parts fold there,
+// priors are violated, and the coarse poses are used instead.
 TEST_F(ChainTest, FalseLoopsAloneDoNotSpoilTheMapper) {
   Make(
       "--num_images 160 --seed 2 --alias_ratio 0.04 --num_blackouts 1 "
@@ -197,9 +197,9 @@ TEST_F(ChainTest, FalseLoopsAloneDoNotSpoilTheMapper) {
   ExpectGoodMetricModel(Evaluate("sparse/0"), 160);
 }
 
-// Photos 7 m apart: the parts bend in the dark. What the refinement could only
-// put back without its points tears no prior, but the coarse poses serve
-// better.
+// With photos 7 m apart the parts bend in the dark. A part that the refinement
+// could straighten only without its points violates no prior, but the coarse
+// poses are better.
 TEST_F(ChainTest, NoImageLosesItsPointsToPartsThatBend) {
   for (const std::string seed : {"1", "4"}) {
     Make(
@@ -251,8 +251,8 @@ TEST_F(ChainTest, TwiceIsOnceAndTheRestorerUndoes) {
   EXPECT_EQ(rows(), original);
 }
 
-// The coarse stage finds a focal length that nobody marked as known, and the
-// mapper goes on with it, though the database has the wrong one.
+// The coarse stage estimates a focal length that is not marked as known. The
+// mapper uses the estimate, though the database has the wrong focal length.
 TEST_F(ChainTest, TheMapperTakesTheCoarseModelsCameras) {
   Make("--num_images 80 --seed 4");
   Import();
@@ -272,8 +272,8 @@ TEST_F(ChainTest, TheMapperTakesTheCoarseModelsCameras) {
   ExpectGoodMetricModel(Evaluate("wrong/0"), 80);
 }
 
-// A guessed SIMPLE_RADIAL becomes a RADIAL camera, in the models only; where
-// the database says that it knows its camera, the mapper keeps that one.
+// A guessed SIMPLE_RADIAL camera becomes a RADIAL camera, in the models only.
+// If the database marks its camera as known, the mapper keeps that one.
 TEST_F(ChainTest, TheMapperTakesALensWithMoreTerms) {
   Make("--num_images 80 --seed 4");
   const double focal_px = ReadFocalLength();
@@ -291,8 +291,8 @@ TEST_F(ChainTest, TheMapperTakesALensWithMoreTerms) {
   EXPECT_EQ(CameraOf("known/0").ModelName(), "SIMPLE_RADIAL");
 }
 
-// Without sensors nothing leads through the dark. A coarse model that joins
-// both sides all the same, the second one anywhere, ends as a model for each.
+// Without sensors nothing connects the two sides of a dark gap. A coarse model
+// that joins them by an arbitrary relative pose ends as one model per side.
 TEST_F(ChainTest, StretchesThatACoarseModelJoinsByAGuessAreAModelEach) {
   Make("--num_images 90 --seed 5 --num_blackouts 1 --blackout_images 14");
   ExpectSuccess(GlobalArguments("apart"));

@@ -35,7 +35,8 @@ TEST_F(CommandLineTest, SignalsPass) {
   EXPECT_EQ(WTERMSIG(run.status), SIGTERM);
 }
 
-// Under a limit of address space our own commands have one thread of OpenMP.
+// Under a limit of address space our own commands have one OpenMP thread, but
+// the host has the user's number.
 TEST_F(CommandLineTest, TheHostHasTheUsersThreads) {
   const std::string host = "ulimit -v 4000000; ADASFM_HOST_COLMAP=" +
                            WriteScript("env | grep -o 'OMP_NUM_THREADS=.*'\n");
@@ -137,7 +138,7 @@ TEST_F(CommandLineTest, EveryCommandExplainsItself) {
     EXPECT_NE(run.out.find("--log_level"), std::string::npos) << command.name;
     ExpectError(std::string(command.name) + " --no_such_option 1",
                 "no_such_option");
-    // The one command that works on nothing.
+    // The only command without required options.
     if (std::string(command.name) == "adasfm_version") continue;
     ExpectError(command.name, "required but missing");
   }
@@ -217,7 +218,7 @@ TEST_F(ImporterTest, WritesTablesAndSummary) {
       nlohmann::json::parse(ReadBytes(database_ + ".priors.json"));
   EXPECT_EQ(summary["num_priors"], 24);
   EXPECT_EQ(summary["num_images"], 25);
-  // Twice is once, but for the time that it takes.
+  // A second import gives the same summary, except for the time it takes.
   ASSERT_EQ(Call(Arguments()).ExitCode(), 0);
   nlohmann::json again =
       nlohmann::json::parse(ReadBytes(database_ + ".priors.json"));
@@ -240,7 +241,7 @@ TEST_F(ImporterTest, EitherSensorAlone) {
   }
   const Run wheels_alone = Call(Arguments("imu_path", "''"));
   ASSERT_EQ(wheels_alone.ExitCode(), 0);
-  // Nobody knows how far they turn wrongly.
+  // The rotation error of wheels alone is unknown.
   EXPECT_NE(wheels_alone.out.find("m per 100 m"), std::string::npos);
   EXPECT_EQ(wheels_alone.out.find("deg per 100 m"), std::string::npos);
   loaded = ReadPriorTables(database_);

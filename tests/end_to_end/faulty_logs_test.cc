@@ -79,7 +79,7 @@ class FaultyLogsTest : public CommandLineTest {
                        : std::vector<RelativePosePrior>();
   }
 
-  // The largest differences between the priors and those of the whole log.
+  // Expects priors within these bounds of those of the whole log.
   void ExpectNear(const std::vector<RelativePosePrior>& priors,
                   const std::vector<RelativePosePrior>& clean, double deg,
                   double metres) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// What the commands do to files: none that is foreign is lost, nothing damaged
-// or unfinished is believed, and the last line says what a model is worth.
+// What the commands do to files: foreign files are kept, damaged or unfinished
+// ones are not used, and the last line states the quality of a model.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -70,11 +70,11 @@ TEST_F(FilesTest, VerdictClosesTheMapper) {
   EXPECT_THAT(run.out, HasSubstr("\nVerdict: good. 40 of 40 images"));
   EXPECT_EQ(Verdict()["result"], "good");
   EXPECT_EQ(Verdict()["metric_source"], "wheels");
-  // The wheels' radius is known to 1 %, and better once the drive has begun.
+  // The wheel scale is known to 1 % beforehand, and better after the drive.
   EXPECT_GT(Verdict()["metric_sigma"], 0.0);
   EXPECT_LT(Verdict()["metric_sigma"], 0.01);
   EXPECT_THAT(run.out, HasSubstr("in metres from wheels (to 0."));
-  // And opens the report.
+  // The report begins with the verdict, too.
   const Run report = Call("adasfm_reporter --input_path " + folder_.File("m") +
                           " --output_path " + folder_.File("report.html"));
   ASSERT_EQ(report.ExitCode(), 0) << report.err;
@@ -110,7 +110,7 @@ TEST_F(FilesTest, LostImagesAreSaid) {
 }
 
 TEST_F(FilesTest, KeypointThatIsNoNumber) {
-  // Two of image 5, as five of 60 would be.
+  // Two keypoints of image 5.
   const float nan = std::nanf("");
   std::string bytes;
   {
@@ -173,7 +173,7 @@ TEST_F(FilesTest, OutputsReplaceNoInputs) {
   EXPECT_EQ(ReadBytes(folder_.File("gt.txt")), truth);
   ExpectError(importer_ + " --summary_path " + folder_.File("imu.csv"),
               "is the input --imu_path");
-  // Somebody's own project, and a world of ours.
+  // Without landmarks.txt the folder may be somebody's project, not a world.
   fs::remove(folder_.File("landmarks.txt"));
   ExpectError(
       "adasfm_synthesizer --num_images 5 --output_path " + folder_.Path(),
@@ -189,8 +189,7 @@ TEST_F(FilesTest, SecondRunIsToldWhoHasTheFolder) {
   ExpectError(Global("g"), "process " + std::to_string(getpid()));
 }
 
-// The models of before stay when the database cannot be written.
-// Two at once would write one database file.
+// Two commands at once would write one database file.
 TEST_F(FilesTest, ASecondWorldKeepsOutOfTheFirstOnesFolder) {
   const std::string folder = folder_.File("world");
   std::filesystem::create_directory(folder);
@@ -201,6 +200,7 @@ TEST_F(FilesTest, ASecondWorldKeepsOutOfTheFirstOnesFolder) {
   EXPECT_FALSE(std::filesystem::exists(folder + "/database.db"));
 }
 
+// Existing models stay when the database cannot be written.
 TEST_F(FilesTest, LockedDatabaseLeavesTheModels) {
   ASSERT_EQ(Call(Global("g")).ExitCode(), 0);
   const std::string summary = ReadBytes(folder_.File("g/summary.json"));
@@ -219,7 +219,7 @@ TEST_F(FilesTest, StrayWordsAndMisplacedOptions) {
               "--AdaSfmMapper.stage part only");
 }
 
-// Below it libraries wait for ever for memory that they cannot have.
+// With less address space libraries wait forever for memory.
 TEST_F(FilesTest, TooLittleAddressSpace) {
   const auto error_under = [this](const std::string& limit) {
     const int status =

@@ -44,7 +44,8 @@ class GnssTest : public CommandLineTest {
     ASSERT_EQ(truth_.size(), 80u);
   }
 
-  // A fix of 0.3 m at every other image; two seconds of them jump by 15 m.
+  // A fix with a sigma of 0.3 m at every other image; the fixes of two seconds
+  // jump by 15 m.
   std::string WriteGnss(uint64_t seed) const {
     Random random(seed);
     std::ostringstream text;
@@ -80,7 +81,7 @@ class GnssTest : public CommandLineTest {
         0);
   }
 
-  // Of the cameras, on the Earth, without any alignment.
+  // The RMS error of the cameras on the Earth, without any alignment.
   double RmsError(const std::string& folder) const {
     const auto origin = ReadGeoreference(folder + "/georeference.json");
     EXPECT_TRUE(origin.ok()) << origin.status().message();
@@ -107,8 +108,8 @@ class GnssTest : public CommandLineTest {
   std::map<std::string, Eigen::Vector3d> truth_;
 };
 
-// 36 good fixes of 0.3 m give the frame to 0.3 sqrt(7 / 36 / 3) = 0.08 m a
-// direction at best, 0.13 m in space.
+// 36 good fixes of 0.3 m determine the frame to 0.3 sqrt(7 / 36 / 3) = 0.08 m
+// per direction at best, 0.13 m in space.
 TEST_F(GnssTest, PositionsWithOtherSensors) {
   for (const uint64_t seed : {1, 2}) {
     Synthesize(seed);
@@ -130,7 +131,7 @@ TEST_F(GnssTest, PositionsAlone) {
     Reconstruct();
     EXPECT_LT(RmsError(folder_.File("sparse")), 0.3) << seed;
   }
-  // The same model in ECEF, with the ids of frames and rigs that it has.
+  // The same model in ECEF keeps its ids of frames and rigs.
   ModelFrames frames;
   for (const auto& [image_id, pose] :
        CamsFromWorld(*ReadModel(folder_.File("sparse/0")))) {
@@ -170,7 +171,7 @@ TEST_F(GnssTest, PositionsAlone) {
               "is in use by");
 }
 
-// Those that COLMAP 3.8 takes from EXIF.
+// Positions that COLMAP 3.8 takes from EXIF.
 TEST_F(GnssTest, PositionsOfPhotos) {
   Synthesize(5);
   const std::string path = folder_.File("database.db");

@@ -27,7 +27,7 @@ int NumKills() {
 
 class KillTest : public CommandLineTest {
  protected:
-  // A world, and the chain on it. `mapper_input` is the mapper's in $OUT.
+  // Makes a world and a script of the chain. `mapper_input` is a path in $OUT.
   void Prepare(const std::string& world, const std::string& importer,
                const std::string& mapper_input) {
     const Run run = Call("adasfm_synthesizer --num_keypoints 150 " + world +
@@ -85,7 +85,7 @@ class KillTest : public CommandLineTest {
 
   std::string Sqlite(const std::string& path, const std::string& statement) {
     const std::string out = folder_.File("sqlite_out");
-    // The shell is gone, but what it ran may be dying still, with its lock.
+    // A program that the killed shell ran may still be exiting, with its lock.
     EXPECT_EQ(std::system(("sqlite3 -cmd '.timeout 10000' " + path +
                            "/database.db \"" + statement + "\" > " + out)
                               .c_str()),
@@ -98,8 +98,8 @@ class KillTest : public CommandLineTest {
   std::string script_;
 };
 
-// Kills the chain again and again; it ends in the same models, and nothing else
-// beside them.
+// Kills the chain at random times and runs it again: the database and the
+// models must equal those of an undisturbed run.
 void KillTest::KillAndCompare(int num_models) {
   const std::string expected = NewRun("undisturbed");
   const auto start = std::chrono::steady_clock::now();
@@ -142,7 +142,7 @@ TEST_F(KillTest, EndsInTheSameModelWithTheDatabaseIntact) {
   KillAndCompare(1);
 }
 
-// Without wheels nothing leads through the dark.
+// Without wheels nothing connects the two sides of a dark gap.
 TEST_F(KillTest, EndsInTheSameModelsOfSeveralComponents) {
   ASSERT_NO_FATAL_FAILURE(
       Prepare("--num_images 60 --seed 5 --num_blackouts 1 --blackout_images 14",

@@ -27,7 +27,7 @@ class SessionsTest : public CommandLineTest {
     return folder_.File("session" + std::to_string(session) + ".db");
   }
 
-  // Left with the images of the session, and imported by itself.
+  // Keeps the images of the session only, and imports them by themselves.
   void MakeSession(int session) {
     std::filesystem::copy_file(world_, SessionPath(session));
     const std::string is_other = " % 2 = " + std::to_string(session);
@@ -114,7 +114,7 @@ class SessionsTest : public CommandLineTest {
                   folder_.File("merged_gt.txt") + " --json_path " + json);
     const auto evaluation = nlohmann::json::parse(ReadBytes(json));
     EXPECT_EQ(evaluation["num_images"], 2 * kNumImagesPerSession);
-    // As one drive of as many images (chain_test.cc).
+    // The bounds of one drive with as many images (chain_test.cc).
     EXPECT_LT(evaluation["sim3_least_squares"]["translation_rmse_m"], 0.15);
     EXPECT_NEAR(evaluation["sim3"]["scale"], 1.0, 0.03);
   }
@@ -125,8 +125,8 @@ class SessionsTest : public CommandLineTest {
   const std::string merged_ = folder_.File("all.db");
 };
 
-// A twenty-fifth of the pairs joins look-alike places, between the drives too,
-// where no odometry leads from one to the other.
+// 4 % of the pairs are aliased, also between the drives, which no odometry
+// connects.
 TEST_F(SessionsTest, LookAlikesDoNotFoldTheMapOfTwoDrives) {
   ExpectSuccess("adasfm_synthesizer --output_path " + folder_.Path() +
                 " --seed 2 --alias_ratio 0.04 --num_images " +

@@ -48,7 +48,7 @@ class Terminal {
     return true;
   }
   void PressCtrlC() { ASSERT_EQ(write(terminal_, "\x03", 1), 1); }
-  // Reads the rest; the exit code.
+  // Reads the remaining output and returns the exit code.
   int Wait() {
     ReadUntil("");
     int status = 0;
@@ -57,7 +57,7 @@ class Terminal {
   }
 
   const std::string& Text() const { return text_; }
-  // What was drawn over itself on one line.
+  // The bars that were drawn over each other on one line.
   std::vector<std::string> Bars() const {
     const std::string start = "\r\033[K";
     std::vector<std::string> bars;
@@ -86,7 +86,7 @@ class TerminalTest : public CommandLineTest {
   }
 };
 
-// More photos than any machine renders before the time left is known.
+// More photos than any machine renders before the remaining time is known.
 TEST_F(TerminalTest, BarWithTheTimeLeftUntilCtrlC) {
   Terminal terminal(Render(300, "--image_width 1600 --image_height 1000"));
   ASSERT_TRUE(terminal.ReadUntil(" left")) << terminal.Text();

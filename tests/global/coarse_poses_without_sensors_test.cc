@@ -29,8 +29,8 @@ TEST(EstimateCoarsePosesWithoutSensors, WorksOnCleanAndFisheyeWorlds) {
   }
 }
 
-// One wrong match of wide parallax among many true ones must not set an edge's
-// length, and with it the scale of half of the road.
+// One wrong match of wide parallax among many true ones must not determine a
+// baseline length, and with it the scale of half of the road.
 TEST(EstimateCoarsePosesWithoutSensors, KeepsTheScaleAlongLongRoads) {
   for (uint64_t seed = 1; seed <= 3; ++seed) {
     SyntheticWorldOptions options;
@@ -51,7 +51,7 @@ TEST(EstimateCoarsePosesWithoutSensors, KeepsTheScaleAlongLongRoads) {
   }
 }
 
-// The order of capture is odometry enough.
+// The order of capture is sufficient odometry to reject aliased pairs.
 TEST(EstimateCoarsePosesWithoutSensors, LookAlikesDoNotFoldSequences) {
   for (uint64_t seed = 1; seed <= 3; ++seed) {
     SyntheticWorldOptions options = AliasedWorld(seed);
@@ -74,8 +74,8 @@ TEST(EstimateCoarsePosesWithoutSensors, LookAlikesDoNotFoldSequences) {
   }
 }
 
-// Look-alike places do not join what a blackout separates: each part is a
-// model.
+// Aliased pairs must not join the parts that a blackout separates: each part is
+// a model.
 TEST(EstimateCoarsePosesWithoutSensors, BlackoutsSplitSequences) {
   for (uint64_t seed = 1; seed <= 3; ++seed) {
     const CoarseProblem problem =
@@ -99,7 +99,7 @@ TEST(EstimateCoarsePosesWithoutSensors, BlackoutsSplitSequences) {
   }
 }
 
-// Photos in any order lose nothing by it.
+// Unordered photos must lose no pairs to checks that assume a sequence.
 TEST(EstimateCoarsePosesWithoutSensors, UnorderedImagesAreNoSequence) {
   for (uint64_t seed = 1; seed <= 3; ++seed) {
     SyntheticWorldOptions options;

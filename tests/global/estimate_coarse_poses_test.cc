@@ -37,8 +37,9 @@ TEST(EstimateCoarsePoses, AliasedWorldsWithBlackoutsAreSolvedInMetres) {
   }
 }
 
-// The car stops after an image: copies of it with other noise, a part of which
-// is gross, on the keypoints. They share what the image shares.
+// Simulates a stop of the car: adds copies of an image with other keypoint
+// noise, some of it gross. Copies share matches with each other and with all
+// images that share matches with the original.
 void AddStop(image_t image_id, int num_copies, Random* random,
              CoarseProblem* problem) {
   auto& bearings = problem->correspondences.bearings;
@@ -123,8 +124,8 @@ TEST(EstimateCoarsePoses, AStopIsNoContradiction) {
   }
 }
 
-// A step without a prior is completed by vision, also where priors of images
-// without pairs, before the others, make up the number.
+// Visual odometry adds the edge of a step without a prior. Priors of images
+// without pairs, which make up the number, must not hide the hole.
 TEST(EstimateCoarsePoses, VisionCompletesAHoleInThePriors) {
   SyntheticWorldOptions options = AliasedWorld(1);
   options.num_blackouts = 0;
@@ -152,8 +153,8 @@ TEST(EstimateCoarsePoses, VisionCompletesAHoleInThePriors) {
   EXPECT_TRUE(added_edges());
 }
 
-// Rotations alone cannot tell look-alike places in streets of one direction
-// apart; the way that vision sees between them does.
+// Rotations alone cannot reject aliased pairs in streets of one direction;
+// translations of visual odometry can.
 TEST(EstimateCoarsePoses, VisionCompletesAnImuWithoutWheels) {
   int num_aliases_without = 0;
   for (uint64_t seed = 1; seed <= 3; ++seed) {
@@ -189,8 +190,8 @@ TEST(EstimateCoarsePoses, VisionCompletesAnImuWithoutWheels) {
   EXPECT_GT(num_aliases_without, 0);
 }
 
-// Wheels that end half-way, or logs with a hole that splits the chain: metres
-// are spread over the rest.
+// Wheels end half-way, or a hole in the logs splits the chain: the metric scale
+// must reach the steps without positions.
 TEST(EstimateCoarsePoses, VisionCompletesInterruptedSensors) {
   for (uint64_t seed = 1; seed <= 2; ++seed) {
     SyntheticWorldOptions options = AliasedWorld(seed);
@@ -220,8 +221,8 @@ TEST(EstimateCoarsePoses, VisionCompletesInterruptedSensors) {
 }
 
 // Behind a blackout without sensors only distant pairs could join the drive,
-// and look-alikes are among them: what stands on one side only is a model of
-// its own, and sound.
+// and some of them are aliased. The images on one side must be a correct model
+// of their own.
 TEST(EstimateCoarsePoses, JoinsNothingBehindABlackoutWithoutSensors) {
   int num_split = 0;
   for (uint64_t seed = 1; seed <= 3; ++seed) {

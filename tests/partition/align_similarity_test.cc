@@ -33,7 +33,7 @@ struct Noise {
   double rotation_rad = 0.0;
 };
 
-// The same cameras in a part's own world.
+// The same cameras in the world of a part.
 std::vector<PosePair> BuildPairs(const std::vector<Rigid3d>& cams_from_target,
                                  const Sim3d& source_from_target,
                                  const Noise& noise, Random* random) {
@@ -70,7 +70,7 @@ TEST(AlignSimilarity, ExactWithoutNoise) {
       EXPECT_LT(LogSo3(identity.rotation).norm(), 1e-8);
       EXPECT_LT(identity.translation.norm(), 1e-7);
       EXPECT_EQ(result.inlier_ratio, 1.0);
-      // Everything fits at every threshold: the lowest one is final.
+      // All poses fit at every threshold: the lowest one is final.
       EXPECT_NEAR(result.threshold, AlignSimilarityOptions().min_threshold,
                   1e-9);
     }
@@ -155,7 +155,7 @@ TEST(AlignSimilarity, ThresholdRisesOnlyAsFarAsNeeded) {
   EXPECT_TRUE(adaptive.success);
   EXPECT_GT(adaptive.threshold, options.initial_threshold);
   EXPECT_GT(adaptive.num_iterations, 1);
-  // Without adaptation, with fewer rounds, or with no room, it does not fit.
+  // No fit without adaptation, with few rounds or with a low upper limit.
   options.adapt_threshold = false;
   EXPECT_FALSE(AlignSimilarity(options, poses).success);
   options.adapt_threshold = true;

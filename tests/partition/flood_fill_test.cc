@@ -36,7 +36,7 @@ Parts FigureParts() {
 }
 
 TEST(FloodFill, TakesTheSecondLayerOfThePapersFigure) {
-  // Of which the second layer is enough.
+  // The second layer alone reaches this overlap.
   FloodFillOptions options;
   options.min_overlap_ratio = 0.01;
   const Parts expanded =
@@ -66,7 +66,7 @@ TEST(FloodFill, PrefersTheStrongestEdge) {
   EXPECT_EQ(expanded[0], (std::vector<image_t>{1, 2, 3, 5}));
 }
 
-// One camera after another: each layer adds one image at each end.
+// A chain of cameras: each layer adds one image at each end.
 TEST(FloodFill, ThinChainReachesTheOverlap) {
   ImageGraph graph;
   const int kNumParts = 4;
@@ -86,8 +86,8 @@ TEST(FloodFill, ThinChainReachesTheOverlap) {
     for (int k = 0; k < kNumParts; ++k) {
       EXPECT_TRUE(std::includes(expanded[k].begin(), expanded[k].end(),
                                 parts[k].begin(), parts[k].end()));
-      // What it takes counts as shared, so it stops at the latest with
-      // a / (size + a) = ratio; a layer adds one image at each end.
+      // Images that a part takes count as shared, so the expansion stops at the
+      // latest with a / (size + a) = ratio; a layer adds one image at each end.
       EXPECT_LE(expanded[k].size(), kPartSize / (1.0 - ratio) + 2.0);
       // A chain's part stays one interval.
       EXPECT_EQ(expanded[k].back() - expanded[k].front() + 1,

@@ -16,7 +16,8 @@ fail() { echo "adasfm.sh: $*" >&2; exit 1; }
   > "$work/log"
 camera=$(sed -nE 's/^ *intrinsics: *\[(.*)\]/\1/p' "$work/drive/sensors.yaml" | tr -d ' ')
 
-# check_result WORKSPACE METRIC: all images, and whether lengths are metres.
+# check_result WORKSPACE METRIC: the model has all images; METRIC: whether its
+# lengths are metres.
 check_result() {
   [ -s "$1/report.html" ] || fail "$1 has no report"
   "$COLMAP" adasfm_evaluator --input_path "$1/sparse" \
@@ -35,7 +36,7 @@ for sensors in "$work/drive" ''; do
   else check_result "$workspace" false; fi
 done
 
-# Without arguments it explains itself.
+# Without arguments the script prints its usage.
 if "$script" > "$work/log" 2>&1; then fail 'wants arguments'; fi
 grep -q 'adasfm.sh PHOTOS WORKSPACE' "$work/log" || fail 'does not explain itself'
 echo 'adasfm.sh: ok'

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Tests of scripts/benchmark/benchmark.py. ADASFM_LAUNCHER names our `colmap`."""
+"""Tests of scripts/benchmark/benchmark.py. ADASFM_LAUNCHER: our `colmap`."""
 
 import glob
 import json
@@ -127,7 +127,7 @@ class WholeBenchmarkTest(unittest.TestCase):
     if not launcher:
       self.skipTest('ADASFM_LAUNCHER is not set')
     with tempfile.TemporaryDirectory() as folder:
-      # A peer that only says how many verified pairs it was given.
+      # A peer that only prints the number of verified pairs in its database.
       peer = os.path.join(folder, 'peer')
       with open(peer, 'w') as file:
         file.write('#!%s\nimport sqlite3, sys\n'

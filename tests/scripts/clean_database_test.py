@@ -96,17 +96,17 @@ class CleanDatabaseTest(unittest.TestCase):
         return {row[0] for row in sqlite3.connect(path).execute(
             'SELECT pair_id FROM two_view_geometries WHERE rows > 0')}
       raw, clean = pairs(database), pairs(cleaned)
-      # The false ones; the others stay but for some with few matches.
+      # False pairs are removed; true ones stay except some with few matches.
       self.assertTrue(clean < raw)
       self.assertGreater(len(clean), 0.85 * len(raw))
       self.assertTrue(os.path.isfile(cleaned + '.coarse/0/images.bin'))
-      # COLMAP's mapper is told where to begin, or finds that itself.
+      # COLMAP's mapper gets its initial pair, or finds one itself.
       with open(cleaned + '.coarse/summary.json') as file:
         start = json.load(file)['models'][0]['mapper_start']
       with open(cleaned + '.options') as file:
         self.assertEqual(bool(file.read()), start['must_be_told'])
       self.assertGreaterEqual(start['matches'], 100)
-      # Not twice.
+      # An existing copy is not overwritten.
       again = subprocess.run(
           [os.path.join(SCRIPTS, 'clean_database.sh'), database, cleaned],
           capture_output=True, text=True)

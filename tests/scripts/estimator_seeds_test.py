@@ -15,8 +15,8 @@ sys.path.insert(0, SCRIPTS)
 
 import estimator_seeds  # noqa: E402
 
-# Writes what the real commands would: a world of two samples, summaries, and an
-# error that tells the models apart.
+# Writes the files that the real commands would write: a world of two samples,
+# summaries, and an error that differs between the models.
 LAUNCHER = '''#!%s
 import json, os, sys
 value = dict(zip(sys.argv[2::2], sys.argv[3::2]))

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSD-3-Clause
-"""Some faults of each campaign of scripts/checks/faults.sh, and such as went
-wrong once."""
+"""Some faults of each campaign of scripts/checks/faults.sh, and faults that
+once caused errors."""
 
 import errno
 import os
@@ -65,8 +65,8 @@ class FaultsTest(unittest.TestCase):
     shutil.rmtree(cls.folder)
 
   def inject(self, command, kind, shares, error, keep=''):
-    """At these shares of the command's calls of that kind; whether any of them
-    made it fail."""
+    """Injects a fault at each share of the command's calls of that kind;
+    returns whether any of them made the command fail."""
     failed = False
     for share in shares:
       call = 1 + int(share * self.counts[command][kind])
@@ -76,7 +76,7 @@ class FaultsTest(unittest.TestCase):
     return failed
 
   def test_synthesizer_notices_what_its_database_has_not(self):
-    # Those near the end move COLMAP's log of the database into it.
+    # Writes near the end move COLMAP's write-ahead log into the database.
     self.assertTrue(self.inject('adasfm_synthesizer', 'write',
                                 (0.3, 0.86, 0.9, 0.98), errno.ENOSPC))
 
@@ -90,7 +90,7 @@ class FaultsTest(unittest.TestCase):
                                   ':keep'))
 
   def test_short_of_memory(self):
-    # A part of the mapper is not given up for it.
+    # The mapper does not skip a part, but fails.
     self.assertTrue(self.inject('adasfm_mapper', 'memory',
                                 (0.2, 0.35, 0.5, 0.65), errno.ENOMEM))
 

@@ -1,15 +1,15 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: BSD-3-Clause
-# Gets the COLMAP of another Debian release beside the machine's own, as a
-# program to test against: apt downloads the package and its libraries from the
-# machine's own mirror into a folder, where they are unpacked. No root, nothing
-# is installed.
+# Fetches the COLMAP of another Debian release, to test against it: apt downloads
+# the package and its libraries from the machine's own mirror into a folder, where
+# they are unpacked. The script needs no root and installs nothing into the
+# system.
 #
 #   fetch_colmap.sh FOLDER SUITE     SUITE: trixie (COLMAP 3.10, 0.3 GB) or
 #                                    sid (COLMAP 4, 0.8 GB)
 #
-# Prints the program's path, FOLDER/SUITE/colmap; fetches nothing when it is
-# there. Exit code 1 with one line on standard error when it cannot be had.
+# Prints the program's path, FOLDER/SUITE/colmap; fetches nothing if the program
+# exists. Ends with 1 and one line on standard error if it cannot be fetched.
 set -euo pipefail
 if [ $# -ne 2 ]; then sed -n '3,13s/^# \{0,1\}//p' "$0" >&2; exit 1; fi
 mkdir -p "$1"

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Tests of scripts/benchmark/independent_worlds.py: the logs and keypoints of its
-worlds agree with the truth, and the three commands map one."""
+"""Tests of scripts/benchmark/independent_worlds.py: the logs and keypoints of
+its worlds agree with the truth, and the three commands map one."""
 
 import json
 import os
@@ -55,7 +55,7 @@ class IndependentWorldsTest(unittest.TestCase):
     rows = np.round(t[[0, -1]] * motion.RATE_HZ).astype(int)
     begin, end = moved.rotation[rows] @ wheel_from_imu[:3, :3]
     error = rotation_vector(rotation.T @ begin.T @ end)
-    # Bias known from 3 s of noise, over 10 s; six sigmas of an axis.
+    # Bias estimated from 3 s of noise, applied over 10 s; six sigmas per axis.
     sigma = motion.GYRO_NOISE * np.sqrt(13.0 + 10.0**2 / 3.0)
     self.assertLess(np.abs(error).max(), 6.0 * sigma)
     self.assertGreater(np.linalg.norm(rotation_vector(begin.T @ end)), 1.0)
@@ -68,7 +68,7 @@ class IndependentWorldsTest(unittest.TestCase):
     world = np.einsum('nij,nj->ni', moved.rotation[rows], force)
     gained = np.sum(world - [0, 0, motion.GRAVITY], axis=0) / 200
     velocity = np.gradient(moved.position, 1.0 / motion.RATE_HZ, axis=0)
-    # Biases of 0.04 m/s^2 and their turn.
+    # Biases of 0.04 m/s^2, rotated with the machine.
     self.assertLess(np.abs(gained - velocity[rows[-1]] + velocity[rows[0]]).max(),
                     4.0 * 0.04 * t[-1])
 

@@ -1,9 +1,9 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: BSD-3-Clause
-# Runs the chain with other COLMAPs than the one that we are linked with: each
-# extracts and matches rendered photos, and each takes our models. COLMAP 3.10
+# Runs the chain with other COLMAPs than the one that our program links: each
+# extracts and matches rendered photos, and each reads our models. COLMAP 3.10
 # and 4 are Debian's packages of other releases, fetched once into ADASFM_CACHE
-# (1.1 GB); one that cannot be had is left out with one line.
+# (1.1 GB); a version that cannot be fetched is left out with one line.
 #
 #   other_colmaps.sh BUILD_DIR
 set -euo pipefail
@@ -16,7 +16,7 @@ trap 'rm -rf "$work"' EXIT
 
 fail() { echo "other_colmaps: $*" >&2; exit 1; }
 
-# call WHAT COMMAND...: shows the end of what it printed when it fails.
+# call WHAT COMMAND...: shows the end of the command's output if it fails.
 call() {
   local what=$1
   shift
@@ -61,8 +61,8 @@ chain() {
   is_right "$2/sparse/0"
 }
 
-# is_right MODEL [ALIGNMENT]: it has all 8 images where they were, in metres, or
-# after the alignment sim3.
+# is_right MODEL [ALIGNMENT]: the model has all 8 images at their true positions,
+# in metres or after the alignment sim3.
 is_right() {
   call adasfm_evaluator "$ours" adasfm_evaluator --input_path "$1" \
     --ground_truth_path "$world/gt.txt" --json_path "$work/evaluation.json"
@@ -75,7 +75,7 @@ assert figures[sys.argv[2]]['translation_rmse_m'] < 0.02, figures
 CHECK
 }
 
-# takes_model HOST MODEL: its commands read the model.
+# takes_model HOST MODEL: the host's commands read the model.
 takes_model() {
   rm -rf "$work/out"
   mkdir -p "$work/out/dense" "$work/out/adjusted"
@@ -85,7 +85,8 @@ takes_model() {
   host "$1" bundle_adjuster --input_path "$2" --output_path "$work/out/adjusted"
 }
 
-# continues_model HOST DATABASE MODEL: those that read the database with it.
+# continues_model HOST DATABASE MODEL: the host's commands that read the model
+# with its database continue it.
 continues_model() {
   rm -rf "$work/out"
   mkdir -p "$work/out/points" "$work/out/more"
@@ -96,9 +97,9 @@ continues_model() {
 }
 
 # continues_copy HOST DATABASE MODEL: the same on a copy of the database, which
-# a newer COLMAP converts to its own form. 4 cannot convert that of 3.10 without
-# the column that the launcher's warning asks for. The model stays right; the
-# mapper adjusts all of it without a scale.
+# a newer COLMAP converts to its own form. COLMAP 4 cannot convert a database of
+# 3.10 without the column that the launcher's warning asks for. The model stays
+# right; the mapper adjusts the whole model without a fixed scale.
 continues_copy() {
   cp "$2" "$work/copy.db"
   if [[ $1 == 4.* && $2 == */3.10/* ]]; then
@@ -111,8 +112,8 @@ continues_copy() {
   rm -f "$work"/copy.db*
 }
 
-# warns HOST DATABASE WORDS: so does a command on a copy of the database, which
-# the host cannot use.
+# warns HOST DATABASE WORDS: the host cannot use a copy of the database; the
+# launcher warns of that with these words.
 warns() {
   rm -f "$work"/copy.db*
   cp "$2" "$work/copy.db"
@@ -156,8 +157,8 @@ for name in "${hosts[@]}"; do
   database "$name" "$folder/database.db"
   cp "$folder/database.db" "$folder/original.db"
   chain "$folder/database.db" "$folder"
-  # The oldest host comes first. None opens the database of a newer one: with
-  # its model it can do what needs no database.
+  # The oldest host comes first. No host opens the database of a newer one, but
+  # each runs the commands on its model that need no database.
   is_older=1
   for other in "${hosts[@]}"; do
     takes_model "$other" "$folder/sparse/0"
@@ -179,10 +180,10 @@ if [[ $newest == 4.* ]]; then
   cp "$work/3.8/original.db" "$folder/expected.db"
   chain "$folder/database.db" "$folder"
   continues_model "$newest" "$folder/database.db" "$folder/sparse/0"
-  # 3.8 still reads what the newest has converted.
+  # 3.8 still reads the database that the newest has converted.
   continues_copy 3.8 "$folder/database.db" "$folder/sparse/0"
   call adasfm_restorer "$ours" adasfm_restorer --database_path "$folder/database.db"
-  # What it makes of the originals.
+  # The newest converts a database with the original geometries.
   host "$newest" mapper --database_path "$folder/expected.db" \
     --image_path "$photos" --input_path "$work/3.8/sparse/0" \
     --output_path "$work/out/more"
@@ -209,8 +210,8 @@ stereo() {
     --num_images 12 --num_neighbors 4 --stereo_baseline 0.5
 }
 
-# is_rig HOST MODEL: it has one rig of two cameras, and 12 frames of two images
-# each, for this COLMAP.
+# is_rig HOST MODEL: this COLMAP reads one rig of two cameras, and 12 frames of
+# two images each.
 is_rig() {
   rm -rf "$work/out"
   mkdir -p "$work/out"
@@ -275,9 +276,9 @@ for name in "${hosts[@]:1}"; do
   grep -q 'Registered images: 8' "$work/log" || fail "images are missing"
 done
 
-# Those of COLMAP 3.8 are run with the documentation test. Left out are the pages
-# that take longest: automatic_reconstruction.md has the commands run above, and
-# of the rest scripts/benchmark alone calls the host.
+# The documentation test runs the commands with COLMAP 3.8. The slowest pages are
+# left out here: the commands of automatic_reconstruction.md are run above, and on
+# the other pages only scripts/benchmark calls the host.
 if [[ $newest == 4.* ]]; then
   echo "== The commands of README.md and the guides with COLMAP $newest"
   guides=$here/../../docs/guide

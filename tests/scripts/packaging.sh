@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: BSD-3-Clause
-# Installs the build into a temporary folder and uses what is there as others
-# would, then makes the Debian packages and looks into them:
+# Installs the build into a temporary folder and uses it as other projects would,
+# then makes the Debian packages and checks their contents:
 #   packaging.sh BUILD_DIR COLMAP_DIR
 set -euo pipefail
 build=$1
@@ -36,7 +36,7 @@ zcat "$work/root/share/man/man1/colmap-adasfm.1.gz" | sed 's/\\-/-/g' \
   > "$work/page"
 # shellcheck disable=SC1091
 source "$work/root/share/bash-completion/completions/colmap-adasfm"
-# complete WORDS...: what completion offers for the last of them.
+# complete_words WORDS...: the completions of the last word.
 complete_words() {
   COMP_WORDS=("$@")
   COMP_CWORD=$(($# - 1))
@@ -104,7 +104,8 @@ else
 fi
 
 echo '== beside the package colmap'
-# dpkg as root only, and into a folder: a stand-in with the paths of Debian's colmap.
+# dpkg needs root. It installs into a folder, after a stand-in package with the
+# paths of Debian's colmap.
 if [ "$(id -u)" = 0 ]; then
   for file in bin/colmap share/doc/colmap/copyright share/man/man1/colmap.1.gz \
     share/applications/colmap.desktop; do
@@ -132,7 +133,8 @@ if [ "$(id -u)" = 0 ]; then
 else
   echo 'not root: dpkg was left out'
 fi
-# grep -q on a pipe would end the writer by SIGPIPE when it finds early.
+# A file, since grep -q on a pipe ends at the first match and so kills the writer
+# by SIGPIPE.
 dpkg-deb -f "$runtime" Depends > "$work/depends"
 grep -q 'libopencv-core' "$work/depends" ||
   fail 'the dependencies of the program are missing'
@@ -140,8 +142,8 @@ dpkg -x "$runtime" "$work/deb"
 "$work/deb/usr/bin/colmap-adasfm" adasfm_mapper -h > "$work/help" &&
   grep -q 'Options:' "$work/help" ||
   fail 'the packaged program does not run'
-# Where the COLMAP that it was built with is not there, it takes the one on the
-# PATH, and not itself.
+# If the COLMAP that it was built with is missing, the program uses the colmap on
+# the PATH, but never itself.
 python3 - "$work/deb/usr/bin/colmap-adasfm" "${colmap_dir%/share/colmap}/bin/colmap" << 'PYTHON'
 import pathlib, sys
 program, host = pathlib.Path(sys.argv[1]), sys.argv[2].encode()

@@ -104,7 +104,7 @@ class PairCountsTest(unittest.TestCase):
     pair = IDENTITY, direction(0), matches
     counts = self.count({('a', 'b'): pair, ('a', 'c'): pair},
                         {('a', 'c'): (IDENTITY, direction(0), [(1, 1)])})
-    # Of a and c one of three matches is true; refined, the true one is left.
+    # One of three matches of a and c is true; after refinement only it remains.
     self.assertEqual(counts, {'true': 1, 'true_lost': 1, 'right_lost': 1,
                               'false': 1, 'false_kept': 0})
 

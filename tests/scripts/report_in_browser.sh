@@ -14,7 +14,7 @@ done
 # Places that look alike give removed pairs to show.
 "$colmap" adasfm_synthesizer --output_path "$work" --num_images 150 \
   --spacing 2 --num_keypoints 100 --alias_ratio 0.05 > /dev/null
-# Photos are any picture; OpenCV goes by the content and not by the name.
+# Any picture serves as a photo; OpenCV detects the format by the content.
 mkdir "$work/images"
 sqlite3 "$work/database.db" 'SELECT name FROM images' | while read -r name; do
   { printf 'P6 80 50 255\n'; head -c 12000 /dev/zero | tr '\0' '\140'; } \

@@ -1,10 +1,9 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: BSD-3-Clause
 # Runs scripts/cluster/adasfm_slurm.sh on this machine and through a real Slurm
-# of two nodes on loopback, with a node whose disk is full, one that is drained,
-# one that is lost, and tasks that are killed; the models must be those of the
-# same chain without a cluster, byte by byte. Ends with 77 when Slurm cannot be
-# started here:
+# of two nodes on loopback. A node's disk is full, a node is drained, a node is
+# lost, and tasks are killed; the models must equal those of the same chain
+# without a cluster, byte by byte. Ends with 77 if Slurm cannot be started here:
 #   slurm.sh LAUNCHER
 set -euo pipefail
 launcher=$1
@@ -31,7 +30,7 @@ trap clean EXIT
 fail() { echo "slurm: $*" >&2; exit 1; }
 skip() { echo "slurm: skipped, $*"; exit 77; }
 
-# wait_for SECONDS WHAT COMMAND...: until the command succeeds.
+# wait_for SECONDS WHAT COMMAND...: waits until the command succeeds.
 wait_for() {
   local end=$((SECONDS + $1)) what=$2
   shift 2
@@ -47,8 +46,8 @@ wait_for() {
   done
 }
 
-# expect_error MESSAGE ARGUMENTS...: of adasfm_slurm.sh, in one line; $path is
-# the PATH that it has.
+# expect_error MESSAGE ARGUMENTS...: adasfm_slurm.sh fails with one ERROR line of
+# this message; $path, if set, is its PATH.
 expect_error() {
   local message=$1
   shift
@@ -58,10 +57,10 @@ expect_error() {
   [ "$(wc -l < "$work/log")" = 1 ] || fail "$*: $(cat "$work/log")"
 }
 
-# The program, held up while a file in $hold has the name of an argument: what a
-# long computation is. COLMAP's matcher builds random search trees and finds
-# other matches in every run, so a block that has been matched before gets the
-# matches that it had then.
+# A wrapper of the program that waits while a file in $hold has the name of an
+# argument, in place of a long computation. COLMAP's matcher builds random search
+# trees and finds other matches in every run, so a block that has been matched
+# before gets the earlier matches.
 write_program() {
   mkdir -p "$hold" "$work/matched"
   cat > "$work/colmap" << EOF
@@ -104,7 +103,7 @@ check_errors() {
   expect_error 'has 0 photos' local "$work/empty" --image_path "$hold"
   expect_error 'cannot copy the database' local "$work/text" \
     --database_path "$work/drive/gt.txt"
-  # It may be begun again with something else.
+  # The failed workspace may begin again with other options.
   expect_error 'cannot copy the database' local "$work/text" \
     --database_path "$work/colmap"
   # Without Slurm.
@@ -124,8 +123,8 @@ photo_options() {
     --images_per_block 4 --pairs_per_block 15)
 }
 
-# The chain on this machine: photos with `local`, of which one task is killed,
-# and the database with the commands themselves.
+# The reference models on this machine: photos with `local`, where one task is
+# killed, and the database with the commands themselves.
 run_references() {
   local sensors=$work/world pid
   photo_options
@@ -144,7 +143,7 @@ run_references() {
   grep -q '^Finished' "$work/log-local" || fail "$(cat "$work/log-local")"
   expect_error 'was begun with --max_num_features 2048' \
     local "$work/photos-local" --max_num_features 100
-  # What was there was not made again.
+  # Finished items were not made again.
   [ "$(grep -c '^\$ .*feature_extractor' "$work"/photos-local/logs/features-00000.log)" = 1 ] ||
     fail 'features were extracted twice'
 
@@ -239,19 +238,19 @@ EOF
   fi
 }
 
-# running WORKSPACE STAGE COUNT: so many tasks of the stage run.
+# running WORKSPACE STAGE COUNT: at least COUNT tasks of the stage run.
 running() {
   local job
   job=$(python3 -c 'import json, sys
 print(json.load(open(sys.argv[1])).get(sys.argv[2], 0))' "$1/jobs.json" "$2")
   [ "$(squeue -h -r -t RUNNING -o %F | grep -c "^$job\$")" -ge "$3" ]
 }
-# says WORKSPACE PATTERN: its table.
+# says WORKSPACE PATTERN: the workspace's status table matches.
 says() {
   "$script" status "$1" > "$work/table"
   grep -q "${@:2}" "$work/table"
 }
-# The number of times that the log of a stage's item has a command.
+# Number of commands in the logs of a stage's items.
 num_runs() { cat "$1/logs/$2"-*.log | grep -c "^\\$ "; }
 same_model() {
   local file
@@ -261,8 +260,8 @@ same_model() {
   done
 }
 
-# Photos: no room on the second node's disk, which is drained later; a task of
-# the matching is cancelled, and the chain submitted again.
+# Photos: the second node has a full disk and is drained later; a matching task is
+# cancelled, and the chain is submitted again.
 check_photos() {
   local job
   photo_options
@@ -307,7 +306,7 @@ check_database() {
   scontrol update NodeName=two State=DOWN Reason=test
   wait_for 200 'both went back to the queue' sh -c \
     "[ \"\$(scontrol -o show job | grep 'JobName=adasfm-parts' | grep -c 'Restarts=1')\" -ge 2 ]"
-  # It may have come back by itself.
+  # The node may have come back by itself.
   scontrol update NodeName=two State=RESUME 2> /dev/null || true
   rm "$hold/part"
   wait_for 200 'the drive is done' says "$work/drive300" '^Finished'

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Tests of what the tables of photos, faults, forty seeds and verdicts say of
-their records."""
+"""Tests of the tables of photos, faults, forty seeds and verdicts, made from
+given records."""
 
 import argparse
 import os
@@ -90,7 +90,8 @@ class SeedsTest(unittest.TestCase):
 class VerdictsTest(unittest.TestCase):
 
   def judge(self, metric_m, scale=1.0, shape_m=0.01):
-    """A good model with metres to 2 %, whose limit errs by 1 cm."""
+    """Judges a model with the verdict "good", a stated scale sigma of 2 % and
+    limits of 1 cm."""
     limit = Errors(0.01, 0.01, None, None)
     return verdict_table.judge(Run('good', '', Errors(
         shape_m, metric_m, scale, 0.02), limit, limit))

@@ -9,8 +9,8 @@
 namespace adasfm {
 namespace {
 
-// The error that a hole makes, against the log without it, in units of the
-// variance that the hole adds: near one on average.
+// The squared error that a hole causes, against the log without the hole and in
+// units of the added variance, is near one on average.
 TEST(BridgedHoles, VarianceIsThatOfTheError) {
   const Dataset data = ToDataset(BuildSyntheticWorld(SmallWorld(2, 120)));
   const std::vector<ImuSample>& imu = data.logs.imu;

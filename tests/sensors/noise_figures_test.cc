@@ -55,8 +55,8 @@ std::vector<ImuSample> Samples(const ImuNoise& noise, uint64_t seed,
   return samples;
 }
 
-// Second differences of 20 s at 200 Hz tell a density to 2 %; a quarter of the
-// stretches and the least of three estimates are a little below it.
+// Second differences of 20 s at 200 Hz determine a density to 2 %. A quarter of
+// the stretches and the least of three estimates are a little below it.
 TEST(NoiseFigures, AFigureThatIsTooSmallIsRaisedToTheLog) {
   const ImuNoise truth;
   ImuNoise stated = truth;
@@ -88,15 +88,16 @@ TEST(NoiseFigures, RightAndLargeFiguresAreKept) {
   }
 }
 
-// Vibration is motion: it is at one frequency, white noise at all. In
-// neighbouring samples it is 3e-3 rad/s/sqrt(Hz).
+// Vibration is motion at one frequency, white noise is at all frequencies.
+// Differences of neighbouring samples would state the vibration as 3e-3
+// rad/s/sqrt(Hz).
 TEST(NoiseFigures, VibrationIsNoNoise) {
   const ImuNoise truth;
   const ImuNoise noise = RaiseToLog(Samples(truth, 1, 0.05), truth);
   EXPECT_LT(noise.gyroscope_noise_density, 1.5 * truth.gyroscope_noise_density);
 }
 
-// In a filtered log neighbours differ little, which is no small noise.
+// Neighbours in a filtered log differ little, which is not small noise.
 TEST(NoiseFigures, AFilteredLogIsNotBelieved) {
   const ImuNoise truth;
   const ImuNoise noise = RaiseToLog(Samples(truth, 1, 0.0, 0.05), truth);
@@ -131,7 +132,7 @@ TEST(NoiseFigures, FarTooSmallOnesAreSaid) {
   EXPECT_NEAR(data.calibration.wheel_speed_noise, 0.05, 0.02);
 }
 
-// Rates about one axis that swing at five frequencies for 20 s, then rest.
+// Rates about one axis that oscillate at five frequencies for 20 s, then rest.
 struct Swinging {
   double highest_hz = 0.0;
 
@@ -145,7 +146,7 @@ struct Swinging {
     return 0.5 * envelope * envelope * rate;
   }
 
-  // Over a second.
+  // The angle of rotation over a second.
   double Angle(double begin_s) const {
     constexpr int kNumSteps = 2000;
     double angle = 0.0;
@@ -171,7 +172,7 @@ struct Swinging {
     return samples;
   }
 
-  // What the midpoint rule errs by in a second, as the density of each axis.
+  // Trapezoidal error of a second, as the noise density of each axis.
   double Loss(const std::vector<ImuSample>& samples, int rate_hz) const {
     double sum = 0.0;
     for (int second = 0; second < 39; ++second) {

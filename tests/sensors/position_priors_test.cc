@@ -37,7 +37,7 @@ std::vector<GnssFix> Fixes(int num, double period_s, double clock_s) {
   return fixes;
 }
 
-// Where the two images of a prior say that it is.
+// The position that the poses of a prior's two images predict.
 Eigen::Vector3d Predict(const PositionPrior& prior, double period_s) {
   return (1.0 - prior.share) * PositionAt((prior.image_id1 - 1.0) * period_s) +
          prior.share * PositionAt((prior.image_id2 - 1.0) * period_s);
@@ -48,7 +48,7 @@ TEST(PositionPriors, FixesBetweenNearImagesBelongToBoth) {
   const auto result = ComputePositionPriors({}, calibration, Images(100, 0.1),
                                             Fixes(12, 0.97, 0.0));
   ASSERT_TRUE(result.ok()) << result.status().message();
-  // The last one is at 10.67 s, after the last image.
+  // The last fix is at 10.67 s, after the last image.
   EXPECT_EQ(result->num_fixes_outside, 1);
   ASSERT_EQ(result->priors.size(), 11u);
   for (const PositionPrior& prior : result->priors) {

@@ -45,7 +45,7 @@ class Drive {
     }
   }
 
-  // All that comes out, as numbers.
+  // All results as numbers.
   std::vector<double> Outcome(const PriorEstimationOptions& options) const {
     const StatusOr<PriorEstimate> estimate = EstimatePriors(
         data_.images, data_.logs, data_.calibration, vision_, options);
@@ -63,7 +63,7 @@ class Drive {
   }
 
  private:
-  // A low-pass filter of that time constant.
+  // Applies a low-pass filter with this time constant.
   static void Filter(double lag_s, std::vector<ImuSample>* imu) {
     for (size_t i = 1; i < imu->size(); ++i) {
       const double dt_s =
@@ -98,7 +98,7 @@ TEST_P(EveryOption, ChangesTheOutcome) {
   GetParam().change(&options);
   const std::vector<double> after = drive.Outcome(options);
   EXPECT_NE(before, after);
-  // And back again.
+  // The default options give the first result again.
   EXPECT_EQ(drive.Outcome({}), before);
 }
 

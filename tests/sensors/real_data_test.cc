@@ -62,9 +62,10 @@ TEST_P(RealData, KittiRotationsAreWithinFiveHundredthsOfADegree) {
   EXPECT_LE(errors.rotation_rms_deg, 0.05);
 }
 
-// The cameras' rotations are the truth's with the noise of two-view geometries,
-// matched with the next eight images. On these sets vision and gyroscope differ
-// by 0.02 deg a frame (mean), more over longer intervals.
+// Camera rotations are the true ones with the noise of two-view rotations,
+// between each image and the next eight. In these sequences vision and
+// gyroscope differ by 0.02 deg a frame (mean), and by more over longer
+// intervals.
 TEST_P(RealData, KittiTimeShiftIsFoundWithinTenMilliseconds) {
   Dataset data;
   if (!ReadDataset(GetParam(), &data)) GTEST_SKIP() << "no shared data";
@@ -101,7 +102,8 @@ INSTANTIATE_TEST_SUITE_P(Kitti, RealData,
                                          "kitti06-51"));
 
 // The direction of driving stays 1.6 deg uncertain without vision
-// (docs/reference/sensors.md), so only length and heading are held to 1 %.
+// (docs/reference/sensors.md), so only the length (1 %) and the rotation (0.01
+// deg/m) have narrow bounds.
 TEST(RealRoad, PhoneAndWheelsKeepTheirHeadingAndLength) {
   Dataset data;
   if (!ReadDataset("comma2k19-ex1", &data)) GTEST_SKIP() << "no shared data";

@@ -9,7 +9,7 @@ namespace adasfm {
 namespace {
 
 TEST(RotationTriples, OnlyRightRotationsClose) {
-  // Images 0 to 3 in order of time; that from 2 to 3 is wrong by 0.1 rad.
+  // Images 0 to 3 in order of time; rotation(2, 3) is wrong by 0.1 rad.
   std::vector<Eigen::Quaterniond> cams_from_world;
   for (int i = 0; i < 4; ++i) {
     cams_from_world.push_back(ExpSo3(Eigen::Vector3d(0.1, 0.5 * i, -0.2 * i)));

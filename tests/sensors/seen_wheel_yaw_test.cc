@@ -23,7 +23,7 @@ double Duration(const Dataset& data) {
                        data.images[0].timestamp_ns);
 }
 
-// By how much all priors together turn too far about the vertical, rad.
+// The absolute sum of the priors' errors about the vertical, rad.
 double SummedYawError(const PriorEstimate& estimate, const Dataset& data) {
   double sum = 0.0;
   for (const RelativePosePrior& prior : estimate.priors) {
@@ -35,8 +35,8 @@ double SummedYawError(const PriorEstimate& estimate, const Dataset& data) {
   return std::abs(sum);
 }
 
-// What two-view rotations' noise makes of one error that all links share, and
-// the noise of the wheels.
+// The expected sum: the noise of two-view rotations in the estimate of one
+// error that all links share, and the noise of the wheels.
 double SummedYawSigma(double vision_sigma_rad, const SyntheticWorld& world,
                       const Dataset& data) {
   const double of_wheels = std::sqrt(2.0) * world.options.wheel_speed_noise /
@@ -58,8 +58,9 @@ void Slip(size_t image, double ratio, Dataset* data) {
   }
 }
 
-// One wheel that slips turns the log by tens of degrees: faster than any tyre
-// holds, or, at a smaller slip, so that without the IMU only cameras can tell.
+// One slipping wheel adds tens of degrees to the yaw of the log: faster than
+// any tyre allows or, with a smaller slip, observable only by cameras if there
+// is no IMU.
 TEST(SeenWheelYaw, WheelsThatSlipWithoutAnImuAreFound) {
   for (const uint64_t seed : {1, 2, 3}) {
     const SyntheticWorld world = BuildSyntheticWorld(SmallWorld(seed));
@@ -80,15 +81,14 @@ TEST(SeenWheelYaw, WheelsThatSlipWithoutAnImuAreFound) {
     const PriorEstimate healthy = estimate(0.0, vision);
     EXPECT_TRUE(healthy.summary.warnings.empty());
     EXPECT_LT(chi2(healthy), 1.25) << "seed " << seed;
-    // As no tyre holds.
+    // A slip that exceeds what tyres allow.
     const PriorEstimate skid = estimate(0.5, {});
     EXPECT_EQ(skid.summary.warnings.size(), 1);
     EXPECT_LT(chi2(skid), 1.25) << "seed " << seed;
     const PriorEstimate seen_skid = estimate(0.5, vision);
     EXPECT_EQ(seen_skid.summary.warnings.size(), 1);
     EXPECT_LT(chi2(seen_skid), 1.25) << "seed " << seed;
-    // As only cameras can tell.
-    // At 8 m/s for a second.
+    // A slip that only cameras observe, at 8 m/s for a second.
     const double slip_rad = 0.15 * 8.0 / world.track_width_m;
     EXPECT_GT(SummedYawError(estimate(0.15, {}), data), 0.5 * slip_rad)
         << "seed " << seed;
@@ -96,7 +96,7 @@ TEST(SeenWheelYaw, WheelsThatSlipWithoutAnImuAreFound) {
     EXPECT_EQ(slip.summary.warnings.size(), 1);
     EXPECT_LT(chi2(slip), 1.25) << "seed " << seed;
     EXPECT_LT(slip.priors.size(), healthy.priors.size());
-    // Where rotations of three images agree they take the wheels' place.
+    // Visual rotations that agree for three images replace those of the wheels.
     const PriorEstimate turned =
         estimate(0.15, SimulateVision(world, seed, {5e-3, 2}));
     EXPECT_EQ(turned.priors.size(), healthy.priors.size()) << "seed " << seed;
@@ -104,7 +104,7 @@ TEST(SeenWheelYaw, WheelsThatSlipWithoutAnImuAreFound) {
     EXPECT_LT(SummedYawError(turned, data),
               3.0 * SummedYawSigma(5e-3, world, data))
         << "seed " << seed;
-    // A wrong rotation costs a prior, no more.
+    // A wrong rotation costs one prior and nothing else.
     for (const double ratio : {0.15, 0.5}) {
       EXPECT_LT(
           chi2(estimate(ratio, SimulateVision(world, seed, {5e-3, 1, 0.05}))),
@@ -114,7 +114,7 @@ TEST(SeenWheelYaw, WheelsThatSlipWithoutAnImuAreFound) {
   }
 }
 
-// Wheels that differ by 1 % turn by 0.009 rad a metre, all of them alike.
+// Wheels that differ by 1 % add 0.009 rad of yaw a metre to all links.
 TEST(SeenWheelYaw, CamerasSeeWhatWheelsTurnAlike) {
   for (const uint64_t seed : {1, 2, 3}) {
     const SyntheticWorld world = BuildSyntheticWorld(SmallWorld(seed, 200));
@@ -135,7 +135,7 @@ TEST(SeenWheelYaw, CamerasSeeWhatWheelsTurnAlike) {
     EXPECT_LT(SummedYawError(seen, data),
               3.0 * SummedYawSigma(3e-3, world, data))
         << "seed " << seed;
-    // Both say what they err by alike.
+    // The stated shared errors agree with both sums.
     for (const PriorEstimate* estimate : {&alone, &seen}) {
       EXPECT_LT(SummedYawError(*estimate, data),
                 3.0 * std::hypot(sigma_rad(*estimate),
@@ -145,7 +145,7 @@ TEST(SeenWheelYaw, CamerasSeeWhatWheelsTurnAlike) {
   }
 }
 
-// Many slips to one side are no curvature of the wheels.
+// Many slips to one side must not be taken for a difference of the wheels.
 TEST(SeenWheelYaw, ManySlipsAlikeAreSlips) {
   for (const uint64_t seed : {1, 2, 3}) {
     const SyntheticWorld world = BuildSyntheticWorld(SmallWorld(seed, 200));
@@ -166,8 +166,8 @@ TEST(SeenWheelYaw, ManySlipsAlikeAreSlips) {
   }
 }
 
-// Wheels that slip where cameras see it slip where they do not, too; those that
-// never do are believed there as before.
+// Wheels that slip where cameras observe it are assumed to slip elsewhere, too.
+// Wheels that never slip keep their sigmas there.
 TEST(SeenWheelYaw, SlipsThatNoCameraSeesAreAllowedFor) {
   constexpr size_t kFirst = 130, kLast = 150;  // no pairs between
   for (const uint64_t seed : {1, 2, 3}) {
@@ -184,7 +184,7 @@ TEST(SeenWheelYaw, SlipsThatNoCameraSeesAreAllowedFor) {
         vision.push_back(rotation);
       }
     }
-    // Squares of the errors in sigmas, and the sigmas, of unseen turns.
+    // Mean squared errors in sigmas, and mean sigmas, of unobserved yaws.
     double chi2 = 0.0, sigma_rad = 0.0;
     const auto measure = [&] {
       const PriorEstimate estimate =
@@ -216,13 +216,14 @@ TEST(SeenWheelYaw, SlipsThatNoCameraSeesAreAllowedFor) {
     for (const size_t image : {20, 50, 80, 170}) Slip(image, 0.15, &data);
     measure();
     EXPECT_GT(sigma_rad, 5.0 * sigma_without_rad) << "seed " << seed;
-    // A fourth of the unseen time slips, a tenth of the seen.
+    // Slips take a fourth of the unobserved time, a tenth of the observed.
     EXPECT_LT(chi2, 2.0 * 2.5) << "seed " << seed;
   }
 }
 
-// An image whose pairs err alike closes every triple, and yet wheels that turn
-// as cameras saw from the image before to the one after did not slip.
+// An image whose pairs share one error closes every triple. Wheels that agree
+// with the visual rotation from the image before to the image after did not
+// slip.
 TEST(SeenWheelYaw, AnImageWithWrongPairsIsNoSlip) {
   for (const uint64_t seed : {1, 2, 3}) {
     const SyntheticWorld world = BuildSyntheticWorld(SmallWorld(seed));

@@ -43,13 +43,13 @@ TEST(SyntheticPriors, LongerDrivesTellTheWheelScale) {
   EXPECT_LT(std::sqrt(squares), 0.003);
 }
 
-// A factor of noisy readings would come out too small; one of what is estimated
-// does not (sensors/smoother/odometry_factors.h).
+// A scale factor of noisy readings would be estimated too small, one of
+// estimated motion is not (sensors/smoother/odometry_factors.h).
 TEST(SyntheticPriors, NoisyWheelsDoNotShrinkTheScale) {
   constexpr int kNumSeeds = 8;
   double error = 0.0, variance = 0.0;
   for (int seed = 1; seed <= kNumSeeds; ++seed) {
-    // Many short links, and little else that tells the scale.
+    // Many short links, and little else that constrains the scale.
     SyntheticWorldOptions options = SmallWorld(seed, 400);
     options.spacing_m = 0.3;
     options.wheel_speed_noise = 0.5;
@@ -67,7 +67,7 @@ TEST(SyntheticPriors, NoisyWheelsDoNotShrinkTheScale) {
   EXPECT_NEAR(error, 0.0, 3.0 * std::sqrt(variance));
 }
 
-// Cuts what the IMU logged before the first image.
+// Removes the IMU samples of the standstill before the first image.
 Dataset WithoutStandstill(Dataset data) {
   const timestamp_t start = data.images.front().timestamp_ns;
   while (data.logs.imu.front().timestamp_ns < start - 20'000'000) {
@@ -86,7 +86,7 @@ TEST(SyntheticPriors, StartsWithoutStandstill) {
                        SimulateVision(world, seed), {});
     ASSERT_TRUE(estimate.ok()) << estimate.status().message();
     EXPECT_EQ(estimate->summary.standstill_s, 0.0);
-    // Vision tells the gyroscope's bias to 1e-3 rad over 79 pairs of 0.2 s.
+    // Vision determines the bias to 1e-3 rad over 79 pairs of 0.2 s.
     EXPECT_LT((estimate->summary.gyroscope_bias - world.true_gyro_bias).norm(),
               0.004);
     const PairErrors errors =
@@ -96,7 +96,7 @@ TEST(SyntheticPriors, StartsWithoutStandstill) {
   }
 }
 
-// Rolling shutters and poor geometries turn all pairs alike, however far apart.
+// Rolling shutters and poor geometries rotate pairs of any gap alike: no bias.
 TEST(SyntheticPriors, WhatAllTwoViewRotationsErrByIsNoBias) {
   const Eigen::Quaterniond offset =
       ExpSo3(Eigen::Vector3d(4e-4, -1.2e-3, 6e-4));
@@ -112,7 +112,7 @@ TEST(SyntheticPriors, WhatAllTwoViewRotationsErrByIsNoBias) {
         EstimatePriors(data.images, data.logs, data.calibration, vision, {});
     ASSERT_TRUE(estimate.ok()) << estimate.status().message();
     const SensorSummary& summary = estimate->summary;
-    // About the vertical nothing else tells it.
+    // About the vertical nothing but vision constrains the bias.
     const double error = (summary.gyroscope_bias - world.true_gyro_bias).z();
     EXPECT_LT(std::abs(error),
               3.0 * std::sqrt(summary.gyroscope_bias_covariance(2, 2)))
@@ -159,8 +159,8 @@ TEST(SyntheticPriors, SlipsAreFoundAndTheLengthStays) {
   }
 }
 
-// Wheels that slip until the log ends jump once: what comes after is wrong,
-// too, though the accelerometer agrees with it.
+// Wheels that slip until the log ends show one jump. All later readings are
+// wrong, too, though the accelerometer agrees with them.
 TEST(SyntheticPriors, ASlipUntilTheEndIsFound) {
   for (const uint64_t seed : {1, 2, 3, 4, 5}) {
     Dataset data = ToDataset(BuildSyntheticWorld(SmallWorld(seed, 60)));
@@ -210,8 +210,8 @@ TEST(SyntheticPriors, ImuAloneClaimsRotationOnly) {
   EXPECT_FALSE(estimate.gravity_in_cam.empty());
 }
 
-// Positions of three images, in which the speed drops out of the equations of
-// core/inertial_motion.h; with wheels for odd seeds.
+// Eliminates the speed from the equations of core/inertial_motion.h with the
+// positions of three images; with wheels for odd seeds.
 TEST(SyntheticPriors, StoreWhatTheImuIntegrates) {
   const Eigen::Vector3d gravity(0.0, 0.0, -9.81);
   for (const uint64_t seed : {1, 2, 3, 4, 5}) {
@@ -276,7 +276,7 @@ TEST(SyntheticPriors, SpeedAloneClaimsLengthOnly) {
                        .translation.norm();
   }
   EXPECT_TRUE(estimate.gravity_in_cam.empty());
-  // Bends move the camera beside the wheels' axis.
+  // Beside the wheels' axis, the camera moves differently in bends.
   EXPECT_NEAR(length / true_length, 1.0, 0.03);
 }
 

@@ -50,7 +50,7 @@ TEST(TrajectoryPriors, AreTheMotionsOfTheCameraWhereThereArePoses) {
   // The trajectory's clock is a twentieth of a second behind.
   const auto poses = InterpolateTrajectory(Trajectory(), kCamFromBody,
                                            -kSecondNs / 20, Images(), 0.5);
-  // Not before it, not in its gap (4.5, 5.0, 5.5 s), not after its end.
+  // Not before its start, in its gap (4.5, 5.0, 5.5 s), or after its end.
   EXPECT_EQ(poses.size(), 21 - 3);
   TrajectoryPriorOptions options;
   options.sigma_m_per_m = 0.02;
@@ -85,7 +85,7 @@ TEST(TrajectoryPriors, PosesBetweenOthersAreInterpolated) {
   const Rigid3d truth = kCamFromBody * BodyFromWorld(0.05);
   // Off by the chord of the arc, d^2 / (8 R) = 0.125 mm, and no more.
   EXPECT_LT((poses.at(1).translation - truth.translation).norm(), 1.26e-4);
-  // No gap is bridged that is longer than is allowed.
+  // Gaps longer than the limit are not bridged.
   EXPECT_TRUE(InterpolateTrajectory(Trajectory(), kCamFromBody, 0, images, 0.05)
                   .empty());
 }

@@ -23,7 +23,7 @@ std::vector<WheelSpeed> Drive(uint64_t seed) {
   return speeds;
 }
 
-// Readings from 20 s to 21 s.
+// Changes the readings from 20 s to 21 s.
 template <typename Change>
 std::vector<WheelSpeed> Spoilt(std::vector<WheelSpeed> speeds, Change change) {
   for (size_t i = 1000; i < 1050; ++i) change(&speeds[i]);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// What an import says of translations by the wheels without the accelerometer
-// (sensors/smoother/compose_wheel_translation.h).
+// Translations that an import computes from the wheels without the
+// accelerometer (sensors/smoother/compose_wheel_translation.h).
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -19,8 +19,8 @@ Eigen::Vector3d TrueTranslation(const Dataset& data, image_t image_id1,
       .translation;
 }
 
-// Of the lengths of one drive, without the share of the length that all err
-// by: the wheels' scale.
+// Errors of the lengths of one drive. TakeScaleOff() removes their common share
+// of the length: the wheels' scale.
 struct LengthErrors {
   std::vector<double> lengths, errors, variances;
 
@@ -61,10 +61,10 @@ struct ErrorSums {
   double Correlation() const { return product / square; }
 };
 
-// 790 lengths tell a chi-square to 0.05 and a correlation to 0.036. What is
-// stated was measured 20 % too large, of which 5 are the interpolation of
-// readings at an interval's ends.
-// Lengths that the accelerometer smoothed err alike.
+// 790 lengths determine a chi-square to 0.05 and a correlation to 0.036. Stated
+// errors were measured to be 20 % too large, of which 5 come from interpolating
+// readings at an interval's ends. Errors of lengths that the accelerometer
+// smoothed are correlated.
 TEST(WheelTranslations, ErrByWhatTheyStateAndIndependently) {
   constexpr int kNumSeeds = 10;
   ErrorSums by_wheels, smoothed;
@@ -115,7 +115,7 @@ TEST(WheelTranslations, AreUnknownWhereWheelsSlip) {
   }
 }
 
-// With two photos more of the car before it sets off.
+// A drive with two more photos of the car before it sets off.
 Dataset BuildDriveFromRest(uint64_t seed) {
   Dataset data = ToDataset(BuildSyntheticWorld(SmallWorld(seed)));
   const timestamp_t start_ns = data.logs.imu.front().timestamp_ns;
@@ -137,13 +137,13 @@ TEST(WheelTranslations, AreZeroAtRest) {
         [](const InertialMotion& motion) { return motion.image_id1 == 1001; });
     ASSERT_NE(at_rest, estimate.inertial_motions.end());
     ASSERT_TRUE(at_rest->by_wheels.has_value());
-    // The camera, 1 m from the IMU, moves by what the attitude errs.
+    // The camera, 1 m from the IMU, moves by the error of the attitude.
     EXPECT_LT(at_rest->by_wheels->translation.norm(), 1e-3);
     EXPECT_LT(at_rest->by_wheels->covariance.diagonal().maxCoeff(), 1e-4);
   }
 }
 
-// Without wheels there is nothing to say, at rest neither.
+// Without wheels there are no translations by wheels, not even at rest.
 TEST(WheelTranslations, NeedWheels) {
   Dataset data = BuildDriveFromRest(1);
   data.logs.wheel.clear();

@@ -52,7 +52,7 @@ class Drive {
     for (int i = 0; i <= num_steps; ++i) {
       const double t = i * kStepS;
       if (i % 100 == 0) AddSamples(t, state);
-      // Counts tell speeds between two of them, so not at the log's ends.
+      // Speeds need two counts, so there are no images at the log's ends.
       if (i % 2000 == 1000) AddImage(t, state);
       Advance(t + 0.5 * kStepS, kStepS, &state);
     }
@@ -135,7 +135,7 @@ class Drive {
     ImuSample imu;
     imu.timestamp_ns = time_ns;
     imu.angular_velocity.z() = YawRateAt(t);
-    // The axle's centre: along and across the way, and gravity.
+    // At the axle's centre: force along and across the path, and gravity.
     imu.specific_force =
         Eigen::Vector3d((SpeedAt(t + 1e-3) - SpeedAt(t - 1e-3)) / 2e-3,
                         SpeedAt(t) * YawRateAt(t), 9.81);
@@ -176,7 +176,7 @@ TEST(WheelTypes, SteeringAloneGivesPlanarMotion) {
   EXPECT_LT(errors.rotation_deg, 0.1);
   EXPECT_LT(errors.end_share, 0.01);
 
-  // Another wheelbase is another turn.
+  // A wrong wheelbase gives wrong rotations.
   drive.calibration_.wheelbase_m = 1.1 * kWheelbaseM;
   const StatusOr<PriorEstimate> longer = drive.Estimate();
   ASSERT_TRUE(longer.ok());
@@ -196,7 +196,7 @@ TEST(WheelTypes, SteeringAgreesWithTheGyroscope) {
   EXPECT_NEAR(estimate->summary.wheel_scale, 1.0, 0.01);
 }
 
-// Beside the axle's centre a wheel drives further outside of bends.
+// The wheel is beside the axle's centre and drives further outside of bends.
 TEST(WheelTypes, OneEncoderWithGyroscopeGivesMetres) {
   Drive drive;
   drive.UseEncoder();
@@ -212,8 +212,8 @@ TEST(WheelTypes, OneEncoderWithGyroscopeGivesMetres) {
             1.5 * errors.translation_m);
 }
 
-// Wheels on a clock of their own: a search of the shift brings them near, and
-// what is left is an unknown of the smoother.
+// Wheels on a clock of their own: a search finds the time offset roughly, and
+// the smoother estimates the remainder.
 TEST(WheelTypes, TheClockOfTheWheelsIsCorrected) {
   for (const double shift_s : {-0.12, -0.04, 0.0, 0.05}) {
     Drive drive;

@@ -81,7 +81,7 @@ TEST(SetFocalFactors, WaveIsSlowAndStepsAreSudden) {
     }
     EXPECT_EQ(num_changes, num_steps > 0 ? num_steps : 199);
     EXPECT_EQ(largest > 0.004, num_steps > 0);
-    // Both cameras alike.
+    // The factors are the same for both cameras.
     EXPECT_EQ(world.images[200 + 50].focal_factor,
               world.images[50].focal_factor);
   }
@@ -165,7 +165,7 @@ TEST(OpenShutters, NeverReachTheNextImage) {
   EXPECT_NE(BuildError(options), "");
 }
 
-// f = 100 px; 1 m beside the axis, 10 m ahead, then 9 m.
+// f = 100 px. The point is 1 m beside the axis and first 10 m, then 9 m ahead.
 TEST(ComputeBlurLengths, IsTheWayOfThePixel) {
   SyntheticWorld world;
   world.camera.focal_px = 100.0;
@@ -184,7 +184,7 @@ TEST(ComputeBlurLengths, IsTheWayOfThePixel) {
   EXPECT_NEAR(ComputeBlurLengths(world, image)[0], length_px, 1e-9);
   image.focal_factor = 1.1;
   EXPECT_NEAR(ComputeBlurLengths(world, image)[0], 1.1 * length_px, 1e-9);
-  // Three photos alike but for twice the way: 1.11, 1.11 and 2.5 px.
+  // Three photos, the third with twice the path: 1.11, 1.11 and 2.5 px.
   image.focal_factor = 1.0;
   image.keypoints.resize(20);
   image.landmark_ids.assign(20, 0);

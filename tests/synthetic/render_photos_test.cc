@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// What the settings of a photo do to its grey levels.
+// Effects of a photo's settings on its grey levels.
 
 #include <gtest/gtest.h>
 
@@ -84,7 +84,7 @@ TEST(WorldRenderer, MotionBlurLowersGradientsAndKeepsTheMean) {
   EXPECT_LT(last_energy, 0.6 * GradientEnergy(sharp));
 }
 
-// Against sharp photos from along the way.
+// Reference: the mean of sharp photos along the camera's path.
 TEST(WorldRenderer, BlurredPhotoIsTheMeanOfSharpOnes) {
   SyntheticWorld world = BuildSmallWorld(0.1);
   WorldRenderer renderer(world);
@@ -100,8 +100,8 @@ TEST(WorldRenderer, BlurredPhotoIsTheMeanOfSharpOnes) {
     mean += RenderGrey(&renderer) / kNumPhotos;
   }
   world.images[kIndex].cam_from_world = middle;
-  // All photos of an image have the same noise: what is left is that of the
-  // sums over different moments, and of rounding.
+  // All photos of an image have the same noise. The remaining difference comes
+  // from sums over different moments and from rounding.
   EXPECT_LT(MeanDifference(blurred, mean), 0.5);
   EXPECT_GT(MeanDifference(RenderGrey(&renderer), mean), 2.0);
 }

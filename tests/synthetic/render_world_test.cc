@@ -55,8 +55,8 @@ double Correlation(const std::vector<std::pair<double, double>>& values) {
   return ab / std::sqrt(aa * bb);
 }
 
-// Brightness of facade points of one street in photo 1 against those of the
-// same places of another street (or the same one) in photo 2.
+// Correlation of the brightness of facade points of one street in photo 1 with
+// that of the same places of another street (or the same one) in photo 2.
 double FacadeCorrelation(const SyntheticWorld& world, WorldRenderer* renderer,
                          const Street& street1, size_t index1,
                          const Street& street2, size_t index2) {
@@ -174,7 +174,7 @@ TEST(MipTexture, AveragesOverTheFootprint) {
     }
   }
   const MipTexture texture(checkers, 10.0);
-  // The centre of pixel (20, 30), 0.1 m wide, as it is.
+  // At the centre of pixel (20, 30), 0.1 m wide, the texture is exact.
   const Eigen::Vector3f exact = texture.Sample(Eigen::Vector2d(2.05, 3.05), 0.1,
                                                Eigen::Vector2d(0.01, 0.0));
   EXPECT_NEAR(exact.x(), 200.0, 1e-3);

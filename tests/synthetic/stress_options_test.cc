@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Each dial of a hard world against what the world has, counted from its poses,
-// logs and matches.
+// Compares each option of a hard world with the world's properties, counted
+// from its poses, logs and matches.
 
 #include <gtest/gtest.h>
 
@@ -26,7 +26,7 @@ Eigen::Vector3d Forward(const SyntheticImage& image) {
   return image.cam_from_world.rotation.conjugate() * Eigen::Vector3d::UnitZ();
 }
 
-// The largest value that the message names.
+// The message of the error that these options cause; empty without an error.
 std::string BuildError(const SyntheticWorldOptions& options) {
   try {
     BuildSyntheticWorld(options);
@@ -117,7 +117,7 @@ TEST(StressOptions, LanesLieSideBySideAndSeeEachOther) {
       // The camera sits beside the path, the machine weaves by centimetres.
       const double lane = center.y() / spacing_m;
       EXPECT_NEAR(lane, std::round(lane), 0.2 / spacing_m);
-      // Back and forth.
+      // Neighbouring lanes have opposite directions.
       EXPECT_EQ(forward.x() > 0.0, std::lround(lane) % 2 == 0);
       lanes.insert(std::lround(lane));
     }
@@ -234,7 +234,7 @@ TEST(StressOptions, CarsCarryTheShareOfKeypointsAskedFor) {
   const SyntheticWorldSummary summary = SummarizeWorld(world);
   EXPECT_NEAR(summary.moving_keypoint_ratio, 0.6, 0.005);
   EXPECT_GT(summary.moving_match_ratio, 0.6);
-  // A point of a car does not move against the car, only against the town.
+  // A point on a car moves against the town, but not against the car.
   const SyntheticPair& pair = world.pairs.front();
   const SyntheticImage& image1 = world.images[pair.image_id1 - 1];
   const SyntheticImage& image2 = world.images[pair.image_id2 - 1];
@@ -383,8 +383,7 @@ TEST(StressOptions, FixesHaveNoiseAndJumps) {
   options.gnss_rate_hz = 5.0;
   options.gnss_noise_m = 0.0;
   const SyntheticWorld exact = BuildSyntheticWorld(options);
-  // The first image lies one second after setting off; its antenna is where the
-  // camera's calibration says.
+  // The antenna's position at an image, from the camera's pose and calibration.
   const SyntheticImage& image = exact.images[100];
   const Eigen::Vector3d antenna =
       (exact.cam_from_imu.Inverse() * image.cam_from_world).Inverse() *

@@ -51,7 +51,7 @@ TEST(BuildSyntheticWorld, ASecondCameraSeesTheSameFrames) {
   for (int i = 0; i < 20; ++i) {
     const SyntheticImage& left = world.images[i];
     const SyntheticImage& right = world.images[20 + i];
-    // The first camera's drive is the one without a second camera.
+    // The first camera sees the same as without a second camera.
     EXPECT_EQ(left.name, "cam0/" + one.images[i].name);
     EXPECT_EQ(left.keypoints, one.images[i].keypoints);
     EXPECT_EQ(right.name, "cam1/" + one.images[i].name);
@@ -225,7 +225,7 @@ TEST(BuildSyntheticWorld, AliasPairsAreConsistentAndFarApart) {
                     .norm(),
                 45.0);
       EXPECT_EQ(CountTrueMatches(world, pair), 0);
-      // One small motion explains all of them.
+      // One small motion explains all matches.
       EXPECT_GE(pair.inlier_matches.size(), 15);
       EXPECT_LT(RadToDeg(AngleBetweenRad(pair.cam2_from_cam1.rotation,
                                          Eigen::Quaterniond::Identity())),
@@ -360,7 +360,7 @@ TEST(BuildSyntheticWorld, RejectsImpossibleOptions) {
   options = SyntheticWorldOptions();
   options.spacing_m = -1.0;
   EXPECT_THROW(BuildSyntheticWorld(options), std::invalid_argument);
-  // Look-alike places have to be far from each other.
+  // Aliased places have to be far from each other.
   options = SyntheticWorldOptions();
   options.num_images = 30;
   options.alias_pair_ratio = 0.1;

@@ -12,8 +12,8 @@
 namespace adasfm {
 namespace {
 
-// A facade on the right, 1 m ahead: where the descent of a cost whose
-// derivative is not complete ends far from its minimum.
+// A facade on the right and a step of 1 m ahead: with an incomplete derivative
+// of the cost, the descent ends far from the minimum.
 TEST(RefineTwoViewPose, EndsAtTheLeastCost) {
   constexpr double kLossScalePx = 2.0;
   constexpr double kStep = 1e-3;

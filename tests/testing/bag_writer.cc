@@ -37,7 +37,7 @@ std::string Compress(const std::string& compression, const std::string& data) {
   return out;
 }
 
-// Bit by bit, unlike the reader's.
+// Computes the CRC bit by bit, unlike the reader.
 uint32_t Crc32(const std::string& data) {
   uint32_t crc = ~0u;
   for (const char c : data) {

@@ -16,7 +16,7 @@
 
 namespace adasfm {
 
-// Serialises values as CDR: values are aligned to their size from the body on.
+// Serialises values as CDR, aligned to their size from the body on.
 class CdrWriter {
  public:
   explicit CdrWriter(bool is_big_endian = false)

@@ -75,7 +75,7 @@ AlignedErrors ComputeAlignedErrors(
 double ComputeAlignedRotationError(
     const std::map<image_t, Eigen::Quaterniond>& cams_from_world,
     const std::map<image_t, Eigen::Quaterniond>& true_cams_from_world) {
-  // The chordal mean of R_i^T R_i,true turns the world of the estimate.
+  // Aligns the worlds by the chordal mean of R_i^T R_i,true.
   Eigen::Matrix3d sum = Eigen::Matrix3d::Zero();
   for (const auto& [image_id, rotation] : cams_from_world) {
     sum += (rotation.conjugate() * true_cams_from_world.at(image_id))

@@ -39,7 +39,7 @@ AlignedErrors ComputeAlignedErrors(
     const std::map<image_t, Rigid3d>& true_cams_from_world,
     const AlignmentOptions& options);
 
-// Rotations only: the mean angle after the best common turn of the world.
+// Rotations only: the mean angle after the best common rotation of the world.
 double ComputeAlignedRotationError(
     const std::map<image_t, Eigen::Quaterniond>& cams_from_world,
     const std::map<image_t, Eigen::Quaterniond>& true_cams_from_world);

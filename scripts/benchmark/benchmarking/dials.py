@@ -1,12 +1,13 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The worlds of stress_worlds.py: what makes each hard, and what tells it."""
+"""The worlds of stress_worlds.py, each with one difficulty (dial)."""
 
-# Without logs the scale drifts: a fold errs by more of the way driven.
+# Without logs the scale drifts, so only errors above this share of the distance
+# driven count as folds.
 MAX_DRIFT_WITHOUT_LOGS = 0.005
 ALL_LOGS = ('imu', 'wheel')
 
 
-# One world: the figures of world.json that tell the dial, and options of the
+# One world: the figures of world.json that describe the dial, and options of the
 # synthesizer.
 def dial(figures=(), images=150, logs=ALL_LOGS, bar_m=0.5,
          max_drift=MAX_DRIFT_WITHOUT_LOGS, **options):
@@ -14,7 +15,8 @@ def dial(figures=(), images=150, logs=ALL_LOGS, bar_m=0.5,
           'max_drift': max_drift, 'options': options}
 
 
-# Rendered, for what only photos show; mapped from the photos by one command.
+# A rendered world, for effects that only photos have; one command maps it from
+# the photos.
 def photos(figures, **options):
   return dial(figures, 60, render=1, spacing=1, image_width=640,
               image_height=400, **options)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What the scripts share that write tables into docs/: arguments, results."""
+"""Shared code of scripts that write tables into docs/: arguments, results."""
 
 import json
 import os
@@ -35,8 +35,9 @@ def add_arguments(parser, script, name, output_path):
 
 
 def open_ledger(args):
-  """The rows in args.output_path, which becomes the folder for the worlds and
-  runs of this version; those of other versions are removed."""
+  """Opens the ledger in args.output_path, then sets args.output_path to its
+  subfolder for worlds and runs of this version. Removes those of other
+  versions."""
   os.makedirs(args.output_path, exist_ok=True)
   ledger = Ledger(os.path.join(args.output_path, 'rows.jsonl'),
                   make_stamp(args.root), args.root)
@@ -79,7 +80,8 @@ def world_folder(name, seed, args):
 
 
 def measure(model, folder, args, log_path):
-  """Images and errors of a model of the world in a folder; None without one."""
+  """Images and errors of a model against the folder's gt.txt; None without a
+  model."""
   evaluation = evaluate(model, os.path.join(folder, 'gt.txt'), args, log_path)
   if not evaluation:
     return None

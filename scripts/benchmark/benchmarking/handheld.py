@@ -19,8 +19,8 @@ RECORDINGS = {
     'phone 2': PHONES + '/slam_session_20250923_090335_old',
     'RealSense': 'DM-VIO-dataset',
 }
-# Android's sensors of a phone held upright: photos are turned by a quarter.
-# The noise is that of a consumer's IMU: nobody has calibrated these.
+# Android's sensor axes on a phone held upright, whose photos are rotated by 90
+# deg. The noise is typical of consumer IMUs; these are not calibrated.
 PHONE_SENSORS = '''cam0:
   T_cam_imu:
     - [0, -1, 0, 0]
@@ -35,7 +35,7 @@ imu0:
   accelerometer_noise_density: 0.005
   accelerometer_random_walk: 0.0005
 '''
-# As the repository's own files state them, but for the clock.
+# As in the repository's own files, except for the time offset.
 REALSENSE_SENSORS = '''cam0:
   camera_model: pinhole
   distortion_model: none
@@ -57,8 +57,8 @@ imu0:
 
 
 def read_objects(path):
-  """JSON objects one after the other, on as many lines as they like; one that
-  is cut short ends them."""
+  """Consecutive JSON objects, each on any number of lines; an incomplete object
+  ends the list."""
   with open(path) as file:
     text = file.read()
   decoder = json.JSONDecoder()
@@ -77,8 +77,8 @@ def read_objects(path):
 
 
 def join_samples(gyroscope, accelerometer):
-  """[(t, w, a)] at the gyroscope's times, the accelerometer interpolated;
-  from two lists of (t, (x, y, z)). Times strictly increase."""
+  """[(t, w, a)] at the gyroscope's times, with the accelerometer interpolated,
+  from two lists of (t, (x, y, z)). The resulting times strictly increase."""
   gyroscope, accelerometer = sorted(gyroscope), sorted(accelerometer)
   times = [t for t, _ in accelerometer]
   samples = []

@@ -12,7 +12,8 @@ def has_option(colmap, command, option):
 
 
 def version_of(colmap):
-  """As 4.2.1; empty when the program does not say. Ours says its host's."""
+  """A program's version of COLMAP, as 4.2.1; '' if the program prints none. Our
+  program prints its host's version."""
   result = subprocess.run([colmap, 'help'], check=False, text=True,
                           capture_output=True)
   match = re.search(r'COLMAP (\d+(?:\.\d+)+)', result.stdout + result.stderr)

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Rows of tables: done once for each version, never mixed with another one's.
+"""Rows of tables: run once per version, never mixed with other versions.
 
-A ledger is a file of JSON lines, one for each row that was run: its key, what
-the row is (spec), its records, and the stamp: which sources of the product on
-which machine. The last line of a key counts. A row whose stamp and spec are
-those of today is not run again; a table of rows with two stamps is refused.
+A ledger is a file of JSON lines, one for each row that was run: its key, its
+parameters (spec), its records, and the stamp of our sources and the machine.
+The last line of a key counts. A row with the current stamp and spec is not run
+again; a table of rows with two stamps is an error.
 """
 
 import datetime
@@ -14,7 +14,7 @@ import os
 import platform
 import subprocess
 
-# The product: what a figure can depend on.
+# The sources that a figure can depend on.
 PRODUCT = ('CMakeLists.txt', 'cmake', 'core', 'sensors', 'global', 'partition',
            'synthetic', 'colmap_ext', 'scripts/clean_database.sh',
            'scripts/drop_weak_joins.py', 'scripts/mapper_start.py')
@@ -26,7 +26,7 @@ class MixedVersions(Exception):
 
 
 def hash_sources(root):
-  """Of names and contents of the product's files, whatever git knows."""
+  """Hash of names and contents of PRODUCT's files, tracked by git or not."""
   paths = []
   for name in PRODUCT:
     top = os.path.join(root, name)
@@ -43,7 +43,7 @@ def hash_sources(root):
 
 
 def commit_of(root):
-  """The last commit that changed the product, '+' when files differ from it."""
+  """The last commit that changed PRODUCT, with '+' if files differ from it."""
   def git(*arguments):
     result = subprocess.run(['git', '-C', root, *arguments, '--', *PRODUCT],
                             capture_output=True, text=True, check=False)
@@ -78,7 +78,7 @@ def _identity(stamp):
 class Ledger:
 
   def __init__(self, path, stamp, root=None):
-    """With root, rows during which its sources change are refused."""
+    """root: run() rejects a row if the sources there change while it runs."""
     self.path = path
     self.stamp = stamp
     self.root = root
@@ -101,7 +101,7 @@ class Ledger:
     return None
 
   def run(self, key, function, spec=None):
-    """The row's records: those of before, or function()'s."""
+    """The row's records: stored ones, or function()'s, which are stored."""
     records = self.find(key, spec)
     if records is None:
       entry = {'key': key, 'spec': spec, 'stamp': self.stamp,
@@ -127,12 +127,13 @@ class Ledger:
       return file.read() != b'\n'
 
   def current(self):
-    """All rows of today's version."""
+    """All rows of the current version and machine."""
     return [entry for entry in self.last.values()
             if _identity(entry['stamp']) == _identity(self.stamp)]
 
   def entries(self, keys):
-    """The rows of a table, in order. Raises MixedVersions."""
+    """The rows of a table, in order. Raises MixedVersions if they are of
+    different versions or not run yet."""
     missing = [key for key in keys if key not in self.last]
     if missing:
       raise MixedVersions('%s: not run yet: %s' %

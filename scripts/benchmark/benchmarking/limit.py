@@ -17,8 +17,8 @@ def write_true_poses(database, ground_truth_path, model_path,
                      matched_only=True):
   """A model of the images of the database, at their true poses.
 
-  With matched_only, images without a verified pair stay out: vision says
-  nothing about them.
+  With matched_only, images without a verified pair are left out, since no
+  matches constrain them.
   """
   connection = sqlite3.connect(database)
   names = dict(connection.execute('SELECT name, image_id FROM images'))

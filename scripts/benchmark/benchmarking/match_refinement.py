@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Matches of hard pairs before and after adasfm_global, against the truth.
 
-Look-alike places and images with few keypoints are worlds of the synthesizer,
-whose landmarks tell which match is true. Mirrored are rendered photos: in a
-bend the right half of each becomes the mirror image of its left half, as a
-mirror beside the lens would show it; a match is true when it fits the true
-poses and is not seen in the mirror.
+Aliased places and images with few keypoints are worlds of the synthesizer with
+landmarks, which define the true matches. The mirrored case has rendered photos:
+in a bend the right half of each photo becomes the mirror image of its left
+half, as a mirror beside the lens would show it; a match is true if it fits the
+true poses and is not seen in the mirror.
 """
 
 import os
@@ -30,14 +30,14 @@ CASES = {
     'mirrored': ['--num_images', '48', '--seed', '2', '--image_width', '640',
                  '--image_height', '400', '--render', '1'],
 }
-# The importer sees that gyroscope and mirrored photos contradict each other, and
-# ends unless it is told to go on.
+# The importer finds that gyroscope and mirrored photos contradict each other,
+# and stops without --force.
 IMPORT_OPTIONS = {'mirrored': {'import': ['--force', '1']}}
-# A pair is of little texture when one of its images has no more keypoints.
+# A pair has little texture if one of its images has at most so many keypoints.
 FEW_KEYPOINTS = 80
 NUM_MIRRORED = 14
-# Matches of photos are true up to this distance from both epipolar lines
-# together, as adasfm_global has it [px].
+# Matches of photos are true up to this sum of the distances from both epipolar
+# lines, as in adasfm_global [px].
 MAX_EPIPOLAR_PX = 4.0
 
 
@@ -73,7 +73,8 @@ def turn_deg(a, b):
 
 
 def sharpest_bend(truth, count):
-  """Names of so many images in a row, between whose ends the turn is largest."""
+  """Names of `count` consecutive images with the largest rotation from first to
+  last."""
   names = sorted(truth)
   turns = [turn_deg(truth[names[k]][0], truth[names[k + count - 1]][0])
            for k in range(len(names) - count + 1)]
@@ -144,7 +145,7 @@ class Truth:
     return seen
 
   def is_hard(self, a, b, are_true):
-    """Of verified matches: the kind of pair that the case is about."""
+    """Whether a verified pair is of the kind that the case is about."""
     if self.case == 'mirrored':
       return a in self.mirrored and b in self.mirrored
     if self.case == 'look-alike places':
@@ -184,8 +185,8 @@ def map_with_colmap(database, folder, world, args):
 
 
 def example(before, after, hard, truth):
-  """A hard pair that is kept, of which the most false matches go; as text of
-  its matches, each 'x1,y1,x2,y2,true'."""
+  """The kept hard pair that loses the most false matches. Its matches are text,
+  each 'x1,y1,x2,y2,true'."""
   def false_ones(pair, matches):
     return int((~truth.are_true(*pair, matches)).sum())
 

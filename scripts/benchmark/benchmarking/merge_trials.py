@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The paper's merge trials: parts aligned to coarse poses that were disturbed,
-with fixed thresholds and with the adaptive one."""
+"""The paper's merge trials: parts are aligned to disturbed coarse poses, with
+fixed thresholds and with the adaptive threshold."""
 
 import json
 import os
@@ -17,7 +17,7 @@ from benchmarking.process import Failed, run
 LEVELS_M = (0.2, 0.5, 1.0, 2.0)
 SEEDS = (1, 2, 3)
 THRESHOLDS = ('0.1', '1', '10', 'adaptive')
-# Runs of images that lie beside the way, and a bend's period, in images.
+# Length of the runs of outlier images, and period of the bend, in images.
 RUN_IMAGES = 4
 BEND_IMAGES = 60
 OUTLIER_SHARE = 0.15
@@ -26,11 +26,13 @@ DEG_PER_M = 1.0
 
 
 def disturb(poses, sigma_m, seed):
-  """Coarse poses in order of their names, made wrong on purpose.
+  """Coarse poses with known errors, in order of the images' names.
 
-  A bend with a period of BEND_IMAGES and an amplitude of sigma_m, white noise
-  of half of it per axis and of DEG_PER_M times sigma_m in rotation, and runs of
-  RUN_IMAGES images, OUTLIER_SHARE of all, OUTLIER_FACTOR times sigma_m aside.
+  The errors of the centres are a bend with a period of BEND_IMAGES and an
+  amplitude of sigma_m (z: 0.3 sigma_m), white noise of half of sigma_m per
+  axis, and runs of RUN_IMAGES images, OUTLIER_SHARE of all, that lie
+  OUTLIER_FACTOR times sigma_m aside. Rotations have noise of DEG_PER_M times
+  sigma_m per axis.
   """
   generator = np.random.default_rng(seed)
   names = sorted(poses)
@@ -70,7 +72,7 @@ def options_of(threshold, with_priors):
 
 
 def summarise(output, world, args, log_path):
-  """What a mapper's run says of its parts, and its error."""
+  """Figures of the parts in a mapper's summary, and the model's error."""
   with open(os.path.join(output, 'summary.json')) as file:
     summary = json.load(file)
   parts = summary['parts']

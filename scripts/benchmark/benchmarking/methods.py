@@ -14,7 +14,7 @@ SCRIPTS = os.path.join(os.path.dirname(os.path.abspath(__file__)), '..', '..')
 METHODS = ['mapper', 'hierarchical_mapper', 'adasfm', 'adasfm_no_sensors',
            'limit']
 
-# AdaSfM with one step changed: what does that step buy?
+# AdaSfM with one step changed, to measure the effect of that step.
 ABLATIONS = {
     'adasfm_no_' + name: {command: ['--%s.%s' % (group, option), '0']}
     for name, command, group, option in (
@@ -37,7 +37,7 @@ ABLATIONS.update({
     for metres in ('0.1', '1', '10')})
 
 
-# So that small sets have parts.
+# Limits so low that small sets have several parts [images].
 SMALL_PARTS = ['--AdaSfmPartition.max_num_images_undivided', '50',
                '--AdaSfmPartition.max_part_size', '50']
 
@@ -47,7 +47,8 @@ LOGS = {'image_times': 'times.csv', 'imu': 'imu.csv', 'wheel': 'wheel.csv',
 
 
 def log_options(source, logs=tuple(LOGS)):
-  """Of the importer and the one command, for these logs of a set."""
+  """Arguments of adasfm_prior_importer and adasfm_automatic_reconstructor for
+  these logs of a set."""
   return [word for log in logs
           for word in ('--%s_path' % log, os.path.join(source, LOGS[log]))]
 
@@ -63,7 +64,7 @@ def images_of(folder, source):
 
 
 def run_mapper(command, executable, folder, source, args, fixed=True):
-  """fixed: the database's intrinsics are kept."""
+  """Runs a mapper of COLMAP. fixed: the database's intrinsics are kept."""
   output = os.path.join(folder, 'model')
   os.makedirs(output)
   arguments = [executable, command, '--database_path',
@@ -83,7 +84,7 @@ def run_mapper(command, executable, folder, source, args, fixed=True):
 
 
 def clean_database(folder, source, args):
-  """As users do who keep their COLMAP (docs/guide/cleaner.md)."""
+  """Cleans a database for COLMAP's own mappers (docs/guide/cleaner.md)."""
   database = os.path.join(folder, 'database.db')
   cleaned = os.path.join(folder, 'cleaned.db')
   arguments = [os.path.join(SCRIPTS, 'clean_database.sh'), database, cleaned]
@@ -135,8 +136,8 @@ def run_limit(folder, source, args):
   write_true_poses(database, os.path.join(source, 'gt.txt'), truth)
   os.makedirs(points)
   os.makedirs(output)
-  # COLMAP's triangulator adjusts the points at the true poses too, at least
-  # once: one iteration is all that the limit needs.
+  # COLMAP's triangulator adjusts the points at the true poses, too, at least
+  # once; the limit needs no more than one iteration.
   steps = {'triangulate': run(
       [host, 'point_triangulator', '--database_path', database, '--image_path',
        images_of(folder, source), '--input_path', truth, '--output_path',
@@ -211,7 +212,8 @@ def _run_steps(method, folder, source, args):
 
 
 def run_method(name, method, folder, source, args):
-  """JSON records of a run: one, or more when it gives several models."""
+  """JSON records of a run: one; for adasfm also of its coarse model and
+  priors."""
   shutil.rmtree(folder, ignore_errors=True)
   os.makedirs(folder)
   database = os.path.join(folder, 'database.db')

@@ -10,7 +10,7 @@ from benchmarking.pair_counts import rotation_matrix
 
 
 def quaternion_of(rotation):
-  """w, x, y, z of a 3x3, by its largest eigenvector (Bar-Itzhack)."""
+  """w, x, y, z of a 3x3 rotation, by the largest eigenvector (Bar-Itzhack)."""
   r = rotation
   k = np.array([
       [r[0, 0] + r[1, 1] + r[2, 2], r[2, 1] - r[1, 2], r[0, 2] - r[2, 0],

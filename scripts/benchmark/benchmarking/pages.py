@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Tables within pages that people write: between two markers."""
+"""Tables between two markers of a page that is otherwise written by hand."""
 
 import os
 
@@ -9,8 +9,9 @@ def _markers(name):
 
 
 def write_table(path, name, text):
-  """Replaces what stands between the markers of a table; a page that does not
-  exist becomes one with nothing else. Raises ValueError without the markers."""
+  """Replaces the text between the markers of a table; a page that does not
+  exist is made with nothing else. Raises ValueError unless a page has the
+  markers once."""
   begin, end = _markers(name)
   page = '%s\n%s\n' % (begin, end)
   if os.path.exists(path):

@@ -1,12 +1,13 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What became of the pairs of a world with truth: one that adasfm_global refuses
-though it is true counts as an error, as one that it keeps though it is false.
+"""Counts wrong decisions of adasfm_global on the pairs of a world with truth.
 
-A pair is true when more than half of its verified matches see one landmark; in
-a world without landmarks, when its images are no more than FAR_M apart. The
-pose of a true pair is right when it is off by less than MAX_ROTATION_DEG and,
-from MIN_BASELINE_M on, its direction by less than MAX_DIRECTION_DEG. A pair is
-lost when the database has no matches of it any more, wrong ones included.
+These are true pairs that it rejects and false pairs that it keeps. A pair is
+true if more than half of its verified matches see one landmark; in a world
+without landmarks, if its images are at most FAR_M apart. The pose of a true
+pair is right if its rotation errs by at most MAX_ROTATION_DEG and, from
+MIN_BASELINE_M on, its direction by at most MAX_DIRECTION_DEG. A true pair is
+lost if the cleaned database has no matches of it, true or false. A false pair
+is kept if it has matches there and is still false by the same rule.
 """
 
 import os
@@ -52,7 +53,7 @@ def read_landmarks(path):
 
 
 def read_pairs(database_path):
-  """{(name, name): (matches, qvec or None, tvec or None)} with matches."""
+  """{(name, name): (matches, qvec or None, tvec or None)} of verified pairs."""
   database = sqlite3.connect('file:%s?mode=ro' % database_path, uri=True)
   names = dict(database.execute('SELECT image_id, name FROM images'))
   pairs = {}
@@ -102,8 +103,8 @@ def is_pose_right(names, qvec, tvec, poses):
 
 
 def count_pairs(verified_path, cleaned_path, folder):
-  """Of a world's database as verified and as adasfm_global left it; folder has
-  gt.txt and, in synthesized worlds, landmarks.txt."""
+  """Counts pairs of a world's database as verified and as adasfm_global left it
+  (cleaned); folder has gt.txt and, in synthesized worlds, landmarks.txt."""
   poses = read_true_poses(os.path.join(folder, 'gt.txt'))
   landmarks = read_landmarks(os.path.join(folder, 'landmarks.txt'))
   verified = read_pairs(verified_path)

@@ -18,12 +18,12 @@ from benchmarking.view_graph import unpack, unpack_points  # noqa: E402
 
 BLUE, ORANGE, GREEN, PURPLE = '#0072B2', '#D55E00', '#009E73', '#CC79A7'
 GREY, YELLOW, BLACK = '#999999', '#E69F00', '#000000'
-# So many matches of a pair are drawn.
+# About as many matches of a pair are drawn at most.
 NUM_LINES = 90
 
 
 def save(figure, args, name, num_colours=0):
-  """A PNG of few colours makes a small file of photos."""
+  """Saves a figure; num_colours limits a PNG's colours to keep photos small."""
   os.makedirs(args.images_path, exist_ok=True)
   path = os.path.join(args.images_path, name)
   if name.endswith('.svg'):
@@ -181,7 +181,7 @@ def _draw_matches(axes, photos, matches, step, title):
 
 
 def draw_mirrored_pair(example, args):
-  """Needs the photos of the run; without them the picture stays."""
+  """Without the photos of the run, an existing picture stays as it is."""
   folder = os.path.join(args.output_path, example['photos'], 'images')
   paths = [os.path.join(folder, name) for name in example['names']]
   if not all(map(os.path.exists, paths)):

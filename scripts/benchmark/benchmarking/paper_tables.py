@@ -92,10 +92,10 @@ def view_graph_words(record):
 
 
 def trial_values(records, level_m, threshold, with_priors, field):
-  """One value for each seed at which the run gave it."""
+  """The values of a field, one for each seed whose run has it."""
   found = [r[threshold] for r in records
            if r['level_m'] == level_m and r['with_priors'] == with_priors]
-  if field == 'separator_rmse_m':  # between parts: there must be two
+  if field == 'separator_rmse_m':  # needs two merged parts
     found = [f for f in found if f.get('merged', 0) > 1]
   return [f[field] for f in found if f.get(field) is not None]
 
@@ -136,8 +136,8 @@ def merge_table(records):
 
 
 def best_thresholds(records):
-  """Which threshold has the smallest median error at which level, and where the
-  adaptive one's range of errors lies apart from those of all others."""
+  """Which threshold has the smallest median error at which level, and at which
+  levels all errors of the adaptive one are below all errors of the others."""
   words = []
   for with_priors, name in ((False, 'without priors'), (True, 'with priors')):
     won, apart = {}, []
@@ -215,7 +215,7 @@ def recall_table(pairs):
 
 
 def pairs_of_sets(two_view):
-  """{set: pairs} of those sets that Table I and its picture show."""
+  """{set: pairs} of the sets in Table I and its picture."""
   pairs = {r['set']: r['pairs'] for row in two_view['rows']
            for r in row['records'] if 'pairs' in r}
   return {name: pairs[name] for name in TWO_VIEW_SETS if name in pairs}

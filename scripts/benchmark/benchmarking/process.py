@@ -20,8 +20,8 @@ class Failed(Exception):
 
 
 def run(arguments, log_path, timeout=None, environment=None):
-  """Runs a command, with these variables besides; returns its Usage. Raises
-  Failed."""
+  """Runs a command, with additional environment variables; returns its Usage.
+  Raises Failed for an exit code other than 0 and after the timeout [s]."""
   started = time.monotonic()
   with open(log_path, 'ab') as log:
     log.write(('$ ' + ' '.join(arguments) + '\n').encode())
@@ -29,7 +29,7 @@ def run(arguments, log_path, timeout=None, environment=None):
     process = subprocess.Popen(arguments, stdout=log, stderr=log,
                                stdin=subprocess.DEVNULL,
                                env=dict(os.environ, **(environment or {})))
-    # wait4 gives this child's own peak memory, but knows no timeout.
+    # wait4 gives this child's own peak memory, but has no timeout.
     killed = threading.Event()
 
     def kill():
@@ -48,6 +48,6 @@ def run(arguments, log_path, timeout=None, environment=None):
   if killed.is_set():
     raise Failed('%s took more than %g s' % (arguments[1], timeout), usage)
   if process.returncode != 0:
-    # Without the log's path, which tables and figures would keep.
+    # Tables and figures keep the message, so it omits the log's path.
     raise Failed('%s ended with %d' % (arguments[1], process.returncode), usage)
   return usage

@@ -54,7 +54,7 @@ def shrink(world, max_num_images):
 
 
 def camera_params(sensors_path):
-  """Of cam0, as COLMAP's PINHOLE has them: pixel centres at 0.5."""
+  """cam0's parameters for COLMAP's PINHOLE: pixel centres are at 0.5."""
   with open(sensors_path) as file:
     match = re.search(r'intrinsics:\s*\[([^\]]*)\]', file.read())
   fx, fy, cx, cy = (float(number) for number in match.group(1).split(','))
@@ -66,7 +66,7 @@ def make_database(name, folder, args):
   log_path = os.path.join(folder, 'make.log')
   database = os.path.join(folder, 'database.db')
   if is_world(name):
-    # gt.txt is written last, so a world cut short is made again.
+    # gt.txt is written last, so an incomplete world is made again.
     if not os.path.exists(os.path.join(folder, 'gt.txt')):
       if os.path.exists(database):
         os.remove(database)
@@ -85,7 +85,8 @@ def make_database(name, folder, args):
 
 
 def copy_features(name, source, database, args, log_path):
-  """COLMAP's own work on real photos, which our version does not change."""
+  """Copies COLMAP's features and matches of real photos. They are computed
+  once, since they do not depend on our version."""
   features = os.path.join(args.features_path, name + '.db')
   if not os.path.exists(features):
     os.makedirs(args.features_path, exist_ok=True)
@@ -94,7 +95,7 @@ def copy_features(name, source, database, args, log_path):
 
 
 def copy_whole(source, target):
-  """An interrupted copy has another name."""
+  """Copies a file; an interrupted copy is left under another name."""
   shutil.copyfile(source, target + '.part')
   os.replace(target + '.part', target)
 

@@ -36,7 +36,7 @@ def shift_clocks(folder, names, shift_ms):
 
 
 def keep_every(folder, name, step):
-  """One row of so many; the calibration states the new rate."""
+  """Keeps every step-th row; the calibration states the new rate."""
   edit_rows(folder, name, lambda rows: rows[::step])
   sensor = name.split('.')[0] + '0:'
 
@@ -57,7 +57,7 @@ def shift_gyroscope(folder, bias_rad_s):
 
 
 def add_imu_noise(folder, rate_sigma_rad_s, acceleration_sigma_m_s2):
-  """Per sample; the calibration does not know of it."""
+  """Adds white noise with these sigmas per sample; the calibration stays."""
   generator = random.Random(7)
   sigmas = [rate_sigma_rad_s] * 3 + [acceleration_sigma_m_s2] * 3
   edit_rows(folder, 'imu.csv', lambda rows: [
@@ -72,7 +72,7 @@ def scale_wheels(folder, factor):
 
 
 def cut_logs(folder, names, begin, end):
-  """Removes the rows between two shares of the time of the images."""
+  """Removes the rows between two shares of the images' time span."""
   with open(os.path.join(folder, 'times.csv')) as file:
     times = [int(line.split(',')[0]) for line in file.read().splitlines()[1:]]
   begin_ns, end_ns = (times[0] + share * (times[-1] - times[0])
@@ -117,12 +117,12 @@ def turn_wheels(folder, yaw_deg, pitch_deg):
 
 
 def turn_camera(folder, angle_deg):
-  """About the camera's vertical axis."""
+  """Rotates the camera in the calibration about its vertical axis (y)."""
   turn_matrix(folder, 'T_cam_imu', axis_rotation(1, angle_deg))
 
 
 def scale_focal_length(folder, factor):
-  """Of a pinhole camera; the verified pairs stay."""
+  """Scales fx and fy in database and calibration; the verified pairs stay."""
   database = sqlite3.connect(os.path.join(folder, 'database.db'))
   for camera_id, blob in database.execute(
       'SELECT camera_id, params FROM cameras').fetchall():
@@ -139,7 +139,7 @@ def scale_focal_length(folder, factor):
 
 
 def forget_focal_length(folder):
-  """The database does not mark it as known any more."""
+  """Marks the focal length in the database as not known."""
   database = sqlite3.connect(os.path.join(folder, 'database.db'))
   database.execute('UPDATE cameras SET prior_focal_length = 0')
   database.commit()

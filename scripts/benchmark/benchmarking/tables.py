@@ -66,7 +66,7 @@ def long_table(records):
       continue
     limit = runs.get((name, 'limit'))
     has_limit = limit and limit['evaluation']
-    # A trajectory of poses alone has no points to speak of.
+    # Not printed for models without points.
     structure = '%d | %.2f | %.3f' % (
         e['num_points'], e['mean_track_length'], e['rmse_px'])
     lines.append(

@@ -20,7 +20,7 @@ def rotate(q, v):
 
 
 def chain_priors(database):
-  """image id -> (name, qvec, tvec), cam_from_world with the first at rest."""
+  """{image id: (name, qvec, tvec)}, cam_from_world; the first is identity."""
   connection = sqlite3.connect(database)
   rows = connection.execute(
       'SELECT p.image_id1, p.name1, p.image_id2, p.name2, p.qvec, p.tvec '
@@ -55,7 +55,7 @@ def write_poses(poses, camera_line, model_path):
 
 
 def write_prior_trajectory(database, model_path):
-  """Chains the priors into a model of poses only; False without priors."""
+  """Chains the priors into a model of poses only; False below three poses."""
   poses = chain_priors(database)
   if len(poses) < 3:
     return False

@@ -33,7 +33,7 @@ def unpack_points(text):
 
 
 def read_edges(database, names, sensors=False):
-  """Verified pairs, or with sensors those of priors, as places in names."""
+  """Verified pairs, or with sensors those of priors, as indices in names."""
   connection = sqlite3.connect(database)
   place = {image_id: names.index(name) for image_id, name in
            connection.execute('SELECT image_id, name FROM images')}
@@ -83,7 +83,7 @@ def run_coarse(variant, world, args):
 
 
 def run_view_graph(world, args):
-  """The record of the picture; world has database.db, logs and truth."""
+  """The record for the picture; world has database.db, logs and truth."""
   truth = read_true_poses(os.path.join(world, 'gt.txt'))
   names = sorted(truth)
   before = read_edges(os.path.join(world, 'database.db'), names)

@@ -40,7 +40,7 @@ def cross(u, v):
 
 
 def hidden(camera, points, walls):
-  """Whether a wall stands between the camera and each point, from above."""
+  """Whether a wall is between the camera and each point, seen from above."""
   near = np.min(np.linalg.norm(walls - camera, axis=2), axis=1) < 70
   ray = (points - camera)[:, None]
   wall = (walls[near, 1] - walls[near, 0])[None]
@@ -53,10 +53,11 @@ def hidden(camera, points, walls):
 
 
 def visible(center, cam_from_world, landmarks, model):
-  """Landmarks that the image holds, and where."""
+  """Indices of the landmarks in the image, and their pixels."""
   way = landmarks.position - center
   distance = np.linalg.norm(way, axis=1)
-  # Of a size that is found, seen not too flatly, before the camera.
+  # In the range of distances where a landmark is found, not seen at too flat an
+  # angle, in front of the camera.
   found = (distance < landmarks.reach) & (distance > landmarks.reach / 7)
   facing = -np.sum(way * landmarks.normal, 1) / distance
   found &= ((facing > np.where(landmarks.normal[:, 2] > 0.5, 0.06, 0.2)) |
@@ -73,10 +74,11 @@ def visible(center, cam_from_world, landmarks, model):
 
 
 def take_image(center, cam_from_world, landmarks, args, rng):
-  """Keypoints: pixels, looks, direction of view in the landmark's frame and log
-  of the distance; the strongest that the image has room for."""
+  """The strongest args.num_keypoints keypoints: pixels, looks, azimuth of the
+  view relative to the landmark's normal, log2 of the distance."""
   seen, pixels = visible(center, cam_from_world, landmarks, args.camera_model)
-  # A texture's strength is its own, and a little of each view; some are missed.
+  # A landmark's strength is the same in all images but for a little noise; each
+  # image misses a fifth of the landmarks.
   strength = (seen * 0.6180339887) % 1.0 + 0.15 * rng.normal(size=len(seen))
   strength[rng.uniform(size=len(seen)) < 0.2] = -np.inf
   order = np.argsort(-strength)[:min(args.num_keypoints,
@@ -94,7 +96,7 @@ def take_image(center, cam_from_world, landmarks, args, rng):
 
 
 def darken(image, number, rng):
-  """Leaves a few keypoints, which are noise: no other image has their looks."""
+  """Keeps a few keypoints, as noise: no other image has their new looks."""
   few = rng.permutation(len(image['looks']))[:int(rng.integers(0, 40))]
   image = {key: value[few] for key, value in image.items()}
   image['looks'] = -1000 * (number + 1) - np.arange(len(few))
@@ -102,14 +104,15 @@ def darken(image, number, rng):
 
 
 def nearest(pixels, targets, count):
-  """The pixels nearest to each target, in any order, shape (targets, count)."""
+  """Indices of the pixels nearest to each target, unordered; shape (targets,
+  count)."""
   apart = np.sum((pixels[None] - targets[:, None])**2, axis=2)
   return np.argpartition(apart, count - 1, axis=1)[:, :count]
 
 
 def match(image1, image2, outlier_ratio, rng):
-  """Rows of keypoints that look alike, and wrong ones: anywhere, or (a third)
-  near the right place, as on repeated windows."""
+  """Matches as rows of keypoints: those with the same looks, and wrong ones. Of
+  the wrong ones a third is near the right place, as on repeated windows."""
   _, rows1, rows2 = np.intersect1d(image1['looks'], image2['looks'],
                                    return_indices=True)
   turn = image1['azimuth'][rows1] - image2['azimuth'][rows2]
@@ -138,8 +141,8 @@ def match(image1, image2, outlier_ratio, rng):
 
 
 def candidate_pairs(poses, places, spacing, rng):
-  """Neighbours in time, what was seen from near by before, look-alike places,
-  and some at random. places: as of image_places."""
+  """Pairs of neighbours in time, of nearby earlier images, of aliased places,
+  and some random pairs. places: as of image_places."""
   count = len(poses)
   centers = np.array([center for center, _ in poses])
   forward = np.array([rotation[2] for _, rotation in poses])

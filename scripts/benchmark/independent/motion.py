@@ -32,7 +32,7 @@ def euler(yaw, pitch, roll):
 
 
 def smooth(values, sigma):
-  """Gaussian average along the first axis; ends are held."""
+  """Gaussian average along the first axis; the end values are repeated."""
   radius = int(4 * sigma) + 1
   kernel = np.exp(-0.5 * (np.arange(-radius, radius + 1) / sigma)**2)
   padded = np.pad(values, [(radius, radius)] + [(0, 0)] * (values.ndim - 1),
@@ -49,7 +49,7 @@ def lengths(points):
 
 
 def smooth_path(kind, polyline, rng):
-  """The polyline with rounded corners, off its middle by a slow weave."""
+  """The polyline with rounded corners and a slow lateral weave."""
   step = kind['corner'] / 10.0
   at_vertex = lengths(polyline)
   s = np.arange(0, at_vertex[-1], step)
@@ -64,7 +64,7 @@ def smooth_path(kind, polyline, rng):
   length = lengths(path)
   yaw = smooth(np.unwrap(np.arctan2(tangent[:, 1], tangent[:, 0])),
                0.25 * kind['corner'] / step)
-  # At most 2 m/s^2 to the side and 0.8 rad/s.
+  # At most 2 m/s^2 to the side and 0.8 rad/s, but at least 15 % of the speed.
   curvature = np.abs(np.gradient(yaw) / np.gradient(length)) + 1e-3
   limit = np.minimum(kind['speed'], np.minimum(np.sqrt(2.0 / curvature),
                                                0.8 / curvature))
@@ -75,7 +75,7 @@ def smooth_path(kind, polyline, rng):
 
 
 def follow(path, count):
-  """Speed and arc length at 1 kHz: standing still first, then speeding up."""
+  """Speed and arc length at 1 kHz: first stationary, then accelerating."""
   dt = 1.0 / RATE_HZ
   ramp = np.clip((np.arange(count) * dt - STANDSTILL_S) / 2.5, 0, 1)
   ramp = ramp**3 * (10 - 15 * ramp + 6 * ramp**2)
@@ -91,8 +91,8 @@ def follow(path, count):
 
 
 def drive(kind, polyline, duration_s, rng):
-  """Motion along a polyline: over gentle hills, with a body that shakes, and a
-  standstill that is not quite still."""
+  """Motion along a polyline over gentle hills, with a shaking body and, for
+  spoil > 0, a small rotation during the standstill."""
   path = smooth_path(kind, polyline, rng)
   count = int((duration_s + STANDSTILL_S) * RATE_HZ)
   t = np.arange(count) / RATE_HZ
@@ -127,8 +127,8 @@ def random_walk(count, density, dt, rng):
 
 
 def imu_log(motion, wheel_from_imu, spoil, rng):
-  """Times, gyroscope and accelerometer: differences of the motion, a bias that
-  walks, white noise."""
+  """Times, gyroscope and accelerometer: finite differences of the motion, a
+  constant bias, a random walk and white noise."""
   dt = 1.0 / RATE_HZ
   at = motion.position + motion.rotation @ wheel_from_imu[:3, 3]
   world_from_imu = motion.rotation @ wheel_from_imu[:3, :3]
@@ -149,8 +149,8 @@ def imu_log(motion, wheel_from_imu, spoil, rng):
 
 
 def wheel_log(motion, kind, rng):
-  """Times, speeds of both wheels, and begin and end of slips: unequal radii,
-  white noise, slips of one wheel or both."""
+  """Times, speeds of both wheels, and begin and end of slips. The speeds have
+  unequal radii (for spoil > 0), white noise, and slips of one wheel or both."""
   velocity = np.gradient(motion.position, 1.0 / RATE_HZ, axis=0)
   forward = np.sum(velocity * motion.rotation[:, :, 0], 1)
   yaw_rate = np.sum(np.gradient(motion.rotation[:, :, 0], 1.0 / RATE_HZ, axis=0) *

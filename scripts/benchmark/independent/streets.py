@@ -5,8 +5,8 @@ import numpy as np
 
 
 def walk_streets(kind, length_m, rng):
-  """Junctions, and the drive as a list of them: a walk that never turns back
-  and likes streets that were driven the same way before."""
+  """Junctions, and the drive as a list of them: a random walk that never turns
+  back and prefers streets that were driven the same way before."""
   size = max(4, int(np.sqrt(length_m / 180.0)) + 2)
   columns, rows = np.meshgrid(np.arange(size), np.arange(size))
   junctions = np.stack([columns.ravel(), rows.ravel()], 1) * kind['grid']
@@ -97,8 +97,8 @@ def street_template(kind, length_m, rng):
 
 
 def build_town(kind, junctions, route, rng):
-  """Landmarks, and the template of each driven street by its ends, which are
-  ordered as it was first driven."""
+  """Landmarks, and {ends: template} of the driven streets, with the ends in the
+  order of the first drive."""
   landmarks = Landmarks()
   streets = []
   for ends in zip(route, route[1:]):
@@ -158,8 +158,8 @@ def build_lawn(corners, rng):
 
 
 def image_places(junctions, route, templates, positions, vertices):
-  """Of each image: its street's template, the street, metres along it, and the
-  way it is driven; None near its ends."""
+  """For each image: its street's template, the street, metres along it, and
+  whether it is driven from its first end; None near the ends."""
   places = []
   for position, vertex in zip(positions, vertices):
     driven = tuple(route[vertex:vertex + 2])

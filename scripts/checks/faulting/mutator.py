@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Damages files as disks, editors, other programs and enemies do."""
+"""Damages files as disks, editors, other programs and attackers do."""
 
 import os
 import re
@@ -17,7 +17,7 @@ ODD_WORDS = ['', ' ', 'nan', 'inf', '-inf', '-1', '0', '1e308', '1e-308',
 
 
 def pack_odd(generator):
-  """The bytes of a number that nobody expects."""
+  """The bytes of an unusual number."""
   if generator.random() < 0.5:
     return struct.pack('<d', generator.choice(ODD_DOUBLES))
   number = generator.choice(ODD_NUMBERS)
@@ -27,7 +27,7 @@ def pack_odd(generator):
 
 
 def damage_bytes(path, generator):
-  """Of any file."""
+  """Damages the bytes of any file; returns the kind of damage."""
   with open(path, 'rb') as file:
     data = bytearray(file.read())
   what = generator.choice(['empty', 'cut', 'bytes', 'number', 'number',
@@ -43,7 +43,7 @@ def damage_bytes(path, generator):
       if data:
         data[generator.randrange(len(data))] = generator.randrange(256)
   elif what == 'number':
-    # Counts stand at the beginning.
+    # Half of the time near the beginning, where counts are.
     if generator.random() < 0.5:
       at = generator.randrange(max(1, min(len(data), 200)))
     odd = pack_odd(generator)
@@ -65,7 +65,7 @@ def damage_bytes(path, generator):
 
 
 def damage_text(path, generator):
-  """Replaces, drops, repeats or exchanges words and lines."""
+  """Replaces words, or drops, repeats or exchanges lines."""
   with open(path, encoding='utf8', errors='surrogateescape', newline='') as file:
     lines = file.read().split('\n')
   at = generator.randrange(len(lines))
@@ -99,7 +99,7 @@ def damage_text(path, generator):
 
 
 def damage_cell(path, generator):
-  """Of a database: one cell, or one row more or less."""
+  """Damages a database: one cell, all cells of a column, a row or a table."""
   database = sqlite3.connect(path)
   try:
     tables = [row[0] for row in database.execute(
@@ -156,12 +156,12 @@ def odd_cell(old, generator):
 
 
 def damage(path, generator):
-  """One fault of the file's own kind, or of its bytes; says what it did."""
+  """Damages a file, often by its format; returns what was damaged."""
   if path.endswith('.db') and generator.random() < 0.75:
     try:
       return damage_cell(path, generator)
     except (sqlite3.Error, OverflowError):
-      pass  # SQLite refuses that value there
+      pass  # SQLite rejects this value
   if (path.endswith(('.csv', '.yaml', '.txt', '.json', '.ini')) and
       os.path.getsize(path) and generator.random() < 0.75):
     return damage_text(path, generator)

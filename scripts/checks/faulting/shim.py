@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The library that lets calls fail (shim.c)."""
+"""Builds the library that makes calls fail (shim.c)."""
 
 import os
 import subprocess

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""One trial of each campaign; all raise Wrong and return what to count."""
+"""One trial of each campaign: returns the outcome to count, or raises Wrong."""
 
 import errno
 import glob
@@ -10,8 +10,8 @@ from faulting.mutator import damage
 from faulting.world import CASES, Wrong
 
 COMMANDS = list(CASES)
-# Memory in proportion: what the undisturbed command takes, and this beside
-# twice as much again [kB].
+# On a damaged file a command may use three times the memory of the undisturbed
+# command plus this [kB].
 MEMORY_MARGIN_KB = 300000
 
 # A kind of call, the errors that it fails with, and whether all later calls
@@ -29,7 +29,8 @@ FAULTS = [
     ('thread', [errno.EAGAIN], ':keep'),
 ]
 
-# Damaged files: command, the folder that it is run in, patterns, how often.
+# Damaged files: command; command whose result folder it starts in (None: as in
+# CASES); patterns of files; weight.
 RESUMED = 'adasfm_mapper'
 INPUTS = [
     ('adasfm_prior_importer', None, ['imu.csv', 'wheel.csv', 'gnss.csv',
@@ -57,7 +58,7 @@ def pick(commands, world, number):
 
 
 def try_kill(world, generator, number):
-  """kill -9 at a random time; the command once more ends as undisturbed."""
+  """kill -9 at a random time; then the command must end as undisturbed."""
   command = pick(COMMANDS, world, number)
   seconds = world.seconds[command]
   for _ in range(20):
@@ -66,7 +67,7 @@ def try_kill(world, generator, number):
         kill_after=generator.uniform(0.002, max(0.02, seconds)))
     if outcome.code < 0:
       break
-    # It was faster than ever.
+    # The command ended before it was killed.
     outcome.require_success()
     seconds *= 0.7
   else:
@@ -76,7 +77,7 @@ def try_kill(world, generator, number):
 
 
 def count_calls(world, shim, command):
-  """How many calls of each kind the undisturbed command makes."""
+  """{kind: number of calls} of the undisturbed command."""
   world.begin(command)
   path = os.path.join(world.root, 'counts')
   world.start(command, environment={
@@ -91,7 +92,7 @@ def with_threads(arguments):
 
 
 def inject(world, shim, command, fault):
-  """The command with a call that fails, then without; how it ended."""
+  """Runs the command with the fault, then without; returns the 1st Outcome."""
   arguments = CASES[command][1]
   if fault.startswith('thread'):
     arguments = with_threads(arguments)
@@ -108,7 +109,7 @@ def inject(world, shim, command, fault):
 
 
 class Injections:
-  """Calls that fail in each command, one after the other or from one on."""
+  """Lets one random call of a command fail, or all calls from that one on."""
 
   def __init__(self, shim):
     self.shim = shim
@@ -123,7 +124,7 @@ class Injections:
     if kind == 'thread':
       num_calls = 3
     if num_calls == 0:
-      # The command makes no such call.
+      # The command makes no such call, so a kind that it makes is taken.
       kind, errors, keep = FAULTS[generator.choice([0, 1, 7, 8])]
       num_calls = self.counts[command][kind]
     fault = '%s:%d:%d%s' % (kind, generator.randint(1, max(1, num_calls)),
@@ -134,7 +135,7 @@ class Injections:
 
 
 def try_limit(world, generator, number):
-  """No file may grow beyond a size, then it may again."""
+  """Runs the command with a limit of file sizes, then without."""
   command = pick(COMMANDS, world, number)
   limit = int(10 ** generator.uniform(1.5, 6.5))
   world.begin(command)
@@ -160,14 +161,15 @@ def try_two(world, generator, number):
   if not any(answers):
     raise Wrong('both failed: %s; %s' % (done[0], done[1]))
   if not all(answers):
-    # The one that was refused has left everything as it was.
+    # The process that failed must not have changed the other one's result.
     world.check(command)
   world.check_after_rerun(command)
   return 'both' if all(answers) else 'one'
 
 
 def try_file(world, generator, number):
-  """A damaged input: refused in one line, or used, in time and memory."""
+  """The command on a damaged file ends with a result or an ERROR line, within
+  limits of time and memory."""
   rows = [row for row in WEIGHTED_INPUTS if row[0] in world.commands]
   command, state, patterns = rows[number % len(rows)]
   world.copy(state or CASES[command][0])
@@ -182,7 +184,7 @@ def try_file(world, generator, number):
   try:
     outcome = world.start(command).wait()
     if state == RESUMED:
-      # Checkpoints may differ in what does not matter.
+      # The model counts; checkpoints may differ.
       outcome.require_success()
       world.check_model(command, 'm/0')
     used = outcome.require_answer()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Our commands on tiny worlds, and what they leave when nothing disturbs them."""
+"""Our commands on tiny worlds, and their undisturbed results."""
 
 import hashlib
 import os
@@ -14,16 +14,16 @@ import time
 NUM_IMAGES = '30'
 # Far more than any command takes on such a world [s].
 TIMEOUT_S = 120
-# No command needs half as much on such a world; runaway memory stops there.
+# Commands on such a world need less than half of this [bytes].
 MAX_ADDRESS_SPACE = 8 << 30
 ONE_THREAD = ['--num_threads', '1']
-# So that there are several.
+# Limits so low that the world has several parts.
 SMALL_PARTS = ['--AdaSfmPartition.max_num_images_undivided', '12',
                '--AdaSfmPartition.max_part_size', '16',
                '--AdaSfmPartition.min_part_size', '8']
 DATABASE = ['--database_path', 'database.db']
-# Command, folder that it begins with, and arguments; the outcome is a folder
-# of the command's name.
+# Command: (command whose result it starts from, arguments). The result of each
+# command is kept in a folder named after the command.
 CASES = {
     'adasfm_synthesizer': ('empty', [
         '--output_path', 'world', '--num_images', NUM_IMAGES,
@@ -55,7 +55,7 @@ CASES = {
         '--image_times_path', 'times.csv', '--imu_path', 'imu.csv',
         '--wheel_path', 'wheel.csv', '--sensors_path', 'sensors.yaml',
         '--max_num_features', '500', '--num_similar_images', '4']),
-    # The only database with descriptors.
+    # Starts from the only database with descriptors.
     'adasfm_pair_generator': ('adasfm_automatic_reconstructor', [
         '--database_path', 'ws/database.db', *ONE_THREAD, '--output_path',
         'pairs.txt', '--image_times_path', 'times.csv']),
@@ -65,7 +65,7 @@ PHOTOS = ['--output_path', 'world', '--num_images', '10', '--render', '1',
 
 
 class Wrong(Exception):
-  """A command did what it must not."""
+  """A command behaved as it must not."""
 
 
 class Outcome:
@@ -86,7 +86,7 @@ class Outcome:
       raise Wrong(str(self))
 
   def require_answer(self):
-    """0, or 1 with a line that says why; whether it was 0."""
+    """True for exit code 0, False for 1 with an ERROR line; else Wrong."""
     if self.code == 0 or self.code == 1 and 'ERROR: ' in self.error:
       return self.code == 0
     raise Wrong(str(self))
@@ -104,7 +104,7 @@ class Process:
         [colmap, command, *arguments], cwd=folder, stdin=subprocess.DEVNULL,
         stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, preexec_fn=prepare,
         env=dict(os.environ, **(environment or {})), start_new_session=True)
-    # Not a file: a limit of file sizes would cut what is said about it.
+    # A pipe, not a file: a limit of file sizes would cut its own error message.
     self.error = b''
     self.reader = threading.Thread(target=self.read_error)
     self.reader.start()
@@ -113,7 +113,8 @@ class Process:
     self.error = self.process.stderr.read()
 
   def wait(self, kill_after=None):
-    """Kills at that time; Wrong when the process does not end by itself."""
+    """Waits for the end; kills the process after kill_after [s]. Without it, a
+    process that runs longer than TIMEOUT_S is killed and raises Wrong."""
     deadline = time.monotonic() + (kill_after or TIMEOUT_S)
     pause = 0.002
     while True:
@@ -137,7 +138,7 @@ class Process:
 
 
 def digest(path):
-  """Of the content; of a database what its tables hold."""
+  """Hash of a file's bytes, or of a database's tables and rows."""
   sha = hashlib.sha1()
   if path.endswith('.db'):
     database = sqlite3.connect('file:%s?mode=ro' % path, uri=True, timeout=10)
@@ -155,8 +156,9 @@ def digest(path):
 
 
 def digests(folder):
-  """Of all files but locks and what SQLite keeps beside a database. Logs count
-  as being there: they tell how long the work took, and what was done twice."""
+  """{path: digest} of all files except locks and SQLite's files beside a
+  database. Of logs only the existence counts, since they contain durations and
+  repeated work."""
   found = {}
   for parent, _, names in os.walk(folder):
     for name in names:
@@ -211,24 +213,24 @@ class World:
       self.max_rss_kb[command] = outcome.max_rss_kb
       runs.append(digests(self.folder))
     self.names[command] = set(runs[0])
-    # Times of day and durations differ.
+    # Files with times of day or durations differ, and are not compared.
     self.expected[command] = {name: value for name, value in runs[0].items()
                               if runs[1].get(name) == value}
     source = self.folder
     if command == 'adasfm_synthesizer':
-      # What follows is in the folder of the world.
+      # The next commands run in the folder of the world.
       source = os.path.join(self.folder, 'world')
       shutil.copy(os.path.join(source, 'database.db'),
                   os.path.join(source, 'other.db'))
     shutil.copytree(source, self.state(command))
 
   def copy(self, state):
-    """A new folder for a trial, as that command left it."""
+    """Makes the trial's folder anew, as a copy of the result of a command."""
     shutil.rmtree(self.folder, ignore_errors=True)
     shutil.copytree(self.state(state), self.folder)
 
   def begin(self, command):
-    """A new folder for a trial of the command."""
+    """Makes the trial's folder anew, with the input of the command."""
     self.copy(CASES[command][0])
 
   def start(self, command, arguments=None, environment=None, limits=()):
@@ -236,7 +238,7 @@ class World:
                    arguments or CASES[command][1], environment, limits)
 
   def check_model(self, command, folder):
-    """Wrong unless this model is the undisturbed one."""
+    """Raises Wrong unless this model is the undisturbed one."""
     found = digests(os.path.join(self.folder, folder))
     for name, value in self.expected[command].items():
       if (os.path.dirname(name) == folder and
@@ -244,7 +246,8 @@ class World:
         raise Wrong('%s: %s is not as undisturbed' % (command, name))
 
   def check(self, command):
-    """Wrong unless the trial's folder is as after the undisturbed command."""
+    """Raises Wrong unless the trial's folder is as after the undisturbed
+    command."""
     found = digests(self.folder)
     for name, value in self.expected[command].items():
       if name not in found:
@@ -257,6 +260,6 @@ class World:
                   (command, ' '.join(sorted(strange)[:5])))
 
   def check_after_rerun(self, command):
-    """The same command once more must end as if nothing had been."""
+    """The same command, run again, must give the undisturbed result."""
     self.start(command).wait().require_success()
     self.check(command)

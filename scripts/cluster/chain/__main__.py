@@ -48,7 +48,7 @@ def run(arguments):
         try:
             prepare.prepare(chosen)
         except settings.UserError:
-            # Nothing has begun: the next call may say something else.
+            # Nothing has begun, so the next call may have other options.
             os.remove(chosen.path(settings.FILE))
             raise
         if arguments.command == 'submit':

@@ -1,33 +1,33 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What tasks are expected to need. Measured (docs/guide/cluster.md) and rounded
-up; once the plan is there, its own estimate counts."""
+"""Estimates of the memory and time of tasks: measured (docs/guide/cluster.md)
+and rounded up. For parts, the plan's own memory estimate replaces them."""
 
 PAIRS_PER_IMAGE = 40
 MATCHES_PER_PAIR = 250
 IMAGES_PER_PART = 200
 
-# A core may be this much slower than the one that was measured on.
+# A core may be slower by this factor than the core of the measurements.
 SLOWNESS = 4.0
 MIN_MINUTES = 10.0
 
 
 def whole_mb(facts):
-    """Of adasfm_global and of the merge: more than colmap_ext/stage_memory.cc
-    estimates for the scene."""
+    """Memory of adasfm_global and of the merge: more than the estimate of
+    colmap_ext/stage_memory.cc for the scene."""
     return (135 + 0.07 * facts['num_images'] +
             200e-6 * facts['num_keypoints'] +
             50e-6 * facts['num_inlier_matches'])
 
 
 def memory_mb(stage, settings, facts):
-    """Bytes of an image, a keypoint and an inlier, times 1.3 to 1.5 of what was
-    measured."""
+    """Memory of a task, from 1.3 to 1.5 times the measured bytes of an image, a
+    keypoint and an inlier."""
     images = facts['num_images']
     keypoints = facts['num_keypoints'] / 1e6
     inliers = facts['num_inlier_matches'] / 1e6
     scene = 120 + 100 * keypoints + 35 * inliers
     if stage.name == 'features':
-        # A photo of 3200 x 2400 pixels, twice as large for the detector.
+        # For a photo of 3200 x 2400 pixels, which the detector enlarges twofold.
         return 500 + 2000 * settings.threads_per_task
     if stage.name == 'matches':
         return 500 + 0.5 * min(images, settings.pairs_per_block)
@@ -52,7 +52,7 @@ PAIR_SECONDS = 0.25
 
 
 def minutes(stage, settings, facts, num_tasks):
-    """Of the longest task."""
+    """Time of the stage's longest task [min]."""
     if stage.name == 'matches':
         seconds = PAIR_SECONDS * facts['num_pairs']
     else:

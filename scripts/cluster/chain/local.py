@@ -18,7 +18,7 @@ def command(settings, stage, index, num_tasks):
 
 
 def run_stage(settings, stage, num_jobs):
-    """True when all items are there."""
+    """Makes the missing items; True if all items are there in the end."""
     count = stage.count(stages.prepare.facts(settings))
     waiting = [item for item in range(count)
                if not stage.is_done(settings, item)]

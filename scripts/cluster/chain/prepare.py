@@ -13,7 +13,7 @@ PHOTO_ENDINGS = ('.jpg', '.jpeg', '.png', '.bmp', '.ppm', '.pgm', '.tif',
 
 
 def facts(settings):
-    """What stages have found out: numbers of images, blocks, parts."""
+    """Facts that stages have written: numbers of images, blocks, parts."""
     known = {}
     folder = settings.path('facts')
     for name in sorted(os.listdir(folder)) if os.path.isdir(folder) else []:
@@ -92,7 +92,7 @@ def count_database(path):
 
 
 def prepare(settings):
-    """Does nothing when it is done already."""
+    """Makes the blocks or the database's copy, unless that is done already."""
     if os.path.exists(settings.path('facts', 'prepare.json')):
         return
     if settings.database_path:

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What the user asks for: read from the command line the first time, kept in
-the workspace's settings.json, and read from there by every task."""
+"""The user's options: read from the command line, kept in the workspace's
+settings.json, and read from there by every task."""
 
 import argparse
 import json
@@ -14,8 +14,8 @@ class UserError(Exception):
     """A message of one line: what is wrong, and what to do."""
 
 
-# name, default, help. Those that change the result cannot change in a
-# workspace that has begun; the others can at every call.
+# Name, default, help. Options that change the result are fixed once a workspace
+# has begun; each call may change the other options.
 RESULT_OPTIONS = [
     ('--image_path', '', 'folder of the photos'),
     ('--database_path', '', 'in place of --image_path: a database with verified'

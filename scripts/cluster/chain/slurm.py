@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Queues the stages as dependent job arrays, and asks about them."""
+"""Queues the stages as dependent job arrays, and reads their state."""
 
 import os
 import re
@@ -11,8 +11,8 @@ import sys
 from chain import costs, stages
 from chain.settings import UserError, read_json, write_json
 
-# A task that fails goes back to the queue; Slurm itself sends those back whose
-# node is lost or taken away.
+# A task that fails goes back to the queue; Slurm itself requeues tasks whose node
+# is lost or taken away.
 SCRIPT = """#!/bin/bash
 export PYTHONPATH={package} PYTHONDONTWRITEBYTECODE=1
 {python} -m chain task {workspace} {stage} "$SLURM_ARRAY_TASK_ID" {num_tasks}
@@ -25,7 +25,7 @@ exit $code
 
 
 def call(*arguments, text=None):
-    """What a command of Slurm prints; a UserError with its message."""
+    """The output of a command of Slurm; raises UserError with its message."""
     try:
         result = subprocess.run(arguments, input=text, text=True, check=False,
                                 stdout=subprocess.PIPE, stderr=subprocess.PIPE)
@@ -44,7 +44,7 @@ def check_is_there():
 
 
 def jobs(settings):
-    """The job of each stage, as far as it was queued."""
+    """{stage: job} of the stages that were queued."""
     return read_json(settings.path('jobs.json'), {})
 
 
@@ -73,7 +73,7 @@ def requested_memory_mb(settings, stage, largest):
 
 
 def array_text(settings, stage, num_tasks):
-    """The tasks that have something left to do."""
+    """sbatch's --array: the tasks that have items left to make."""
     count = stage.count(stages.prepare.facts(settings))
     indices = range(num_tasks)
     if count is not None:
@@ -111,7 +111,7 @@ def submit_stage(settings, stage, after, most_tasks, largest):
 
 
 def submit(settings):
-    """Queues what is left; what waits in the queue already is queued anew."""
+    """Queues the remaining stages; tasks that wait already are queued anew."""
     queued = tasks_in_queue(settings)
     if any(state in ('RUNNING', 'COMPLETING') for _, _, state, _, _ in queued):
         raise UserError('tasks of this workspace are running; see'
@@ -146,9 +146,8 @@ def cancel(settings):
 
 
 def update_requests(settings, done):
-    """Lowers what the jobs after the stage `done` ask for, now that more is
-    known. Slurm lets users lower it; where it does not, the first estimates
-    stand."""
+    """Sets the memory of the jobs after the stage `done` to the new estimates.
+    Slurm lets users lower the memory; if it refuses, the old estimate stays."""
     if 'SLURM_JOB_ID' not in os.environ:
         return
     largest = largest_node_mb()
@@ -163,6 +162,6 @@ def update_requests(settings, done):
                  'MinMemoryNode=%d' % memory)
             print('%s asks for %d MB' % (stage.name, memory))
         except UserError as error:
-            # Of a whole array it reports success as an error.
+            # For a whole array scontrol reports success as an error.
             if 'No error' not in str(error):
                 print('%s keeps what it asks for: %s' % (stage.name, error))

@@ -10,9 +10,9 @@ from chain.settings import read_json
 
 
 class Stage:
-    """`results(settings, item)` are the paths that an item leaves; `count(facts)`
-    its number of items, none when that is not known yet; `guess(settings,
-    facts)` the number of tasks to queue then."""
+    """`results(settings, item)` are the paths of an item's results;
+    `count(facts)` is the number of items, None if it is not known yet;
+    `guess(settings, facts)` is the number of tasks to queue in that case."""
 
     def __init__(self, name, run, results, count=lambda facts: 1, guess=None,
                  is_wide=False, finds_sizes=False):
@@ -21,9 +21,9 @@ class Stage:
         self.results = results
         self.count = count
         self.guess = guess
-        # Many items of few cores, or one of many.
+        # True: many items of few cores; False: one item of many cores.
         self.is_wide = is_wide
-        # After it, more is known about what the later ones need.
+        # After this stage, the needs of later stages are known better.
         self.finds_sizes = finds_sizes
 
     def cores(self, settings):

@@ -24,7 +24,7 @@ def row(settings, stage, queued, job):
 
 
 def tasks_that_go_on(settings, queued):
-    """All but those that wait for a job that has failed for good."""
+    """The queued tasks, without those that wait for a job that has failed."""
     active = []
     for stage in stages.of(settings):
         tasks = [task for task in queued if task[0] == stage.name]
@@ -66,6 +66,6 @@ def show(settings):
                        else text.rjust(width)
                        for i, (text, width) in enumerate(zip(line, widths)))
              for line in rows]
-    # At once, for a reader that stops at the line that it looks for.
+    # Printed at once, since a reader (grep -q) may stop at the line it looks for.
     print('\n'.join(lines + [verdict(settings, queued)]), flush=True)
     return 0

@@ -13,8 +13,8 @@ from chain.work import TaskError, Work
 
 
 def folders(settings, stage, item):
-    """Where an item is made: on the node's own disk first and, if that fails,
-    as it does when the disk is full, in the workspace."""
+    """Folders to make an item in: on the node's own disk and, if that fails (a
+    full disk, say), in the workspace."""
     workspace = hashlib.sha256(settings.workspace.encode()).hexdigest()[:8]
     name = 'adasfm-%s-%s-%05d' % (workspace, stage.name, item)
     scratch = os.path.expandvars(settings.scratch_path) or \
@@ -23,7 +23,7 @@ def folders(settings, stage, item):
 
 
 def run_in(folder, settings, stage, item):
-    """Makes an item; returns what it has cost."""
+    """Makes an item; returns its time and memory."""
     shutil.rmtree(folder, ignore_errors=True)
     try:
         os.makedirs(folder)

@@ -19,7 +19,7 @@ class TaskError(Exception):
 
 
 class Work:
-    """One item: where it works, and what it has cost."""
+    """One item: its folder, and the time and memory used so far."""
 
     def __init__(self, settings, stage, item, folder):
         self.settings = settings
@@ -62,7 +62,7 @@ class Work:
         """Moves a file of the scratch folder into the workspace."""
         target = self.settings.path(*parts)
         os.makedirs(os.path.dirname(target), exist_ok=True)
-        # Of another name than that of the same item on a node that was lost.
+        # The same item on a lost node has a temporary file of another name.
         temporary = '%s.%s.%d.part' % (target, os.uname().nodename, os.getpid())
         shutil.copyfile(self.scratch(name), temporary)
         with open(temporary, 'rb') as file:
@@ -149,8 +149,8 @@ def pairs(work):
                         {'pair_blocks': count, 'num_pairs': len(lines)})
 
 
-# What of the whole database a block of pairs needs. COLMAP 3.12 and later have
-# rigs and frames.
+# The rows of the whole database that a block of pairs needs. COLMAP 3.12 and
+# later have rigs and frames.
 SUBSET = """
 INSERT INTO main.images SELECT * FROM whole.images WHERE name IN
   (SELECT name FROM temp.wanted) ORDER BY image_id;
@@ -238,8 +238,9 @@ def priors(work):
 
 
 def memory_budget(settings, group, options):
-    """The adjustments of a large model keep to what Slurm gives: MiB, which are
-    5 % more than a thousandth of a GB, for the task itself."""
+    """Limits the adjustments of a large model to the memory that Slurm gives.
+    Its MiB are passed on as MB, which are 5 % smaller; the difference remains
+    for the task itself."""
     given_mb = float(os.environ.get('SLURM_MEM_PER_NODE', 0))
     if (given_mb < costs.whole_mb(prepare.expected(settings)) or
             'max_memory_gb' in options):

@@ -31,7 +31,7 @@ class DecodeImage : public testing::Test {
     return cause;
   }
 
-  // A picture of 4 x 2 pixels, rows padded by three bytes.
+  // An image message of 4 x 2 pixels; `padding` bytes follow each row.
   std::string Raw(const std::string& encoding, const std::string& pixel,
                   bool is_big_endian = false, uint32_t padding = 3) {
     std::string pixels;
@@ -95,7 +95,7 @@ TEST_F(DecodeImage, TwelveBitsBecomeEightInAllPhotosAlike) {
                    "sensor_msgs/Image", &picture),
             "");
   EXPECT_EQ(picture.at<cv::Vec3b>(0, 0)[0], 0xf0);
-  // A dark photo stays dark; in the other byte order too.
+  // A dark photo stays dark, in big-endian byte order too.
   ASSERT_EQ(Decode(Raw("mono16", std::string("\x00\x80", 2), true, 0),
                    "sensor_msgs/Image", &picture),
             "");
@@ -150,7 +150,7 @@ TEST(CameraFromInfo, ModelsOfRosBecomeColmaps) {
          "FULL_OPENCV", "500,510,320.5,240.5,1,2,3,4,5,6,7,8");
   expect(Info("equidistant", {1, 2, 3, 4}), false, "OPENCV_FISHEYE",
          "500,510,320.5,240.5,1,2,3,4");
-  // Without distortion a fisheye is no pinhole.
+  // An equidistant camera without distortion is a fisheye, not a pinhole.
   expect(Info("equidistant", {0, 0, 0, 0}), false, "OPENCV_FISHEYE",
          "500,510,320.5,240.5,0,0,0,0");
   expect(Info("plumb_bob", {1, 2, 3, 4, 5}), true, "PINHOLE",
@@ -171,8 +171,8 @@ TEST(CameraFromInfo, WhatCannotBeUsedIsNamed) {
   EXPECT_THAT(cause(Info("equidistant", {1})), HasSubstr("4 coefficients"));
 }
 
-// 1 m/s for 10 s with a photo each 0.1 s, the last 5 s at rest but for a turn
-// of 90 degrees.
+// Photos every 0.1 s for 10 s: 5 s straight on at 1 m/s, then 5 s of turning on
+// the spot by 90 degrees.
 BagLogs Drive() {
   BagLogs logs;
   logs.wheel_type = WheelType::kVelocity;
@@ -192,7 +192,7 @@ TEST(SelectPhotos, ByStepAndByDistanceDriven) {
   EXPECT_EQ(SelectPhotos(Drive(), options)->size(), 11);
   options.image_step = 1;
   options.image_distance_m = 0.99;
-  // One at the start, five on the way, and one each 10 degrees of the turn.
+  // One at the start, five on the way, and one for each 10 degrees of the turn.
   const int num_photos = SelectPhotos(Drive(), options)->size();
   EXPECT_GE(num_photos, 6 + 7);
   EXPECT_LE(num_photos, 6 + 9);
@@ -204,9 +204,9 @@ TEST(SelectPhotos, ByStepAndByDistanceDriven) {
   }
 }
 
-// The same drive as other wheels log it: two speeds of wheels 0.6 m apart, one
-// speed, a steering angle (which turns nothing at rest). The distance is the
-// same, and no turn is computed smaller than it is.
+// The same drive in other wheel logs: two speeds of wheels 0.6 m apart, one
+// speed, or a steering angle (without effect at rest). The distance is the
+// same, and turns are never underestimated.
 TEST(SelectPhotos, WheelsOfEachKind) {
   PhotoSelectionOptions options;
   options.image_distance_m = 0.99;
@@ -230,7 +230,7 @@ TEST(SelectPhotos, WheelsOfEachKind) {
   EXPECT_EQ(count(WheelType::kSteering,
                   [](WheelSample* sample) { sample->second = 0.0; }),
             6);
-  // 11.8 degrees a photo with a wheelbase of 0.5 m: each is taken.
+  // 11.8 degrees between photos with a wheelbase of 0.5 m: each is selected.
   EXPECT_EQ(count(WheelType::kSteering,
                   [](WheelSample* sample) { sample->second = -0.8; }),
             51);

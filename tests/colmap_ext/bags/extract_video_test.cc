@@ -16,7 +16,7 @@ TEST(SelectSharpFrames, TheSharpestOfTheFirstHalfOfEachStretch) {
   }
   EXPECT_EQ(SelectSharpFrames(frames, {0, 40, 80}),
             (std::vector<int>{1, 4, 8}));
-  // Every frame is a stretch of its own.
+  // Each start time selects from one frame only.
   EXPECT_EQ(SelectSharpFrames(frames, {0, 10, 20}).size(), 3);
   // A frame without edges is better than none.
   frames[0].blur_px = std::numeric_limits<double>::infinity();

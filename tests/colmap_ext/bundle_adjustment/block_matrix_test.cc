@@ -13,7 +13,7 @@ namespace {
 TEST(BlockMatrixTest, AddsBlocksIntoTheLowerTriangle) {
   BlockMatrix matrix;
   for (const int size : {6, 3, 2}) matrix.AddBlock(size);
-  // More than once, and from either side.
+  // More than once, and in either order.
   for (int k = 0; k < 1000; ++k)
     matrix.AddPair(k % 2 == 0 ? 0 : 2, 2 - k % 2 * 2);
   matrix.Allocate();
@@ -29,7 +29,7 @@ TEST(BlockMatrixTest, AddsBlocksIntoTheLowerTriangle) {
   EXPECT_LT((Eigen::MatrixXd(matrix.Matrix()) - expected).norm(), 1e-15);
 }
 
-// Values below the diagonal of the factor, without CHOLMOD.
+// Values below the diagonal of the Cholesky factor, without CHOLMOD.
 int CountFill(const Eigen::SparseMatrix<double>& lower) {
   Eigen::MatrixXd pattern = lower;
   int num_values = 0;
@@ -46,8 +46,8 @@ int CountFill(const Eigen::SparseMatrix<double>& lower) {
   return num_values;
 }
 
-//  0 is tied to all others, which are a chain: 1 - 2 - ... - 39. Eliminated
-//  first, it would tie all to all.
+// Block 0 is connected to all others, a chain 1 - 2 - ... - 39. Eliminated
+// first, it would connect all blocks.
 TEST(BlockMatrixTest, ReordersWithoutFill) {
   constexpr int kNumBlocks = 40;
   BlockMatrix matrix;

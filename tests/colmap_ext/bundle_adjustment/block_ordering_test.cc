@@ -38,7 +38,7 @@ TEST(BlockOrderingTest, ACompleteGraphIsFull) {
   EXPECT_EQ(NumFactorBlocks(neighbors), 30 * 29 / 2);
 }
 
-// 0 - 1 - 2 - 3 - 4 - 5 - 0: whichever node goes first joins its neighbours,
+// 0 - 1 - 2 - 3 - 4 - 5 - 0: eliminating any node connects its two neighbours,
 // until a triangle is left.
 TEST(BlockOrderingTest, ARingFills) {
   Neighbors ring(6);
@@ -46,8 +46,8 @@ TEST(BlockOrderingTest, ARingFills) {
   EXPECT_EQ(NumFactorBlocks(ring), 6 + 3);
 }
 
-// A drive that sees each place once stays a band, however long; streets that
-// cross fill more.
+// The factor of a drive that sees each place once is banded, however long the
+// drive; crossing streets cause more fill.
 TEST(BlockOrderingTest, GrowsWithTheStreetsThatCross) {
   const int num_images = 400;
   Neighbors straight(num_images);
@@ -65,8 +65,8 @@ TEST(BlockOrderingTest, GrowsWithTheStreetsThatCross) {
   EXPECT_GT(NumFactorBlocks(crossing), band);
 }
 
-// A mower's lanes, each image tied to those around it: dissection fills less
-// than minimum degree.
+// A mower's lanes, each image connected to those around it: nested dissection
+// causes less fill than minimum degree.
 Neighbors MakeLanes(int num_lanes, int lane_length) {
   const int num_images = num_lanes * lane_length;
   Neighbors lanes(num_images);
@@ -78,7 +78,8 @@ Neighbors MakeLanes(int num_lanes, int lane_length) {
   return lanes;
 }
 
-// METIS draws from rand(), which COLMAP's threads seed.
+// Orderings must not depend on rand(), which METIS uses and COLMAP's threads
+// seed.
 TEST(BlockOrderingTest, OrdersSideBySideAreThoseOfOneThread) {
   std::vector<Neighbors> graphs;
   std::vector<std::vector<int>> expected;

@@ -93,7 +93,7 @@ TEST(AdjustBundleTest, WeightsDoNotMoveANoiseFreeSolution) {
   }
 }
 
-// Images 8 to 13 see nothing: only priors tie them in.
+// Images 8 to 13 have no observations: only priors connect them.
 //
 //   1 - ... - 7 ~ 8 ~ 9 ~ ... ~ 13 ~ 14 - ... - 20      (~ prior only)
 TEST(AdjustBundleTest, PriorsCarryImagesWithoutObservations) {
@@ -114,8 +114,8 @@ TEST(AdjustBundleTest, PriorsCarryImagesWithoutObservations) {
   EXPECT_LT(CenterError(world, reconstruction), 2e-3);
 }
 
-// The vehicle stops while the camera sees nothing: images 8 to 13 see nothing,
-// and 10 to 12 stand at one place, up to a millimetre.
+// The vehicle stops while the camera sees nothing: images 8 to 13 have no
+// observations, and images 10 to 12 are at one place, up to a millimetre.
 TEST(AdjustBundleTest, AStopInTheDarkKeepsTheChainTogether) {
   const double sigma_m = 3e-3;
   for (uint64_t seed = 1; seed <= 5; ++seed) {
@@ -159,7 +159,7 @@ TEST(AdjustBundleTest, AStopInTheDarkKeepsTheChainTogether) {
         AdjustBundle(PriorBundleAdjustmentOptions(), problem, &reconstruction)
             .success);
     for (const auto& [id, pose] : truth) {
-      // Six steps of three components, 5 sigmas.
+      // 5 sigmas of six steps with three components each.
       EXPECT_LT((CamFromWorld(reconstruction.Image(id)).TargetOriginInSource() -
                  pose.TargetOriginInSource())
                     .norm(),
@@ -186,7 +186,7 @@ TEST(AdjustBundleTest, WrongPriorIsOutvoted) {
   colmap::Reconstruction reconstruction = BuildBundleWorld(world);
   PriorBundleAdjustmentProblem problem = ProblemOfAll(reconstruction);
   problem.priors = TruePriors(world);
-  // A slipping wheel and a turn that did not happen.
+  // A length as of a slipping wheel, and a rotation that did not happen.
   problem.priors[9].cam2_from_cam1.translation *= 3.0;
   problem.priors[9].cam2_from_cam1.rotation =
       ExpSo3(Eigen::Vector3d(0.0, 0.3, 0.0)) *
@@ -228,8 +228,8 @@ TEST(AdjustBundleTest, AgreesWithColmap) {
   }
 }
 
-// One focal length: a car that only yaws cannot tell a wrong vertical one from
-// a taller world.
+// One focal length: a camera that only yaws cannot distinguish a wrong vertical
+// focal length from a taller world.
 TEST(AdjustBundleTest, RefinesTheFocalLength) {
   BundleWorldOptions world;
   world.camera_model = "SIMPLE_PINHOLE";
@@ -307,9 +307,9 @@ TEST(AdjustBundleTest, FailsWithoutResidualsAndChangesNothing) {
   EXPECT_LT(CenterError(world, reconstruction), 1e-12);
 }
 
-// Vision sees a slight bend of a whole street only little, beside the noise of
-// its keypoints: it ends where an adjustment from the truth ends, though the
-// cost hardly changes on the way.
+// A slight bend of a whole street changes the cost by little compared with the
+// keypoint noise. The adjustment still reaches the optimum that an adjustment
+// from the truth reaches.
 TEST(AdjustBundleTest, UnbendsALongStreet) {
   for (uint64_t seed = 1; seed <= 3; ++seed) {
     BundleWorldOptions world;
@@ -379,8 +379,8 @@ TEST(AdjustBundleTest, ThreadsChangeNothing) {
   }
 }
 
-// Where its equations do not fit, points are cut, which tell the poses nearly
-// the same; where they do, nothing changes.
+// If the equations exceed max_memory_gb, points are cut, which hardly changes
+// the poses; otherwise the result is identical.
 TEST(AdjustBundleTest, CutsPointsWhereMemoryIsBounded) {
   for (const uint64_t seed : {1, 2, 3}) {
     BundleWorldOptions world;
@@ -410,7 +410,7 @@ TEST(AdjustBundleTest, CutsPointsWhereMemoryIsBounded) {
     for (const image_t id : models[0].RegImageIds()) {
       EXPECT_EQ(models[1].Image(id).Tvec(), models[0].Image(id).Tvec());
     }
-    // What cutting adds to the noise is less than the noise.
+    // The error that cutting adds is smaller than the error due to the noise.
     EXPECT_LT(CenterError(world, models[2]),
               std::sqrt(2.0) * CenterError(world, models[0]));
   }
@@ -429,8 +429,8 @@ TEST(PriorBundleAdjustmentOptionsTest, NamesTheBrokenRule) {
       std::invalid_argument);
 }
 
-// Wrong matches may leave points that one image of a pair sees twice and the
-// other one not at all: the one is held, and the other has no residual.
+// With wrong matches one image of a pair may see all points twice and the other
+// image none. The first image is constant and the other has no residual.
 TEST(AdjustBundleTest, WithoutAFreePoseNothingMoves) {
   colmap::Reconstruction world = BuildBundleWorld({});
   const auto ids = world.Point3DIds();

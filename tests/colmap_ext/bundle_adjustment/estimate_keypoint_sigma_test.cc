@@ -26,7 +26,7 @@ TEST(EstimateKeypointSigmaTest, FindsTheNoiseOfTheWorld) {
       const std::optional<double> sigma_px =
           EstimateKeypointSigmas(AdjustedWorld(options)).of_all_px;
       ASSERT_TRUE(sigma_px.has_value());
-      // The median of some hundred points is good to 4 %.
+      // The median of some hundred points is accurate to 4 %.
       EXPECT_NEAR(*sigma_px / noise_px, 1.0, 0.1) << "seed " << seed;
     }
   }
@@ -43,7 +43,7 @@ TEST(EstimateKeypointSigmaTest, FindsTheNoiseOfEachCamera) {
     const std::map<camera_t, double> sigmas_px =
         EstimateKeypointSigmas(AdjustedWorld(options)).of_cameras_px;
     ASSERT_EQ(sigmas_px.size(), 2);
-    // More than three times what ten seeds scatter by.
+    // More than three times the scatter over ten seeds.
     EXPECT_NEAR(sigmas_px.at(1) / 0.3, 1.0, 0.1) << "seed " << seed;
     EXPECT_NEAR(sigmas_px.at(2) / 1.2, 1.0, 0.1) << "seed " << seed;
   }

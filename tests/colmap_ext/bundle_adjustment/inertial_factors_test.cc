@@ -42,7 +42,7 @@ struct Parameters {
   }
 };
 
-// The drive's motions from the second image on, and the true poses of three.
+// Two consecutive inertial motions and the true poses of their three images.
 struct ThreeImages {
   InertialMotion motion1, motion2;
   Parameters parameters;
@@ -123,12 +123,13 @@ TEST(InertialCost, DerivativesAreThoseOfDifferences) {
   }
 }
 
-// The IMU's axes are not where T_cam_imu has them. What is left is of second
-// order: gravity turned by the square of half a degree.
+// T_cam_imu has a wrong rotation, which the parameter `turn` compensates. The
+// remaining residual is of second order: gravity rotated by the square of half
+// a degree.
 TEST(InertialCost, KnowsTheTurnOfTheImu) {
   for (uint64_t seed = 1; seed <= 3; ++seed) {
     ThreeImages images = BuildThreeImages(seed);
-    const double sigma = images.motion1.dt_s;  // Accelerations, m/s^2.
+    const double sigma = images.motion1.dt_s;  // residuals in m/s^2
     const Eigen::Vector3d turn = DegToRad(0.5) * Random(seed).UnitVector();
     images.motion1.camera_from_imu_origin.setZero();
     images.motion2.camera_from_imu_origin.setZero();
@@ -148,7 +149,7 @@ TEST(InertialCost, KnowsTheTurnOfTheImu) {
   }
 }
 
-// A drive without wheels: of the priors rotations are left.
+// A drive without wheels: only the rotations of its priors are used.
 PriorBundleAdjustmentProblem ProblemWithoutWheels(
     const MapperWorld& world, const colmap::Reconstruction& model) {
   PriorBundleAdjustmentProblem problem = ProblemOf(world, model);
@@ -160,7 +161,8 @@ PriorBundleAdjustmentProblem ProblemWithoutWheels(
   return problem;
 }
 
-// Leaves a few of the points that images on both sides of `last` see.
+// Keeps only a few of the points that images up to `last` share with later
+// ones.
 void TearAt(image_t last, colmap::Reconstruction* model) {
   const auto ids = model->Point3DIds();
   std::vector<colmap::point3D_t> point_ids(ids.begin(), ids.end());
@@ -191,9 +193,9 @@ PriorBundleAdjustmentSummary Adjust(const PriorBundleAdjustmentProblem& problem,
                                             &factor);
 }
 
-// The residuals tell the accelerometer's noise, though vision's is several
-// times larger. Some 60 of 350 residuals are the accelerometer's own: 1 sigma
-// of the noise is 0.1 of it, and so much is added to be on the safe side.
+// The residuals determine the accelerometer's noise, though that of vision is
+// several times larger. Some 60 of 350 residuals are due to the accelerometer:
+// 1 sigma of the noise is 0.1 of it, and as much is added as a safety margin.
 TEST(InertialFactors, FindTheNoiseOfTheAccelerometer) {
   for (uint64_t seed = 1; seed <= 3; ++seed) {
     const MapperWorld world = BuildDrive(seed);
@@ -218,8 +220,8 @@ TEST(InertialFactors, FindTheNoiseOfTheAccelerometer) {
   }
 }
 
-// Where few points tie two halves of a drive they end apart; the accelerometer
-// knows better, and its noise does not matter to a model that holds.
+// Two halves of a drive that few points connect drift apart. The accelerometer
+// corrects this, and its noise does not degrade a sound model.
 TEST(InertialFactors, CloseATearAndLeaveTheRest) {
   double torn = 0.0, mended = 0.0, sound = 0.0, sound_mended = 0.0;
   for (uint64_t seed = 1; seed <= 5; ++seed) {
@@ -246,9 +248,10 @@ TEST(InertialFactors, CloseATearAndLeaveTheRest) {
   EXPECT_LT(sound_mended, 1.05 * sound);
 }
 
-// The machine turns about the vertical only: of a turn about that axis the
-// gyroscope tells nothing, and the directions of driving have one of their own.
-// Over 24 s at 2 m/s^2 noise of 0.01 leaves 0.06 deg.
+// The vehicle rotates about the vertical only. The gyroscope does not observe a
+// camera-IMU rotation about that axis, and the directions of driving have an
+// unknown rotation of their own. Noise of 0.01 over 24 s at 2 m/s^2 leaves
+// 0.06 deg.
 TEST(InertialFactors, TellHowTheImuIsTurned) {
   double error = 0.0, error_without = 0.0;
   for (uint64_t seed = 1; seed <= 5; ++seed) {
@@ -285,9 +288,9 @@ TEST(InertialFactors, TellHowTheImuIsTurned) {
   EXPECT_GT(error_without, 2.0 * error);
 }
 
-// The wheels' translation takes the place of the smoothed one, or none where
-// they slip and across gaps of a drive without; of motions that no factor has,
-// lengths that vision found, and too few motions nothing changes.
+// The wheels' translation replaces the smoothed one, or none does at wheel
+// slips and across gaps of a drive without wheels. Nothing changes for motions
+// in no factor, for lengths found by vision, and for too few motions.
 TEST(LeaveAccelerometerToFactors, ReplacesWhatTheFactorsHold) {
   constexpr image_t kBridge = 7;  // across a gap, by the accelerometer
   std::vector<InertialMotion> motions;

@@ -32,11 +32,11 @@ ceres::Solver::Summary SolveWithCeres(const MinimizeBundleOptions& options,
   return summary;
 }
 
-// One adjustment with its true priors, by Ceres and by MinimizeBundle.
+// The same adjustment with true priors, by Ceres and by MinimizeBundle.
 struct Solutions {
   ceres::Solver::Summary expected;
   MinimizeBundleSummary summary;
-  // Adjusted, in this order.
+  // By Ceres and by MinimizeBundle.
   colmap::Reconstruction models[2];
 };
 
@@ -80,8 +80,8 @@ int NumIterations(const ceres::Solver::Summary& summary) {
   return summary.num_successful_steps + summary.num_unsuccessful_steps;
 }
 
-// The reprojection error of a point of the model, were it there, with the
-// adjustment's loss (Cauchy), in px^2.
+// The reprojection cost of a point of the model if it were at xyz, with the
+// adjustment's Cauchy loss, in px^2.
 double ReprojectionCostPx(const colmap::Reconstruction& model,
                           const colmap::Point3D& point,
                           const Eigen::Vector3d& xyz) {
@@ -99,7 +99,7 @@ double ReprojectionCostPx(const colmap::Reconstruction& model,
   return sum;
 }
 
-// Whether cutting leaves observations alone, which do not take part.
+// Whether cutting leaves single observations, which are not used.
 bool HasSingles(const Covisibility& covisibility,
                 const colmap::Point3D& point) {
   std::set<image_t> images;
@@ -113,8 +113,8 @@ bool HasSingles(const Covisibility& covisibility,
   });
 }
 
-// Points that are cut where images share few of them tell the poses nearly the
-// same, and end where all of their observations see them.
+// Cutting points where images share few of them hardly changes the poses, and
+// the points converge to the minimum over all of their observations.
 TEST(MinimizeBundleTest, PointsMayBeCutWhereImagesShareFew) {
   // A hundredth of the variance of a coordinate.
   constexpr double kTolerance = 0.01 * 0.5 * 0.5;
@@ -148,7 +148,7 @@ TEST(MinimizeBundleTest, PointsMayBeCutWhereImagesShareFew) {
               CamFromWorld(whole.Image(id)).TargetOriginInSource())
                  .squaredNorm();
     }
-    // Less than what the noise of the keypoints makes of either.
+    // The difference is less than the error due to the keypoint noise.
     EXPECT_LT(std::sqrt(sum / problem.images.size()),
               CenterError(world, whole));
     for (const colmap::Reconstruction* model : {&whole, &cut}) {
@@ -168,7 +168,8 @@ TEST(MinimizeBundleTest, PointsMayBeCutWhereImagesShareFew) {
   }
 }
 
-// From near the minimum, and from where steps are refused; before either ends.
+// Starts near the minimum, and where steps are rejected. Both solvers are
+// stopped before they converge.
 TEST(MinimizeBundleTest, MakesTheStepsOfCeres) {
   BundleWorldOptions world;
   world.pixel_noise_px = 0.5;
@@ -192,7 +193,7 @@ TEST(MinimizeBundleTest, MakesTheStepsOfCeres) {
   }
 }
 
-// Where Ceres ends, which goes without its last step.
+// Converges where Ceres does, but without discarding the last step.
 TEST(MinimizeBundleTest, KeepsItsLastStep) {
   BundleWorldOptions world;
   world.pixel_noise_px = 0.5;
@@ -221,8 +222,8 @@ TEST(MinimizeBundleTest, KeepsItsLastStep) {
   }
 }
 
-// Spacing so small that images see most of each other's points: a factorisation
-// takes longer than iterations with an earlier factor.
+// The spacing is so small that images see most of each other's points: a
+// factorisation takes longer than iterations with an earlier factor.
 TEST(MinimizeBundleTest, ReusesAFactorThatTakesLong) {
   MinimizeBundleOptions minimize = WithoutPointIterations(1e10);
   minimize.function_tolerance = 1e-8;
@@ -264,7 +265,7 @@ void ExchangeInPart(colmap::point3D_t id1, colmap::point3D_t id2,
   }
 }
 
-// Of points with long tracks whose keypoints are near each other in an image.
+// Spoils long tracks whose keypoints are near each other in an image.
 void SpoilTracks(int num_pairs, colmap::Reconstruction* model) {
   constexpr size_t kMinLength = 6;
   constexpr double kMaxDistancePx = 20.0;
@@ -317,9 +318,9 @@ MinimizeBundleSummary MinimizeSpoilt(uint64_t seed, int num_spoilt_pairs,
   return summary;
 }
 
-// A few points whose observations contradict each other take many steps, but
-// not of all: those are as few as without such points, and lead to the same
-// minimum.
+// A few points whose observations contradict each other take many steps of
+// their own. The adjustment itself takes as few iterations as without them, to
+// the same minimum.
 TEST(MinimizeBundleTest, ContradictedPointsDoNotHoldUpTheRest) {
   const int max_num_iterations =
       MinimizeBundleOptions().max_num_point_iterations;

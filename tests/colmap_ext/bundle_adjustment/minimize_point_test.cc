@@ -14,8 +14,8 @@ namespace {
 
 constexpr double kFocalLengthPx = 500.0;
 
-// A point 20 m ahead of cameras that come nearer by a metre each, a little to
-// the side, and its keypoints with a noise of half a pixel, in pixels.
+// A point 20 m ahead and a little to the side of cameras that approach it by a
+// metre each, and its keypoints with a noise of half a pixel.
 struct SeenPoint {
   explicit SeenPoint(uint64_t seed, int num_contradictions = 0) {
     constexpr int kNumImages = 8;
@@ -33,7 +33,7 @@ struct SeenPoint {
       const Eigen::Vector3d in_cam =
           poses[i].rotation * (truth - poses[i].center);
       Eigen::Vector2d error_px = random.GaussianVector(0.5).head<2>();
-      // Another point's keypoints, all at the same distance.
+      // Keypoints of another point, all shifted by the same 15 px.
       if (i < num_contradictions) error_px.x() += 15.0;
       observation.keypoint.normalized =
           in_cam.hnormalized() + error_px / kFocalLengthPx;
@@ -99,14 +99,14 @@ TEST(MinimizePointTest, FindsTheMinimumOfCeres) {
           MinimizePoint(options, seen.Observations(), loss, &point);
       EXPECT_NEAR(cost, expected_cost, 1e-9 * expected_cost);
       EXPECT_NEAR(cost, seen.Cost(loss, point), 1e-12 * cost);
-      // A hundredth of what these points err by, 0.16 m on average (RMS).
+      // A hundredth of these points' RMS error, 0.16 m.
       EXPECT_LT((point - expected).norm(), 1e-3);
     }
   }
 }
 
-// Where observations are of two points, steps are short, but lead to a minimum:
-// no place nearby costs less.
+// If the observations are of two points, the steps are short, but lead to a
+// minimum: no place nearby has a lower cost.
 TEST(MinimizePointTest, EndsAtAMinimumOfContradictingObservations) {
   ceres::CauchyLoss cauchy(4.0);
   MinimizePointOptions options;
@@ -137,7 +137,8 @@ TEST(MinimizePointTest, LeavesWhatItCannotImprove) {
   MinimizePoint(options, seen.Observations(), nullptr, &again);
   EXPECT_EQ(again, point);
 
-  // One ray has no depth; behind all cameras nothing pulls.
+  // One ray does not determine a depth. A point behind all cameras does not
+  // move.
   BundleProblem::ObservationRange one = seen.Observations();
   one.last = one.first + 1;
   MinimizePoint(options, one, nullptr, &point);

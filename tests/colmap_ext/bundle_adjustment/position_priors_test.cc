@@ -77,7 +77,8 @@ TEST(PositionPriors, JacobiansMatchNumericDifferences) {
   }
 }
 
-// The squared residual is that of the covariance, whatever its shape.
+// The squared residual norm is the squared Mahalanobis distance, for a
+// covariance of any shape.
 TEST(PositionPriors, WhitensWithTheCovariance) {
   Random random(4);
   AdjustedPose pose(Rigid3d{});
@@ -92,7 +93,7 @@ TEST(PositionPriors, WhitensWithTheCovariance) {
       prior.position.dot(prior.covariance.inverse() * prior.position), 1e-9);
 }
 
-// A model of a street, bent and moved, with positions at every image.
+// A model of a street under a wrong similarity, with a position at every image.
 struct PositionedWorld {
   BundleWorldOptions options;
   colmap::Reconstruction reconstruction;
@@ -122,7 +123,7 @@ PositionedWorld MakeWorld(double sigma_m, uint64_t seed) {
         pose.rotation * -Eigen::Vector3d::UnitZ();
   }
   world.problem.gravity_sigma_rad = 0.01;
-  // A metre away, turned by 1 deg, and 2 % too long.
+  // A metre away, rotated by 1 deg, and 2 % too long.
   const Sim3d wrong(1.02, ExpSo3(Eigen::Vector3d(0.0, 0.0, DegToRad(1.0))),
                     Eigen::Vector3d(0.6, -0.7, 0.4));
   for (const image_t id : world.reconstruction.RegImageIds()) {
@@ -147,8 +148,9 @@ double RmsError(const PositionedWorld& world) {
   return std::sqrt(sum / world.options.num_images);
 }
 
-// 40 positions of 0.3 m: seven degrees of freedom of the frame, so that the
-// mean squared error is 0.3^2 * 7 / 40 / 3 a direction, 0.13 m rms in space.
+// 40 positions of 0.3 m determine the seven degrees of freedom of the frame:
+// the mean squared error is 0.3^2 * 7 / 40 / 3 per direction, 0.13 m RMS in
+// space.
 TEST(PositionPriors, AdjustmentMovesTheModelOntoThem) {
   for (uint64_t seed = 1; seed <= 5; ++seed) {
     PositionedWorld world = MakeWorld(0.3, seed);
@@ -177,7 +179,7 @@ TEST(PositionPriors, AJumpOfAFewIsLeftOut) {
   }
 }
 
-// Without enough of them the adjustment is the one without.
+// Too few positions are ignored.
 TEST(PositionPriors, TwoPositionsDoNotHoldAFrame) {
   PositionedWorld world = MakeWorld(0.3, 1);
   PositionedWorld without = world;

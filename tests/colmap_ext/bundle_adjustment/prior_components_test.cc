@@ -25,20 +25,20 @@ PriorComponent LengthsOf(int num_honest, double honest, int num_wild) {
   return components[static_cast<size_t>(PriorTerm::kLength)];
 }
 
-// Lengths that are 20 sigmas off where wheels slip count as three of the sigmas
-// found: m = 0.93 * 0.5 + 0.07 * 9 m.
+// Residuals of 20 sigmas, as of slipping wheels, are clipped at three estimated
+// sigmas, or three stated ones if larger: m = 0.93 * 0.5 + 0.07 * 9 m.
 TEST(PriorComponents, FewSlipsDoNotSpeakForAllLengths) {
   EXPECT_NEAR(LengthsOf(93, 0.5, 7).mean_square, 0.93 * 0.5 / 0.37, 0.01);
   EXPECT_NEAR(LengthsOf(97, 0.5, 3).mean_square, 0.97 * 0.5 + 0.03 * 9.0, 0.01);
 }
 
-// An error that most of them share is told in full, whatever its size.
+// An error shared by most of the lengths counts in full, whatever its size.
 TEST(PriorComponents, SharedErrorsAreToldInFull) {
   EXPECT_NEAR(LengthsOf(100, 25.0, 0).mean_square, 25.0, 1e-9);
   EXPECT_NEAR(LengthsOf(50, 0.5, 50).mean_square, 200.25, 1e-9);
 }
 
-// Lengths that vision found are no measurements of their noise.
+// Lengths found by vision are no measurements.
 TEST(PriorComponents, LengthsOfVisionSayNothing) {
   const MapperWorld world = BuildDrive(1);
   const colmap::Reconstruction model = Reconstruct(world);
@@ -54,8 +54,8 @@ TEST(PriorComponents, LengthsOfVisionSayNothing) {
   EXPECT_EQ(num_lengths(), 0);
 }
 
-// Poses that nothing but the priors holds follow a single measurement of each
-// motion wholly, and two by half.
+// Poses constrained by priors alone fit a single measurement of each motion
+// exactly, and two by half: n measurements have a redundancy of 1 - 1 / n.
 TEST(PriorComponents, RedundancyIsWhatMeasurementsTestOfEachOther) {
   const MapperWorld world = BuildDrive(1);
   colmap::Reconstruction model = Reconstruct(world);
@@ -94,7 +94,7 @@ TEST(PriorComponents, RedundancyIsWhatMeasurementsTestOfEachOther) {
   }
 }
 
-// The linear step to other sigmas ends where an adjustment with them does.
+// The linear step to other sigmas predicts an adjustment with them.
 TEST(LinearAdjustment, ForeseesAnAdjustmentWithOtherSigmas) {
   const MapperWorld world = BuildDrive(1);
   colmap::Reconstruction model = Reconstruct(world);
@@ -138,8 +138,8 @@ TEST(PriorComponents, LeavesOutWhatSensorsDidNotMeasure) {
   EXPECT_EQ(ComputePriorMeanSquare(priors, model), chi2);
 }
 
-// Poses follow honest priors, whose squares are then below 1; chi-square allows
-// for that without an estimate of their sigmas too.
+// Poses fit correct priors, whose mean square is then below 1. The chi-square
+// is divided by the redundancy even if the sigmas are not estimated.
 TEST(AdjustBundleWithVarianceComponents, DividesByTheRedundancy) {
   for (uint64_t seed = 1; seed <= 3; ++seed) {
     const MapperWorld world = BuildDrive(seed);
@@ -161,8 +161,8 @@ TEST(AdjustBundleWithVarianceComponents, DividesByTheRedundancy) {
   }
 }
 
-// Sigmas that are stated three times too large end within 40 % of the truth,
-// and the chi-square at 1; right ones stay.
+// Sigmas stated three times too large are estimated within 40 % of the truth,
+// and the chi-square becomes 1. Correct sigmas stay.
 TEST(AdjustBundleWithVarianceComponents, LowersSigmasThatResidualsRefute) {
   for (uint64_t seed = 1; seed <= 3; ++seed) {
     const MapperWorld world = BuildDrive(seed);

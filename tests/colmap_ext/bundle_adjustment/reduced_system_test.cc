@@ -14,8 +14,9 @@
 namespace adasfm {
 namespace {
 
-// The parameters that are not constant: those that the reduced system has, in
-// the order of its columns, then the points as the residuals name them first.
+// Lists the parameters that are not constant: those of the reduced system in
+// the order of its columns, then the points in the order of their first
+// residuals.
 std::vector<double*> ListParameters(BundleProblem* bundle) {
   ceres::Problem& problem = *bundle->CeresProblem();
   std::vector<ceres::ResidualBlockId> ids;
@@ -77,7 +78,7 @@ DenseSolution SolveDensely(BundleProblem* bundle, int size) {
   return {step.head(size), columns.topRows(size)};
 }
 
-// With priors that have errors in common.
+// All images, with priors that share errors.
 PriorBundleAdjustmentProblem ProblemWithPriors(
     const BundleWorldOptions& world, const colmap::Reconstruction& model) {
   PriorBundleAdjustmentProblem problem = ProblemOfAll(model);

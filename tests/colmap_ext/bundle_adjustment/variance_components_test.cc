@@ -26,7 +26,7 @@ TEST(ComputePriorMeanSquare, IsZeroAtThePriorsAndCapsWhatIsWild) {
     t *= 1.0 + 2.0 * edge.length_sigma_m / t.norm();
   }
   EXPECT_NEAR(ComputePriorMeanSquare(longer, model), 4.0, 1e-6);
-  // One edge of n a thousand sigmas off counts 9 / n.
+  // One grossly wrong edge of n is clipped at three sigmas and counts 9 / n.
   std::vector<PosePriorEdge> wild = priors;
   wild[5].cam2_from_cam1.translation *= 1e3;
   EXPECT_NEAR(ComputePriorMeanSquare(wild, model), 9.0 / priors.size(), 1e-6);
@@ -45,8 +45,8 @@ TEST(AdjustBundleWithVarianceComponents, LeavesIndependentNoiseAlone) {
   }
 }
 
-// Vision with an error that all keypoints share: the camera's focal length is
-// 5 % off, so that turns and lengths do not fit each other.
+// All keypoints share an error: the camera's focal length is 5 % off, so that
+// rotations and lengths contradict each other.
 TEST(AdjustBundleWithVarianceComponents,
      BelievesPriorsWhereKeypointsShareAnError) {
   for (uint64_t seed = 1; seed <= 3; ++seed) {
@@ -75,7 +75,7 @@ TEST(AdjustBundleWithVarianceComponents,
     EXPECT_LE(factor, balance.max_sigma_factor);
     const double chi2 = ComputePriorMeanSquare(problem.priors, balanced);
     EXPECT_LT(chi2, plain_chi2) << "seed " << seed;
-    // The balance is that of priors without the errors that they share.
+    // The balance is computed from priors corrected for their shared errors.
     const double own_chi2 = ComputePriorMeanSquare(
         CorrectSharedErrors({}, summary.shared_errors, problem.priors),
         balanced);
@@ -84,7 +84,7 @@ TEST(AdjustBundleWithVarianceComponents,
   }
 }
 
-// A blurred camera beside a sharp one weighs by its own noise.
+// A blurred and a sharp camera are each weighted by their own noise.
 TEST(AdjustBundleWithVarianceComponents, WeighsEachCameraByItsNoise) {
   double error_m = 0.0;
   double error_of_one_sigma_m = 0.0;

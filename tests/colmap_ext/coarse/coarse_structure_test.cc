@@ -16,7 +16,7 @@ struct Fixture {
   CoarseModelInput input;
 };
 
-// True poses moved by normal errors of sigma_m and 0.3 deg.
+// True poses with normal errors: sigma_m, and 0.3 deg per metre of sigma_m.
 Fixture BuildFixture(const SyntheticWorldOptions& options, double sigma_m) {
   Fixture fixture;
   fixture.world = BuildSyntheticWorld(options);
@@ -62,7 +62,7 @@ TEST(BuildCoarseModelTest, AdjustsPosesAndKeepsMetres) {
   }
 }
 
-// Keyframes are a short cut, not another result.
+// Keyframes save residuals, but lead to the same model.
 TEST(BuildCoarseModelTest, KeyframesLeadToTheSameModel) {
   for (const uint64_t seed : {1, 2}) {
     SyntheticWorldOptions options = SmallWorld();
@@ -118,7 +118,7 @@ TEST(BuildCoarseModelTest, PriorsCarryImagesWithoutTexture) {
   EXPECT_LT(ComparePoses(fixture.world, model.reconstruction).rmse_m, 0.1);
 }
 
-// A wide angle alone would leave images of a straight drive without points.
+// On a straight drive a wide minimum angle would leave images without points.
 TEST(BuildCoarseModelTest, LowersTheAngleWhereImagesNeedIt) {
   SyntheticWorldOptions options = SmallWorld();
   options.trajectory = SyntheticTrajectory::kStraight;
@@ -137,8 +137,8 @@ TEST(BuildCoarseModelTest, LowersTheAngleWhereImagesNeedIt) {
   EXPECT_LT(wide.num_points, model.num_points);
 }
 
-// A last threshold of 4 px would leave a noise of 1.9 px of 3, and half of the
-// observations.
+// With a fixed last threshold of 4 px, 3 px of noise would appear as 1.9 px,
+// and half of the observations would be lost.
 TEST(BuildCoarseModelTest, ThresholdFollowsTheNoise) {
   for (const uint64_t seed : {1, 2, 3}) {
     SyntheticWorldOptions options = SmallWorld();

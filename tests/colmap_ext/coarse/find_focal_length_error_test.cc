@@ -8,7 +8,7 @@
 namespace adasfm {
 namespace {
 
-// A street that turns by 23 deg to both sides, driven by two cameras.
+// A street along which two cameras look up to 23 deg to both sides.
 BundleWorldOptions TurningStreet(int num_images) {
   BundleWorldOptions world;
   world.num_images = num_images;
@@ -19,7 +19,7 @@ BundleWorldOptions TurningStreet(int num_images) {
   return world;
 }
 
-// Leaves a point two observations, whose rays meet behind the cameras.
+// Reduces a point to two observations whose rays intersect behind the cameras.
 void MatchWrongly(colmap::point3D_t id,
                   colmap::Reconstruction* reconstruction) {
   while (reconstruction->Point3D(id).Track().Length() > 2) {
@@ -38,8 +38,8 @@ void MatchWrongly(colmap::point3D_t id,
   b.SetXY(xy);
 }
 
-// The error that is found when the focal length of camera 1 is given so many
-// times too long, and that of another is taken for right.
+// The error found if the focal length of camera 1 is `ratio` times too long and
+// that of `constant_camera` is taken as correct.
 std::optional<FocalLengthError> FindError(const BundleWorldOptions& world,
                                           double ratio, bool is_known,
                                           camera_t constant_camera,
@@ -61,7 +61,7 @@ std::optional<FocalLengthError> FindError(const BundleWorldOptions& world,
                               reconstruction);
 }
 
-// Of some of the images, too.
+// Also if only some of the images are adjusted (300 of 320).
 TEST(FindFocalLengthError, TakesConstantCamerasForRight) {
   for (const int num_images : {60, 320}) {
     const BundleWorldOptions world = TurningStreet(num_images);
@@ -74,8 +74,8 @@ TEST(FindFocalLengthError, TakesConstantCamerasForRight) {
   }
 }
 
-// Against a focal length that somebody measured it takes 10 sigmas, against
-// others 3, whatever stands beside it.
+// A measured focal length is contradicted by 10 sigmas, another one by 3,
+// whatever the other camera is.
 TEST(FindFocalLengthError, TrustsAMeasuredLensNextToAnUnknownOne) {
   BundleWorldOptions world = TurningStreet(40);
   world.num_keypoints_per_image = 20;
@@ -85,7 +85,8 @@ TEST(FindFocalLengthError, TrustsAMeasuredLensNextToAnUnknownOne) {
   EXPECT_TRUE(FindError(world, 1.01, true, 2).has_value());
 }
 
-// What they cost until they fall behind their cameras is not the lens' error.
+// The cost of wrong points before they fall behind their cameras must not count
+// as an error of the focal length.
 TEST(FindFocalLengthError, ComparesTheSamePoints) {
   BundleWorldOptions world = TurningStreet(40);
   world.num_keypoints_per_image = 20;

@@ -25,7 +25,7 @@ constexpr int kNumDarkImages = 10;
 constexpr size_t kNumKeptMatches = 16;
 constexpr size_t kNumPoints = 4;
 
-// A drive with a gyroscope, past 10 images that see nothing.
+// A drive with a gyroscope and 10 images that see nothing.
 class GlobalStageGapsTest : public testing::TestWithParam<uint64_t> {
  protected:
   GlobalStageGapsTest() : world_(BuildSyntheticWorld(World())) {
@@ -66,8 +66,8 @@ class GlobalStageGapsTest : public testing::TestWithParam<uint64_t> {
     scene_.inertial_motions = IntegrateDrive(std::move(images), options);
   }
 
-  // Pairs with later images hold this one, nearly all by matches that no third
-  // image has: their directions place it, and it has next to no points.
+  // Only pairs with later images constrain this image, nearly all by matches
+  // that no third image has: it has a position, but next to no points.
   void TakePoints(image_t image_id) {
     std::map<image_t, std::set<uint32_t>> seen_in_no_other;
     std::set<uint32_t> used;
@@ -141,7 +141,7 @@ TEST_P(GlobalStageGapsTest, TheAccelerometerLeadsAcross) {
   EXPECT_NEAR(ComputeAlignedErrors(poses, poses_, {}).scale, 1.0,
               3.0 * model.inertial_scale_sigma);
 
-  // What the mapper gets.
+  // The bridges for the mapper.
   ASSERT_EQ(result.bridges.size(), kNumDarkImages + 1);
   size_t num_bridges = 0;
   double variance = 0.0;
@@ -157,7 +157,7 @@ TEST_P(GlobalStageGapsTest, TheAccelerometerLeadsAcross) {
     dark.insert(length.image_id2);
   }
   EXPECT_EQ(num_bridges, result.bridges.size());
-  // The way from what was seen last to what was seen next.
+  // The translation across the gap, between the images that see something.
   const Eigen::Vector3d error =
       Motion(poses, *dark.begin(), *dark.rbegin()).translation -
       Motion(poses_, *dark.begin(), *dark.rbegin()).translation;
@@ -165,7 +165,7 @@ TEST_P(GlobalStageGapsTest, TheAccelerometerLeadsAcross) {
   EXPECT_LT(variance, 0.15 * 0.15);
 }
 
-// Nothing but the step to it would tie the far side to the near one.
+// Otherwise the step to this image alone would connect the sides of the gap.
 TEST_P(GlobalStageGapsTest, AnImageOnFewPointsBelongsToTheGap) {
   AddInertialMotions();
   std::set<image_t> dark;
@@ -185,8 +185,8 @@ TEST_P(GlobalStageGapsTest, AnImageOnFewPointsBelongsToTheGap) {
   EXPECT_EQ(result.bridges.count(ImagePair(next, next + 1)), 1);
 }
 
-// A largest model of so many images, by so many of 100 pairs and all of 50
-// motions of sensors.
+// A largest model of num_images images, from num_kept_pairs of 100 visual pairs
+// and all 50 sensor motions.
 GlobalStageResult ResultOf(image_t num_images, int num_kept_pairs) {
   GlobalStageResult result;
   result.models.resize(2);

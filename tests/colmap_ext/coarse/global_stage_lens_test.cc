@@ -17,7 +17,7 @@
 namespace adasfm {
 namespace {
 
-// Its road turns by 93 deg.
+// A world whose road turns by 93 deg.
 SyntheticWorldOptions TurningWorld() {
   SyntheticWorldOptions options = SmallWorld();
   options.seed = 2;
@@ -29,8 +29,8 @@ void ScaleFocalLength(double ratio, SceneData* scene, camera_t camera_id = 1) {
   for (const size_t i : camera.FocalLengthIdxs()) camera.Params(i) *= ratio;
 }
 
-// A focal length that is 3 % too long bends the epipolar lines; once the
-// adjustment has found the right one, the matches are judged by that.
+// A focal length that is 3 % too long distorts the epipolar lines. Matches are
+// judged by the focal length that the adjustment has estimated.
 TEST(GlobalStageLensTest, MatchesAreRefinedUnderRefinedCameras) {
   for (const uint64_t seed : {1, 2}) {
     SyntheticWorldOptions world_options = SmallWorld();
@@ -47,7 +47,7 @@ TEST(GlobalStageLensTest, MatchesAreRefinedUnderRefinedCameras) {
     set_focal_length(1.03 * world.camera.focal_px);
     GlobalStageOptions options;
     options.structure.bundle.refine_focal_length = true;
-    // A gyroscope without bias tells the focal length of so short a drive.
+    // A gyroscope without bias determines the focal length of so short a drive.
     options.structure.bundle.shared_errors.enabled = false;
     const GlobalStageResult refined = RunStage(scene, options);
     ASSERT_EQ(refined.models.size(), 1);
@@ -76,14 +76,14 @@ TEST(GlobalStageLensTest, WarnsOfAWrongFocalLength) {
     ASSERT_FALSE(warnings.empty());
     EXPECT_NE(warnings[0].find(ratio > 1.0 ? "shorter" : "longer"),
               std::string::npos);
-    // The cameras are the user's: told, not changed.
+    // Errors of the user's cameras are reported, not corrected.
     EXPECT_FALSE(result.models[0].cameras_refined);
     EXPECT_EQ(result.models[0].reconstruction.Camera(1).Params(),
               scene.cameras.at(1).Params());
   }
 }
 
-// Straight on, the errors that priors share pass for a focal length.
+// On a straight road shared errors of the priors look like a focal length.
 TEST(GlobalStageLensTest, SaysNothingOfFocalLengthsOnStraightRoads) {
   SyntheticWorldOptions options = SmallWorld();
   options.trajectory = SyntheticTrajectory::kStraight;
@@ -119,7 +119,8 @@ TEST(GlobalStageLensTest, RefinesAFocalLengthThatNobodyKnows) {
             ComparePoses(world, left.models[0].reconstruction).rmse_m);
 }
 
-// Before all other steps, as COLMAP's guess spoils two-view rotations.
+// The search precedes all other steps, as COLMAP's guess spoils two-view
+// rotations.
 TEST(GlobalStageLensTest, FindsAFocalLengthThatNobodyKnows) {
   const SyntheticWorld world = BuildSyntheticWorld(TurningWorld());
   SceneData scene = BuildSyntheticScene(world, SyntheticPriorOptions());
@@ -150,7 +151,7 @@ double RotationErrorDeg(const std::vector<RelativePosePrior>& priors,
   return RadToDeg(std::sqrt(sum / priors.size()));
 }
 
-// Worlds that turn: the roads of seeds 1 and 4 tell no lens.
+// Worlds with turns: the roads of seeds 1 and 4 do not determine the lens.
 TEST(GlobalStageLensTest, AdjustsALensThatNobodyKnows) {
   for (const uint64_t seed : {2, 3}) {
     SyntheticWorldOptions world_options = TurningWorld();
@@ -199,7 +200,7 @@ SceneData SceneOfTwoCameras(const SyntheticWorld& world, SecondCamera which) {
   return scene;
 }
 
-// A guess that is 10 % too long, with the search among pairs and without.
+// A guess that is 10 % too long, with and without the search over pairs.
 TEST(GlobalStageLensTest, RefinesAFocalLengthNextToAKnownOne) {
   const SyntheticWorld world = BuildSyntheticWorld(TurningWorld());
   for (const SecondCamera which : kSecondCameras) {
@@ -215,7 +216,7 @@ TEST(GlobalStageLensTest, RefinesAFocalLengthNextToAKnownOne) {
     EXPECT_FALSE(left.models[0].cameras_refined);
     ASSERT_TRUE(left.models[0].focal_length_error.has_value());
     EXPECT_EQ(left.models[0].focal_length_error->camera_id, 2);
-    // By the change of the cost that the noise leaves.
+    // The sigma follows from the change of the cost.
     const double sigma = left.models[0].focal_length_error->sigma;
     EXPECT_LT(sigma, 0.005);
     options.structure.refine_unknown_focal_length = true;
@@ -237,7 +238,7 @@ TEST(GlobalStageLensTest, RefinesAFocalLengthNextToAKnownOne) {
   }
 }
 
-// Its distortion, too.
+// The distortion of the unknown lens is adjusted, too.
 TEST(GlobalStageLensTest, AdjustsALensNextToAKnownOne) {
   const SyntheticWorld world = BuildSyntheticWorld(TurningWorld());
   for (const SecondCamera which : kSecondCameras) {
@@ -259,7 +260,7 @@ TEST(GlobalStageLensTest, AdjustsALensNextToAKnownOne) {
   }
 }
 
-// Told, not changed; nor is the unknown one, which is right.
+// The wrong lens is only reported; the unknown one is right and stays as well.
 TEST(GlobalStageLensTest, WarnsOfAWrongKnownLensNextToAnUnknownOne) {
   const SyntheticWorld world = BuildSyntheticWorld(TurningWorld());
   for (const SecondCamera which : kSecondCameras) {

@@ -89,7 +89,7 @@ TEST(RunGlobalStageTest, RefinedMatchesAreTrueOnes) {
   EXPECT_EQ(result.geometries.size() + result.removed_pairs.size() +
                 result.refinement.num_skipped_pairs,
             scene.pairs.size());
-  // Pairs that the odometry refutes are named as such.
+  // Pairs that contradict the odometry are named as such.
   std::istringstream lines(FormatRemovedPairs(scene, result));
   std::string line;
   size_t num_lines = 0, num_refuted = 0;
@@ -101,7 +101,7 @@ TEST(RunGlobalStageTest, RefinedMatchesAreTrueOnes) {
   EXPECT_GT(num_refuted, 0);
 }
 
-// Two equal photos of a camera that stood still, some rounding apart.
+// Two equal photos of a stationary camera, whose poses differ by rounding.
 TEST(RefineStageMatchesTest, EqualPhotosHaveNoGeometry) {
   SceneData scene = BuildSyntheticScene(BuildSyntheticWorld(SmallWorld()),
                                         SyntheticPriorOptions());
@@ -123,7 +123,8 @@ TEST(RefineStageMatchesTest, EqualPhotosHaveNoGeometry) {
   RefineStageMatches(GlobalStageOptions(), scene, RawMatchesOfScene(scene),
                      ComputeSceneBearings(scene, 1), &result);
   EXPECT_FALSE(result.geometries.empty());
-  // Its matches agree, so that it is not removed, and keeps its verified row.
+  // The matches of the pair agree, so that it is not removed and keeps its
+  // verified row.
   const ImagePair equal(pair.image_id1, pair.image_id2);
   EXPECT_EQ(std::count(result.removed_pairs.begin(), result.removed_pairs.end(),
                        equal),
@@ -133,8 +134,8 @@ TEST(RefineStageMatchesTest, EqualPhotosHaveNoGeometry) {
   }
 }
 
-// With keypoints that err by 2 px half of the true matches are further than 4
-// px off their lines.
+// With keypoint noise of 2 px half of the true matches are more than 4 px from
+// their epipolar lines.
 TEST(RunGlobalStageTest, NoisyKeypointsKeepTheirMatches) {
   SyntheticWorldOptions options = SmallWorld();
   options.pixel_noise_px = 2.0;
@@ -155,9 +156,9 @@ TEST(RunGlobalStageTest, NoisyKeypointsKeepTheirMatches) {
   EXPECT_GT(num_kept, 0.85 * num_true_raw);
 }
 
-// Two-view verification takes the motion against cars ahead for that of the
-// camera. The odometry refutes it, and the matches of the town, among the raw
-// ones, hold the images.
+// Two-view verification takes the motion relative to cars ahead for that of the
+// camera. The odometry contradicts that motion, and raw matches on the town
+// constrain the images.
 TEST(RunGlobalStageTest, TrafficDoesNotHideTheTown) {
   SyntheticWorldOptions options = SmallWorld();
   options.moving_keypoint_ratio = 0.5;
@@ -186,9 +187,9 @@ TEST(RunGlobalStageTest, SameResultOnAnyNumberOfThreads) {
   EXPECT_EQ(single.geometries.size(), several.geometries.size());
 }
 
-// A camera that is mounted 3 deg off what the calibration says: no weights
-// bring vision and sensors together, unless the rotation is corrected or the
-// adjustment finds the direction of driving.
+// The true camera-IMU rotation is 3 deg off the calibration. No weights
+// reconcile vision and sensors, unless the rotation is corrected or the
+// adjustment estimates the direction of driving.
 TEST(RunGlobalStageTest,
      CorrectsTheCameraImuRotationOrWarnsOfTheContradiction) {
   const SyntheticWorld world = BuildSyntheticWorld(SmallWorld());
@@ -215,22 +216,25 @@ TEST(RunGlobalStageTest,
       corrected.poses.camera_imu_rotation;
   EXPECT_NEAR(camera_imu.rotation_rad.y(), -DegToRad(3.0),
               4.0 * camera_imu.sigma_rad);
-  // 90 m turn little, which tells the roll; it is left where it is uncertain.
+  // The drive of 90 m turns little, so that roll is weakly observed; it is not
+  // corrected where it is uncertain.
   EXPECT_LT(AngleBetweenRad(ExpSo3(camera_imu.rotation_rad) * turn,
                             Eigen::Quaterniond::Identity()),
             DegToRad(0.6));
   warnings = ListGlobalWarnings(scene, corrected);
   ASSERT_EQ(warnings.size(), 1);
   EXPECT_NE(warnings[0].find("camera-IMU rotation"), std::string::npos);
-  // A turn that the direction of driving explains is no reason for advice.
+  // A rotation that is not significant causes no warning, since the direction
+  // of driving explains it too.
   GlobalStageResult uncertain = corrected;
   uncertain.poses.camera_imu_rotation.sigma_rad =
       0.4 * camera_imu.rotation_rad.norm();
   EXPECT_TRUE(ListGlobalWarnings(scene, uncertain).empty());
 }
 
-// A phone that never lay still, under vision too poor to tell more: true loops
-// contradict the odometry unless the stage hears how badly the bias is known.
+// A phone that was never stationary, and vision too poor to estimate the bias:
+// true loops contradict the odometry unless the stage is given the uncertainty
+// of the bias.
 TEST(RunGlobalStageTest, GatesLoopsByTheStatedBias) {
   SyntheticWorldOptions options = SmallWorld();
   options.num_images = 120;

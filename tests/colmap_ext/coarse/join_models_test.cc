@@ -21,8 +21,8 @@ std::string JoinsOf(const GlobalStageResult& result) {
   return step == result.steps.end() ? "" : step->summary;
 }
 
-// Few keypoints far apart: pairs at turns tell no size before the adjustment,
-// and the drive was two or three models.
+// Few keypoints and images far apart: pairs at turns have no relative scale
+// before the adjustment. Without joins there are two or three models.
 TEST(JoinModelsTest, MakesOneModelOfASparseDrive) {
   for (const uint64_t seed : {2, 3, 5}) {
     SyntheticWorldOptions options;
@@ -41,13 +41,13 @@ TEST(JoinModelsTest, MakesOneModelOfASparseDrive) {
     EXPECT_EQ(result.poses.components.size(), 1);
     const colmap::Reconstruction& model = result.models[0].reconstruction;
     EXPECT_EQ(model.NumRegImages(), kNumImages);
-    // The largest of three parts, 60 m, is known to 5 % against the next.
+    // The relative scale of the largest of three parts, 60 m, is known to 5 %.
     EXPECT_LT(ComparePoses(world, model).rmse_m, 0.05 * 60.0 / std::sqrt(12.0))
         << seed;
   }
 }
 
-// On the spot a camera tells no size: lanes stay apart.
+// Turning on the spot gives no relative scale: lanes stay apart.
 TEST(JoinModelsTest, TurnsOnTheSpotJoinNothing) {
   SyntheticWorldOptions options;
   options.num_images = 200;

@@ -22,7 +22,7 @@ const Eigen::Vector3d kAhead(0.01, 0.0, -2.0);
 const Eigen::Vector3d kAside(-3.0, 0.0, 0.0);
 
 TEST(FindMapperStartTest, ADriveStraightAheadHasToBeTold) {
-  // Neighbours with most matches, the widest with too few, and between them.
+  // Neighbours with most matches, the widest pair with too few, one in between.
   const std::optional<MapperStart> start = FindMapperStart(
       {MakePair(2, 2000, 0.3, kAhead), MakePair(9, 240, 3.3, kAhead),
        MakePair(17, 75, 7.4, kAside)});
@@ -38,7 +38,7 @@ TEST(FindMapperStartTest, AWideParallaxAheadHasToBeToldToo) {
   EXPECT_TRUE(FindMapperStart({ahead})->must_be_told);
   EXPECT_FALSE(
       FindMapperStart({ahead, MakePair(3, 150, 20.0, kAside)})->must_be_told);
-  // Beyond 16 degrees matches count.
+  // Beyond 16 degrees of parallax the number of matches decides.
   EXPECT_EQ(FindMapperStart({ahead, MakePair(3, 150, 40.0, kAside)})->pair,
             ahead.pair);
 }

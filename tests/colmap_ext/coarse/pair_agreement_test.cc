@@ -44,7 +44,8 @@ TEST(MeasurePairAgreement, AllPairsOfTheTruthAgree) {
   }
 }
 
-// Ten degrees at one place: pairs on either side agree, those across do not.
+// A bend of ten degrees at one place: pairs on either side agree, pairs across
+// do not.
 TEST(MeasurePairAgreement, ABendShowsAtTheImagesBesideIt) {
   for (uint64_t seed = 1; seed <= 3; ++seed) {
     Drive drive(seed);
@@ -69,7 +70,8 @@ TEST(MeasurePairAgreement, NothingToAskIsNoContradiction) {
   EXPECT_TRUE(drive.Measure().IsSound());
 }
 
-// Where nothing tells look-alikes apart the world folds, and that is told.
+// Without odometry aliased pairs may fold the world; the agreement is unsound
+// exactly then.
 TEST(MeasurePairAgreement, TellsFoldedWorlds) {
   int num_folded = 0;
   for (uint64_t seed = 1; seed <= 3; ++seed) {

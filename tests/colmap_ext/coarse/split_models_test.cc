@@ -110,12 +110,12 @@ TEST_F(SplitModelsTest, ModelsInMetresStayWhole) {
   EXPECT_EQ(result_.models.size(), 1);
 }
 
-// Long enough for metres from an accelerometer.
+// Long enough for an accelerometer to determine metres.
 class SplitByInertiaTest : public SplitModelsTest {
  protected:
   SplitByInertiaTest() : SplitModelsTest(150) {}
 
-  // Moves the first 20 images aside, by so many metres.
+  // Shifts the first 20 images by way_m metres.
   void MoveFirst(double way_m) {
     colmap::Reconstruction& model = result_.models[0].reconstruction;
     const double units_per_metre =
@@ -129,7 +129,7 @@ class SplitByInertiaTest : public SplitModelsTest {
     }
   }
 
-  // Of an IMU in the camera's place, without errors.
+  // Motions of an IMU at the camera, without errors.
   void AddInertialMotions() {
     std::vector<TimedPose> images;
     for (const SyntheticImage& image : world_.images) {
@@ -152,8 +152,8 @@ TEST_F(SplitByInertiaTest, TakesAPartOutThatStandsElsewhere) {
     EXPECT_FALSE(edge.IsKept() &&
                  IsFirst(edge.image_id1) != IsFirst(edge.image_id2));
   }
-  // Its matches are right here: they give its true place, which the
-  // accelerometer does not deny.
+  // The matches of the part are right here. They give its true position, which
+  // the accelerometer does not contradict.
   EXPECT_EQ(JoinModels({}, scene_, bearings_, matches_, &result_), 1);
   SortModels(&result_);
   ASSERT_EQ(result_.models.size(), 1);

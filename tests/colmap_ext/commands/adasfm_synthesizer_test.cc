@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// The options of adasfm_synthesizer about what a camera sets itself, as a user
-// gives them: each reaches world.json, or ends with an error.
+// Options of adasfm_synthesizer for values that a camera sets itself (focal
+// length, exposure), as a user gives them: each reaches world.json or causes an
+// error.
 
 #include <gtest/gtest.h>
 

@@ -21,7 +21,7 @@ int RunThat(Status (*run)(int, char**)) {
   return RunCommand(command, 0, nullptr);
 }
 
-// Whatever ends a command, it ends with one line and exit code 1.
+// However a command fails, it prints one line and exits with code 1.
 TEST(RunCommandDeathTest, NothingEndsInACoreDump) {
   EXPECT_EXIT(
       std::exit(RunThat([](int, char**) -> Status { throw std::bad_alloc(); })),
@@ -41,7 +41,7 @@ TEST(RunCommand, LibrariesBringNoThreads) {
   EXPECT_EQ(num_threads, 1);
 }
 
-// As OpenMP does when its threads cannot be had.
+// As OpenMP does when it cannot create its threads.
 Status ExitInTwoThreads(int, char**) {
   std::atomic<int> num_waiting{2};
   std::vector<std::thread> threads;
@@ -64,7 +64,7 @@ TEST(RunCommandDeathTest, TheLineIsThereWhenTwoThreadsEndTheProcess) {
   }
 }
 
-// As while a library's words go to a log.
+// As while a library's output goes to a log.
 TEST(RunCommandDeathTest, TheLineIsThereWhereCerrIsRedirected) {
   EXPECT_EXIT(RunThat([](int, char**) -> Status {
                 std::cerr.rdbuf(std::cout.rdbuf());

@@ -132,7 +132,7 @@ TEST(GlobalOptionsTest, OldNamesAreTaken) {
                        "--AdaSfmGlobal.visual_odometry_length_error now"),
             std::string::npos)
       << notes;
-  // Of a project file too.
+  // Old names in a project file, too.
   const std::string path = testing::TempDir() + "/old_names.ini";
   std::ofstream(path) << "[AdaSfmGlobal]\ncamera_mount_sigma_deg=0.5\n";
   EXPECT_TRUE(ParseWords<GlobalStageOptions>({"--project_path", path},

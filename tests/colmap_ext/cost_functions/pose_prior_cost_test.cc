@@ -133,8 +133,8 @@ TEST_P(PosePriorCostTest, JacobiansBySharedErrorsEqualNumericOnes) {
   }
 }
 
-// A prior with known shared errors agrees, to first order, with the motion that
-// SharedErrors::Correct makes of it.
+// To first order, the residuals of a prior with known shared errors vanish at
+// the motion that SharedErrors::Correct returns.
 TEST_P(PosePriorCostTest, SharedErrorsAreThoseThatCorrectTakesOut) {
   for (int seed = 0; seed < 20; ++seed) {
     Random random(seed);

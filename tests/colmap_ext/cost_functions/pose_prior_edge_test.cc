@@ -44,8 +44,8 @@ TEST(PosePriorEdgeFromPriorTest, TakesWhatTheFlagsClaim) {
   EXPECT_EQ(rotation_only.length_sigma_m, kInfinity);
 }
 
-// A window of an error lasts its span, and ends where the chain of motions
-// does.
+// A window of a shared error ends with its time span or with the chain of
+// motions.
 TEST(AssignSharedErrorWindowsTest, AWindowEndsWithItsSpanOrTheChain) {
   std::vector<PosePriorEdge> edges;
   for (image_t id = 1; id <= 12; ++id) {
@@ -55,7 +55,7 @@ TEST(AssignSharedErrorWindowsTest, AWindowEndsWithItsSpanOrTheChain) {
     edge.image_id2 = id + 1;
     edge.dt_s = 1.0;
   }
-  // No motion of a sensor.
+  // An edge that no sensor measured.
   PosePriorEdge& coarse = edges.emplace_back();
   coarse.image_id1 = 3;
   coarse.image_id2 = 9;

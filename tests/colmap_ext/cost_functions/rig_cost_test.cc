@@ -21,8 +21,7 @@ AdjustedPose RandomPose(Random* random, double distance) {
   return pose;
 }
 
-// Two frames and two cams_from_rig; image k of frame k / 2 with cam_from_rig k
-// % 2.
+// Two frames and two cams_from_rig; image k has frame k / 2 and camera k % 2.
 struct Rig {
   explicit Rig(Random* random) {
     for (int k = 0; k < 2; ++k) frames.push_back(RandomPose(random, 2.0));
@@ -88,8 +87,8 @@ TEST(RigCost, JacobiansEqualNumericOnes) {
     edge.rotation_sigma_rad = edge.translation_sigma_m = 0.5;
     for (const auto term :
          {PosePriorCost::Term::kRotation, PosePriorCost::Term::kTranslation}) {
-      // One cam_from_rig, two cams_from_rig; and a frame beside a pose of its
-      // own.
+      // Two images of one camera, and of two cameras. Below: a pose that is
+      // itself a frame.
       for (const auto& [i, j] : {std::pair(1, 3), std::pair(0, 3)}) {
         const PosePriorCost inner(edge, term, 1.0, rig.poses[i].pose,
                                   rig.poses[j].pose);
@@ -116,15 +115,15 @@ TEST(RigCost, JacobiansEqualNumericOnes) {
   }
 }
 
-// The images of a street, of which each odd one is the right camera of the
-// frame that the one before it begins.
+// The images of a street as frames of a stereo rig: each even image is that of
+// the right camera in the frame that the image before it begins.
 TEST(RigCost, AdjustmentKeepsFramesRigidAndFindsTheExtrinsics) {
   BundleWorldOptions options;
   options.num_images = 20;
   options.num_keypoints_per_image = 60;
   options.pixel_noise_px = 0.3;
   colmap::Reconstruction world = BuildBundleWorld(options);
-  // Keypoints of images that are where the rig has them.
+  // The right images are placed as the rig has them, with keypoints to match.
   const Rigid3d cam1_from_cam0(ExpSo3(Eigen::Vector3d(0.01, -0.02, 0.01)),
                                Eigen::Vector3d(-0.6, 0.01, 0.02));
   Random random(3);
@@ -177,13 +176,13 @@ TEST(RigCost, AdjustmentKeepsFramesRigidAndFindsTheExtrinsics) {
     EXPECT_LT((relative(image_id).ToMatrix() - relative(1).ToMatrix()).norm(),
               1e-12);
   }
-  // Ten frames of 60 keypoints of 0.3 px see the turn to far less than the
-  // 2 mrad by which the calibration is off per axis.
+  // Ten frames of 60 keypoints of 0.3 px determine the rotation far better than
+  // the 2 mrad per axis by which the calibration is off.
   EXPECT_LT(AngleBetweenRad(relative(1).rotation, cam1_from_cam0.rotation),
             3e-4);
   EXPECT_NEAR(relative(1).translation.norm(), cam1_from_cam0.translation.norm(),
               4 * 2e-3);
-  // The length of the drive is held by the baseline alone.
+  // Only the baseline determines the length of the drive.
   const double length =
       (truth.at(1).TargetOriginInSource() - truth.at(19).TargetOriginInSource())
           .norm();

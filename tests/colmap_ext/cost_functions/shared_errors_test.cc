@@ -11,8 +11,8 @@
 namespace adasfm {
 namespace {
 
-// A drive whose gyroscope has a constant bias and whose wheels drive elsewhere
-// than T_imu_wheel says.
+// A drive whose gyroscope has a constant bias and whose direction of driving
+// differs from that of T_imu_wheel.
 std::vector<PosePriorEdge> BiasedPriors(const BundleWorldOptions& options,
                                         const SharedErrors& errors,
                                         Random* random) {
@@ -22,7 +22,7 @@ std::vector<PosePriorEdge> BiasedPriors(const BundleWorldOptions& options,
     edge.rotation_sigma_rad = 2e-4;
     edge.direction_sigma_rad = 5e-3;
     edge.length_sigma_m = 0.02;
-    // To first order, the errors with the other sign put them in.
+    // To first order, correcting by the errors of opposite sign adds them.
     SharedErrors opposite;
     opposite.gyroscope_bias[0] = -errors.gyroscope_bias.at(0);
     opposite.extrinsic_rotation = -errors.extrinsic_rotation;
@@ -48,7 +48,8 @@ SharedErrors LargeSharedErrors() {
 }
 
 TEST(SharedErrorsTest, FindsTheErrorsThatAllPriorsShare) {
-  // Long, with few points: vision alone bends, and the priors decide.
+  // A long drive with few points: vision alone allows bends, and the priors
+  // decide.
   BundleWorldOptions world;
   world.num_images = 200;
   world.num_keypoints_per_image = 40;
@@ -71,17 +72,18 @@ TEST(SharedErrorsTest, FindsTheErrorsThatAllPriorsShare) {
     ASSERT_TRUE(AdjustBundle(options, problem, &without).success);
     EXPECT_LT(AlignedCenterError(world, with),
               0.8 * AlignedCenterError(world, without));
-    // Vision of so few points is worth about 6e-4 rad/s (found by its pull at
-    // several noises), its prior 1e-3: a constant rate is found to a third of
-    // itself, and the direction to the 2e-3 that such a rate turns it by.
+    // Vision with so few points determines the bias to about 6e-4 rad/s
+    // (measured at several noises), its prior to 1e-3. A constant bias is found
+    // to a third of its size, and the direction to the 2e-3 rad by which such a
+    // bias rotates it.
     EXPECT_NEAR(summary.shared_errors.gyroscope_bias.at(0).y(), -1e-3, 4e-4);
     EXPECT_NEAR(summary.shared_errors.driving_direction.y(), 0.02, 2e-3);
     EXPECT_NEAR(summary.shared_errors.driving_direction.x(), 0.01, 2e-3);
   }
 }
 
-// A bias that walks by next to nothing is one constant, however many windows it
-// has: its prior counts once, and not once a window.
+// A bias with next to no random walk is one constant, however many windows it
+// has: its prior counts once, not once per window.
 TEST(SharedErrorsTest, AConstantBiasIsHeldBackOnce) {
   BundleWorldOptions world;
   world.num_images = 200;
@@ -102,7 +104,7 @@ TEST(SharedErrorsTest, AConstantBiasIsHeldBackOnce) {
     EXPECT_TRUE(summary.success);
     return summary.shared_errors.gyroscope_bias;
   };
-  // Of the minute that the drive takes.
+  // One window for the minute that the drive takes.
   const Eigen::Vector3d constant = bias_of(1000.0).at(0);
   EXPECT_GT(constant.norm(), 5e-4);
   const std::map<int, Eigen::Vector3d> walking = bias_of(6.0);
@@ -112,8 +114,8 @@ TEST(SharedErrorsTest, AConstantBiasIsHeldBackOnce) {
   }
 }
 
-// Directions of driving whose errors are smooth in time, as a smoother's are:
-// each is as stated, but neighbours do not average out.
+// Directions of driving with errors that are smooth in time, as after a
+// smoother: each error has the stated sigma, but neighbours do not average out.
 std::vector<PosePriorEdge> DriftingPriors(const BundleWorldOptions& options,
                                           Random* random) {
   constexpr double kDt = 0.3;
@@ -137,7 +139,8 @@ std::vector<PosePriorEdge> DriftingPriors(const BundleWorldOptions& options,
   return edges;
 }
 
-// The centres' errors with the options and with others, summed over six worlds.
+// The errors of the centres with the first and with the second options, summed
+// over six worlds.
 std::pair<double, double> CompareErrors(
     const std::function<std::vector<PosePriorEdge>(const BundleWorldOptions&,
                                                    Random*)>& make_priors,
@@ -175,8 +178,8 @@ TEST(SharedErrorsTest, DirectionsThatErrTogetherDoNotOutvoteVision) {
   EXPECT_LT(with_m, 0.8 * without_m);
 }
 
-// Wheels on gravel: the length of each motion errs by what the one before it
-// did, and a little of its own.
+// Wheels on gravel: the relative length errors of consecutive motions are
+// correlated, with a time constant of 3 s.
 std::vector<PosePriorEdge> LengthDriftPriors(const BundleWorldOptions& options,
                                              double sigma_ratio,
                                              Random* random) {

@@ -161,7 +161,7 @@ TEST_F(MergeDatabasesTest, ShardsGiveTheWholeInAnyOrderAndEveryForm) {
     const std::string whole = Copy("form.db", "");
     ReshapeDatabase(whole, form);
     std::vector<DatabaseToMerge> shards = CutIntoShards(whole);
-    // New numbers for frames; nothing but frame_data refers to them.
+    // Frames get new ids, to which nothing but frame_data refers.
     std::vector<std::string> without;
     if (form == "4.2, other frames") without = {"frames", "frame_data"};
     const std::string merged = folder_.File("merged " + form);
@@ -206,7 +206,7 @@ TEST_F(MergeDatabasesTest, TheSameAgainChangesNothing) {
 TEST_F(MergeDatabasesTest, NewImagesDoNotMoveTheIdsThatAreThere) {
   const std::vector<DatabaseToMerge> shards = CutIntoShards();
   const std::string output = folder_.File("merged.db");
-  // The later images come first, and keep the first ids.
+  // The later images are merged first, and keep the first ids.
   ASSERT_NO_FATAL_FAILURE(Merge({shards[1]}, output));
   const std::string before = Dump(output);
   ASSERT_NO_FATAL_FAILURE(Merge({shards[0]}, output));
@@ -217,7 +217,7 @@ TEST_F(MergeDatabasesTest, NewImagesDoNotMoveTheIdsThatAreThere) {
   EXPECT_EQ(images[6].name, world_.images[0].name);
   // One camera took them all.
   EXPECT_EQ(ReadCameras(&database).size(), 1);
-  // Matches of the other order are turned round.
+  // Matches are swapped where the order of a pair's images changes.
   ASSERT_NO_FATAL_FAILURE(Merge({shards[2], shards[3]}, output));
   SqliteConnection merged(output, SqliteConnection::Mode::kRead);
   SqliteConnection whole(whole_, SqliteConnection::Mode::kRead);
@@ -282,7 +282,7 @@ TEST_F(MergeDatabasesTest, SessionsAreKeptApartByTheirPrefixes) {
   for (const RelativePosePrior& prior : both->tables.priors) {
     EXPECT_EQ(prior.image_id1 <= kNumImages, prior.image_id2 <= kNumImages);
   }
-  // Wheels are of each session.
+  // A wheel scale is valid for one session only.
   EXPECT_TRUE(one->tables.wheel_scale.has_value());
   EXPECT_FALSE(both->tables.wheel_scale.has_value());
   // Each session's ids follow the order of its images.
@@ -337,7 +337,7 @@ TEST_F(MergeDatabasesTest, CamerasAreSharedOrNot) {
   const auto shared = MergeDatabases({}, shards, folder_.File("shared.db"));
   ASSERT_TRUE(shared.ok()) << shared.status().message();
   EXPECT_EQ(shared->num_cameras, 1);
-  // Another focal length is another camera.
+  // A camera of another size is another camera.
   SqliteConnection(shards[1].path, SqliteConnection::Mode::kWrite)
       .Execute("UPDATE cameras SET width = width + 1");
   const auto differing =

@@ -119,7 +119,7 @@ TEST_F(PriorCorrectionsTest, TurnGravityToo) {
   EXPECT_EQ(gravity(false), Eigen::Vector3d::UnitY());
 }
 
-// The priors of an IMU without wheels, but for the last one.
+// Priors of an IMU without wheels, except for the last one.
 class InertialLengthsTest : public PriorCorrectionsTest {
  protected:
   InertialLengthsTest() {
@@ -150,7 +150,7 @@ class InertialLengthsTest : public PriorCorrectionsTest {
     return RewriteTwoViewGeometries(path_, {}, {}, correction, lengths_);
   }
 
-  // Whether the priors have got their lengths.
+  // Whether the priors have the inertial lengths.
   bool AreApplied() const {
     const StatusOr<SceneData> scene = ReadSceneData(path_, SceneDataOptions());
     EXPECT_TRUE(scene.ok()) << scene.status().message();
@@ -158,7 +158,7 @@ class InertialLengthsTest : public PriorCorrectionsTest {
     return scene->priors[0].HasLength();
   }
 
-  // The one of a gap.
+  // The index of the prior across a gap.
   static constexpr size_t kBridge = 1;
   std::vector<InertialLength> lengths_;
 };
@@ -215,7 +215,7 @@ TEST_F(InertialLengthsTest, GoToPriorsWithoutLength) {
               lengths_[k].length_m * Eigen::Vector3d::UnitZ());
     EXPECT_NEAR(prior.covariance(5, 5), 0.01, 1e-12);
   }
-  // The last one knows its own.
+  // The last prior keeps its own length.
   EXPECT_EQ(scene->priors.back().flags, tables_.priors.back().flags);
   EXPECT_LT((scene->priors.back().cam2_from_cam1.translation -
              corrected_.back().cam2_from_cam1.translation)

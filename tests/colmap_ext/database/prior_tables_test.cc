@@ -80,7 +80,7 @@ class PriorTablesTest : public testing::Test {
     tables.length_drift_ratio = random.Uniform(0.001, 0.1);
     tables.wheel_scale = WheelScale{random.Uniform(0.98, 1.02),
                                     random.Uniform(0.001, 0.01), 0.01};
-    // The last one has seen no translation.
+    // The last prior has no translation.
     RelativePosePrior& last = tables.priors.back();
     last.flags = kPriorRotation;
     last.covariance.bottomRows<3>().setZero();
@@ -90,7 +90,7 @@ class PriorTablesTest : public testing::Test {
     return tables;
   }
 
-  // What the last tables of MakeTables give, before adasfm_global and behind.
+  // The scene of the last tables, before and after adasfm_global.
   void ExpectScene(bool has_lengths);
 
   void Execute(const std::string& sql) {
@@ -185,7 +185,7 @@ TEST_F(PriorTablesTest, ReadsWhatWasWrittenLast) {
     EXPECT_EQ(loaded->num_ignored_rows, 0);
     ExpectEqual(loaded->tables, tables);
   }
-  // Behind adasfm_global motions count where a length was measured.
+  // After adasfm_global motions are used if a length was measured.
   for (const bool has_lengths : {true, false}) {
     if (!has_lengths) {
       Execute("UPDATE adasfm_relative_pose_priors SET flags = 1");
@@ -212,8 +212,7 @@ void PriorTablesTest::ExpectScene(bool has_lengths) {
   }
 }
 
-// As written before imports stated it, and again by one without a gyroscope.
-// Only the tables of COLMAP and of the version stay.
+// Of our tables only adasfm_meta stays, without the position origin.
 TEST_F(PriorTablesTest, RemovesAllThatItWrote) {
   PriorTables tables = MakeTables(1);
   tables.rig_cameras[1] = {1, true, Rigid3d()};
@@ -233,6 +232,7 @@ TEST_F(PriorTablesTest, RemovesAllThatItWrote) {
   EXPECT_FALSE(origin.Step());
 }
 
+// Databases written before shared errors existed, or without a gyroscope.
 TEST_F(PriorTablesTest, DatabasesWithoutSharedErrorsAreRead) {
   PriorTables tables = MakeTables(1);
   ASSERT_TRUE(WritePriorTables(path_, tables).ok());
@@ -252,8 +252,7 @@ TEST_F(PriorTablesTest, DatabasesWithoutSharedErrorsAreRead) {
   ExpectEqual(loaded->tables, tables);
 }
 
-// As written before there were such motions, and again after an import with
-// wheels.
+// Databases written before inertial motions existed, or without them.
 TEST_F(PriorTablesTest, DatabasesWithoutInertialMotionsAreRead) {
   PriorTables tables = MakeTables(1);
   ASSERT_TRUE(WritePriorTables(path_, tables).ok());
@@ -269,7 +268,7 @@ TEST_F(PriorTablesTest, DatabasesWithoutInertialMotionsAreRead) {
   ExpectEqual(loaded->tables, tables);
 }
 
-// As written when only drives without wheels had them.
+// Databases written when only drives without wheels had inertial motions.
 TEST_F(PriorTablesTest, InertialMotionsWithoutWheelsAreRead) {
   PriorTables tables = MakeTables(1);
   ASSERT_TRUE(WritePriorTables(path_, tables).ok());
@@ -285,8 +284,8 @@ TEST_F(PriorTablesTest, InertialMotionsWithoutWheelsAreRead) {
   ASSERT_TRUE(WritePriorTables(path_, MakeTables(2)).ok());
 }
 
-// Two robots that drive at the same time: what consecutive motions share is
-// counted along one drive.
+// Two robots that drive at the same time: priors are read drive by drive, as
+// consecutive motions share errors along one drive.
 TEST_F(PriorTablesTest, DrivesAtTheSameTimeFollowEachOther) {
   PriorTables tables = MakeTables(1);
   const RelativePosePrior prior = tables.priors.front();
@@ -307,7 +306,7 @@ TEST_F(PriorTablesTest, DrivesAtTheSameTimeFollowEachOther) {
   EXPECT_EQ(firsts, (std::vector<image_t>{1, 3, 2, 4}));
 }
 
-// As written before there were positions, and again after an import without.
+// Databases written before positions existed, or without them.
 TEST_F(PriorTablesTest, DatabasesWithoutPositionsAreRead) {
   PriorTables tables = MakeTables(1);
   ASSERT_TRUE(WritePriorTables(path_, tables).ok());
@@ -353,7 +352,7 @@ TEST_F(PriorTablesTest, NamesDecideWhenIdsChange) {
       "DELETE FROM images WHERE image_id = 6;");
   const StatusOr<LoadedPriorTables> loaded = ReadPriorTables(path_);
   ASSERT_TRUE(loaded.ok()) << loaded.status().message();
-  // Its time, its gravity, one prior, one position and one inertial motion.
+  // Of image 6: time, gravity, one prior, one position, one inertial motion.
   EXPECT_EQ(loaded->num_ignored_rows, 5);
   ASSERT_EQ(loaded->tables.inertial_motions.size(), 4);
   EXPECT_EQ(loaded->tables.inertial_motions[1].image_id2, 103);
@@ -372,7 +371,7 @@ TEST_F(PriorTablesTest, RefusesRowsItCouldNotHaveWritten) {
       "UPDATE adasfm_relative_pose_priors SET qvec = zeroblob(32);",
       "UPDATE adasfm_relative_pose_priors SET tvec = zeroblob(23);",
       "UPDATE adasfm_relative_pose_priors SET flags = 1024;",
-      // What adasfm_global found is in a table of its own.
+      // Lengths that adasfm_global found are in a table of their own.
       "UPDATE adasfm_relative_pose_priors SET flags = flags | 16;",
       "UPDATE adasfm_relative_pose_priors SET dt_ns = -1;",
       "UPDATE adasfm_gravity SET gravity_in_cam = zeroblob(24);",

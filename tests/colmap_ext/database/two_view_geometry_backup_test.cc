@@ -67,7 +67,8 @@ class TwoViewGeometryBackupTest : public testing::Test {
     std::filesystem::copy_file(path_, folder_.File(name));
   }
 
-  // Poses that mean "none" in COLMAP 3, and matrices, on pairs of every kind.
+  // Writes poses that mean "none" in COLMAP 3, and zero matrices, to pairs of
+  // every kind.
   void WriteMissingPoses() {
     const std::string every =
         " WHERE pair_id IN (SELECT pair_id FROM "
@@ -121,7 +122,7 @@ TEST_F(TwoViewGeometryBackupTest, TwiceEqualsOnce) {
   ASSERT_TRUE(RewriteTwoViewGeometries(path_, rows_, removed_).ok());
   EXPECT_EQ(Dump("two_view_geometries"), once);
   EXPECT_EQ(Dump(kTwoViewGeometryBackupTable), kept_once);
-  // Another choice starts from the originals too.
+  // A rewrite with other rows starts from the originals too.
   const std::vector<NewTwoViewGeometry> fewer(rows_.begin(), rows_.begin() + 2);
   ASSERT_TRUE(RewriteTwoViewGeometries(path_, fewer, {}).ok());
   ASSERT_TRUE(RewriteTwoViewGeometries(path_, rows_, removed_).ok());
@@ -159,7 +160,7 @@ TEST_F(TwoViewGeometryBackupTest, ColmapReadsTheNewRows) {
     const Eigen::Matrix3d E =
         Hat(direction) * row.cam2_from_cam1.rotation.toRotationMatrix();
     EXPECT_LT((read.E - E).norm(), 1e-12);
-    // F joins pixels as E joins rays.
+    // F relates pixels as E relates rays.
     const Eigen::Matrix3d K = database.ReadCamera(1).CalibrationMatrix();
     EXPECT_LT((K.transpose() * read.F * K - E).norm(), 1e-9);
   }
@@ -179,11 +180,11 @@ TEST_F(TwoViewGeometryBackupTest, RowsThatColmapWroteSinceStay) {
   EXPECT_EQ(restored->num_restored, rows_.size() + removed_.size() - 2);
   const std::string dump = Dump("two_view_geometries");
   EXPECT_NE(dump.find(pair2 + "|0|2|X''|1|"), std::string::npos);
-  // What did not go back is not lost.
+  // Rows that were not restored stay in the backup.
   const std::string kept = Dump(kTwoViewGeometryBackupTable);
   EXPECT_EQ(std::count(kept.begin(), kept.end(), '\n'), 2);
   EXPECT_EQ(kept.find(pair1 + "|") == std::string::npos, false);
-  // Verified anew, they are the originals of the next run.
+  // The rows that COLMAP verified anew are the originals of the next run.
   ASSERT_TRUE(RewriteTwoViewGeometries(path_, rows_, removed_).ok());
   EXPECT_EQ(RestoreTwoViewGeometries(path_)->num_outdated, 0);
   EXPECT_EQ(Dump("two_view_geometries"), dump);
@@ -243,7 +244,7 @@ TEST_F(TwoViewGeometryBackupTest, KeepsColumnsOfANewerColmap) {
     statement.Step();
     return statement.Int(0);
   };
-  // The rows of ours have no such camera.
+  // Rewritten rows have no such cameras.
   EXPECT_EQ(count("camera1 IS NULL AND camera2 IS NULL"), rows_.size());
   ASSERT_TRUE(RestoreTwoViewGeometries(path_).ok());
   EXPECT_EQ(count("camera1 = X'0102' AND camera2 = X'03'"),

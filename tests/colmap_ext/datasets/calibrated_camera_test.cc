@@ -49,7 +49,7 @@ TEST_F(SensorsCameraTest, DistortionsGoToTheirModels) {
       "distortion_coeffs: [0.25, -0.5, 0.125, 0]}");
   ASSERT_TRUE(camera.has_value());
   EXPECT_EQ(camera->model, "OPENCV_FISHEYE");
-  // OpenCV's own calibration has five.
+  // OpenCV's own calibration has five coefficients.
   camera = Read(
       "cam0: {intrinsics: [500, 500, 320, 240], distortion_model: radtan, "
       "distortion_coeffs: [0.25, -0.5, 0.125, 0, 0.0625]}");
@@ -59,7 +59,7 @@ TEST_F(SensorsCameraTest, DistortionsGoToTheirModels) {
             "500,500,320.5,240.5,0.25,-0.5,0.125,0,0.0625,0,0,0");
 }
 
-// Photos of another camera, no intrinsics, no file: as without.
+// Several cameras, no intrinsics, or no readable file: no camera.
 TEST_F(SensorsCameraTest, WhatItDoesNotKnowIsLeftOut) {
   const std::string pinhole = "intrinsics: [500, 500, 320, 240]";
   EXPECT_TRUE(Read("cam0: {" + pinhole + "}").has_value());
@@ -69,7 +69,8 @@ TEST_F(SensorsCameraTest, WhatItDoesNotKnowIsLeftOut) {
   EXPECT_FALSE(*ReadSensorsCamera(folder_.File("none.yaml")));
 }
 
-// A focal length guessed in its place would spoil the model without a word.
+// Unusable intrinsics are errors: a guessed focal length would silently spoil
+// the model.
 TEST_F(SensorsCameraTest, WhatIsWrongWithItIsSaid) {
   const std::string pinhole = "intrinsics: [500, 500, 320, 240]";
   const auto expect = [this](const std::string& cam0, const std::string& why) {

@@ -236,7 +236,7 @@ TEST_F(KittiTest, RawDrive) {
       ReadSensors(layout).cam_from_imu,
       Rigid3d(rectified_from_cam0, shift) * cam0_from_velo * velo_from_imu);
   EXPECT_NEAR(layout.imu_period_s, 0.1, 1e-9);
-  // The same clock as the IMU's.
+  // Images and IMU have the same clock.
   const StatusOr<std::vector<ImageTime>> times =
       ReadImageTimes(folder_.Write("times.csv", layout.image_times_text));
   ASSERT_TRUE(times.ok()) << times.status().message();

@@ -124,7 +124,7 @@ TEST(EvaluatePoses, MetricAlignmentSeesAWrongScale) {
       EvaluatePoses(Transform(larger, truth), truth);
   ASSERT_TRUE(evaluation.ok());
   EXPECT_NEAR(evaluation->sim3.scale, 1.0 / 1.1, 1e-9);
-  // A tenth of the spread of the centres about their mean.
+  // The error is a tenth of the spread of the centres about their mean.
   Eigen::Vector3d mean = Eigen::Vector3d::Zero();
   for (const auto& [name, pose] : truth) {
     mean += pose.TargetOriginInSource() / truth.size();
@@ -146,7 +146,8 @@ TEST(EvaluatePoses, ErrorsAreThoseOfTheNoise) {
     const StatusOr<Evaluation> evaluation = EvaluatePoses(
         Perturb(truth, rotation_sigma_rad, center_sigma_m, &random), truth);
     ASSERT_TRUE(evaluation.ok());
-    // The norm of three normals; 1,200 of them tell it to 4 % (2 sigma).
+    // The norm of three normal errors; 1,200 of them determine it to 4 % (2
+    // sigma).
     EXPECT_NEAR(evaluation->sim3_least_squares.translation_rmse_m,
                 std::sqrt(3.0) * center_sigma_m, 0.05 * center_sigma_m * 2.0);
     // The mean of a Maxwell distribution is 1.596 sigma.
@@ -165,7 +166,7 @@ TEST(EvaluatePoses, OrientationsAreComparedOnAStraightRoadToo) {
       const Eigen::Vector3d center = Eigen::Vector3d::UnitX() * x++;
       pose = CamFromWorldWithCenter(pose.rotation, center);
     }
-    // A few images look somewhere else altogether.
+    // One image in ten has a grossly wrong orientation.
     NamedPoses model = Perturb(truth, rotation_sigma_rad, 0.01, &random);
     int count = 0;
     for (auto& [name, pose] : model) {
@@ -175,8 +176,8 @@ TEST(EvaluatePoses, OrientationsAreComparedOnAStraightRoadToo) {
     }
     const StatusOr<Evaluation> evaluation = EvaluatePoses(model, truth);
     ASSERT_TRUE(evaluation.ok());
-    // With one in ten wild the median is the 0.556-quantile of a Maxwell
-    // distribution, 1.64 sigma; 400 samples tell it to 0.04 sigma.
+    // With one outlier in ten the median is the 0.556-quantile of a Maxwell
+    // distribution, 1.64 sigma; 400 samples determine it to 0.04 sigma.
     EXPECT_NEAR(evaluation->orientation_median_deg,
                 RadToDeg(1.64 * rotation_sigma_rad), 0.1);
   }
@@ -255,7 +256,7 @@ TEST(ReadGroundTruth, LinesModelAndTrajectoryAgree) {
           1e-5);
     }
   }
-  // Further apart than allowed, nothing is interpolated.
+  // Between poses further apart than allowed nothing is interpolated.
   GroundTruthOptions strict;
   strict.max_time_gap_s = 1e-6;
   const StatusOr<NamedPoses> sparse = ReadGroundTruth(

@@ -49,8 +49,9 @@ cv::Mat NoiseImage(int seed) {
   return image;
 }
 
-// The scale of a spot's strongest answer in a difference of Gaussians is its
-// own sigma; 8 bits and three scales an octave leave a tenth.
+// A Gaussian spot has its strongest response in a difference of Gaussians at
+// the scale of its own sigma; 8 bits and three scales an octave leave an error
+// of a tenth.
 TEST(SiftFeatures, KeypointsAreWhereTheSpotsAre) {
   for (const double sigma : {2.0, 3.0, 5.0}) {
     for (const double shift : {0.0, 0.3, 0.7}) {
@@ -107,8 +108,8 @@ TEST(SiftFeatures, DescriptorsHaveTheLengthOfRootSift) {
   }
 }
 
-// A quarter turn of the image turns the orientations with it and leaves the
-// descriptors alone: matched, each keypoint is the turned one.
+// Rotating the image by 90 deg rotates the orientations and leaves the
+// descriptors unchanged: each keypoint matches its rotated counterpart.
 TEST(SiftFeatures, ATurnedImageGivesTurnedKeypoints) {
   const cv::Mat image = NoiseImage(3);
   cv::Mat turned;

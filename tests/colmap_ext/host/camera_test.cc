@@ -43,8 +43,8 @@ TEST(ComputeBearing, InvertsTheProjectionAndItsDerivative) {
       ASSERT_TRUE(projected.has_value());
       // COLMAP's inversion stops at steps of 1e-5 focal lengths.
       EXPECT_LT((*projected - pixel).norm(), 2e-2);
-      // One pixel on, seen through the Jacobian: second order remains, below
-      // (1 / f)^2.
+      // The Jacobian predicts the bearing of a pixel nearby. The error is of
+      // second order, below (1 / f)^2 for one pixel.
       const Eigen::Vector2d step(random.Gaussian(0.5), random.Gaussian(0.5));
       const std::optional<Bearing> moved = ComputeBearing(camera, pixel + step);
       ASSERT_TRUE(moved.has_value());

@@ -37,7 +37,7 @@ class DatabaseTest : public testing::Test {
     SqliteConnection(path_, SqliteConnection::Mode::kWrite).Execute(sql);
   }
 
-  // The file is refused with this in the message, and stays as it is.
+  // Expects that the file is rejected with this message and stays as it is.
   void ExpectRefused(const std::string& path, const std::string& message) {
     const std::string before = ReadBytes(path);
     const Status status = CheckDatabase(path);
@@ -84,7 +84,7 @@ TEST_F(DatabaseTest, ReadsWhatANewerColmapWroteButNotThroughTheLibrary) {
   ASSERT_TRUE(scene.ok()) << scene.status().message();
   EXPECT_EQ(scene->pairs.size(), before->pairs.size());
 
-  // Not even the version that the file says changes.
+  // No command changes the file, not even its version.
   const std::string bytes = ReadBytes(path_);
   const ProgressCallback progress = [](const std::string&, double) {};
   const FeatureOptions options;
@@ -177,7 +177,7 @@ TEST_F(DatabaseTest, ReadsTheSceneAndChangesNothing) {
     EXPECT_EQ(read.name, image.name);
     ASSERT_EQ(read.keypoints.size(), image.keypoints.size());
     for (size_t i = 0; i < read.keypoints.size(); ++i) {
-      // The table holds floats.
+      // The table stores floats.
       EXPECT_LT((read.keypoints[i] - image.keypoints[i]).norm(), 1e-3);
     }
     EXPECT_FALSE(read.timestamp_ns.has_value());

@@ -17,7 +17,7 @@ namespace {
 
 using testing::HasSubstr;
 
-// What COLMAP wrote is counted, not what it was told to write.
+// The rows that COLMAP wrote are counted, not those that it should write.
 TEST(Features, MissingRowsAreFound) {
   const TemporaryFolder folder;
   const std::string path = folder.File("database.db");

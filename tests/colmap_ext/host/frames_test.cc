@@ -56,7 +56,7 @@ TEST_F(FramesTest, AreNeededForOtherIdsOnly) {
 
 TEST_F(FramesTest, RigsOfSeveralCamerasAreFound) {
   ReshapeDatabase(path_, "4.2");
-  // Camera 2 is known, camera 3 is not.
+  // The pose of camera 2 is known, that of camera 3 is not.
   Execute(
       "INSERT INTO rig_sensors VALUES "
       "(1, 2, 0, X'000000000000F03F000000000000000000000000000000000000000000"
@@ -108,10 +108,10 @@ TEST_F(FramesTest, FilesSayTheIdsAndPosesOfRegisteredImages) {
 
   std::string rigs = ReadBytes(folder_.File("0/rigs.bin"));
   EXPECT_EQ(Take<uint64_t>(&rigs), 1);
-  EXPECT_EQ(Take<uint32_t>(&rigs), 3);  // the rig
-  EXPECT_EQ(Take<uint32_t>(&rigs), 1);  // of one
-  EXPECT_EQ(Take<int32_t>(&rigs), 0);   // camera,
-  EXPECT_EQ(Take<uint32_t>(&rigs), 2);  // this
+  EXPECT_EQ(Take<uint32_t>(&rigs), 3);  // rig id
+  EXPECT_EQ(Take<uint32_t>(&rigs), 1);  // number of cameras
+  EXPECT_EQ(Take<int32_t>(&rigs), 0);   // camera, as type
+  EXPECT_EQ(Take<uint32_t>(&rigs), 2);  // its camera id
   EXPECT_TRUE(rigs.empty());
 
   std::string file = ReadBytes(folder_.File("0/frames.bin"));
@@ -128,9 +128,9 @@ TEST_F(FramesTest, FilesSayTheIdsAndPosesOfRegisteredImages) {
     EXPECT_EQ(Take<uint64_t>(&file), image_id);
   }
   EXPECT_TRUE(file.empty());
-  // Models with the two files are read as others.
+  // Models with the two files are read like other models.
   EXPECT_EQ(ReadModel(folder_.File("0"))->NumRegImages(), 2);
-  // Nothing half: an image without a frame is an error.
+  // An image without a frame is an error.
   frames.frames.erase(5);
   EXPECT_FALSE(WriteModelFolder(folder_.Path(), {&model}, frames).ok());
 }
@@ -188,7 +188,8 @@ TEST_F(FramesTest, FilesSayTheRigOfTheModel) {
   for (const uint32_t frame_id : {1, 2}) {
     EXPECT_EQ(Take<uint32_t>(&file), frame_id);
     EXPECT_EQ(Take<uint32_t>(&file), 3);
-    // Both have the pose of the reference camera, seen or not.
+    // Both frames have the pose of the reference camera, with or without its
+    // image.
     for (const double value : {0.5, 0.5, -0.5, 0.5, 1.0, 2.0, 3.0}) {
       EXPECT_NEAR(Take<double>(&file), value, 1e-12);
     }
@@ -217,7 +218,7 @@ TEST_F(FramesTest, FilesAreReadAsWritten) {
     folder_.Write("0/frames.bin", file.substr(0, size));
     EXPECT_FALSE(ReadFrameFiles(folder_.File("0")).ok()) << size;
   }
-  // What is no camera belongs to no model.
+  // Sensors other than cameras are ignored.
   std::string imu = file;
   imu[8 + 2 * 4 + 7 * 8 + 4] = 1;
   folder_.Write("0/frames.bin", imu);

@@ -18,7 +18,7 @@ constexpr image_t kFirst = 10;
 constexpr image_t kSecond = 11;
 constexpr image_t kLonely = 1000;
 
-// A world's images, and one without matches.
+// A world's images, and one image without matches.
 class HostMapperTest : public testing::Test {
  protected:
   HostMapperTest() {
@@ -47,7 +47,7 @@ class HostMapperTest : public testing::Test {
     mapper->TriangulateImage(image_id, 0.1);
   }
 
-  // All images, from two of them on.
+  // Maps all images, starting from two of them.
   std::map<image_t, Rigid3d> Map() const {
     colmap::Reconstruction model;
     HostMapper mapper(&model);
@@ -105,12 +105,12 @@ TEST_F(HostMapperTest, NextImagesSeeEnoughPointsMostFirst) {
   EXPECT_FALSE(
       mapper.RegisterNextImage(images[0], 8.0, static_cast<int>(most) + 1));
   EXPECT_FALSE(model.IsImageRegistered(images[0]));
-  // It comes last now, and may be tried again.
+  // The image comes last after the failure, and may be tried again.
   EXPECT_EQ(mapper.FindNextImages(10).back(), images[0]);
   EXPECT_TRUE(mapper.RegisterNextImage(images[0], 8.0, 10));
 }
 
-// Adjustments and filters go on without the matches, which take memory.
+// Filters work without the matches, which are released to save memory.
 TEST_F(HostMapperTest, FiltersAlikeWithoutMatches) {
   std::vector<size_t> num_points;
   for (const bool releases : {false, true}) {

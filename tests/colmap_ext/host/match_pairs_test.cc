@@ -59,8 +59,8 @@ class MatchPairsTest : public testing::Test {
     return num_guided;
   }
 
-  // The true motions, `error` off, as if known to half a milliradian and a
-  // hundredth of a metre.
+  // Predicts the true motions with the given error, and sigmas of half a
+  // milliradian and a hundredth of a metre.
   MotionPredictor Predict(const Rigid3d& error) {
     return [this, error](const ImagePair& pair) {
       PredictedMotion motion;
@@ -136,7 +136,7 @@ TEST_F(MatchPairsTest, ThreadsAndInterruptionsDoNotMatter) {
   EXPECT_EQ(Rows(again), rows);
 }
 
-// What is found is there, and what COLMAP's matcher finds is found.
+// The matches are true, and include nearly all that COLMAP's matcher finds.
 TEST_F(MatchPairsTest, MatchesAreTrueAndCompareWithTheHosts) {
   const std::string ours = MakeDatabase("ours.db");
   const std::string host = MakeDatabase("host.db");
@@ -179,7 +179,7 @@ TEST_F(MatchPairsTest, AGoodPredictionGuides) {
   EXPECT_GE(num_true_guided, num_true_plain);
 }
 
-// Elsewhere than predicted: as if nothing had been predicted.
+// A prediction that the matches contradict does not change the result.
 TEST_F(MatchPairsTest, AWrongPredictionChangesNothing) {
   const std::string plain = MakeDatabase("plain.db");
   const std::string misled = MakeDatabase("misled.db");

@@ -16,7 +16,7 @@ namespace {
 namespace fs = std::filesystem;
 using testing::HasSubstr;
 
-// With so many images of one camera.
+// A model with num_images images of one camera.
 colmap::Reconstruction MakeModel(int num_images) {
   colmap::Reconstruction model;
   colmap::Camera camera;
@@ -57,7 +57,7 @@ TEST_F(ModelFolderTest, ReplacesItsOwnModels) {
 
 TEST_F(ModelFolderTest, ForeignFilesStay) {
   ASSERT_TRUE(Write(3).ok());
-  // In the place of a model, of one that would be removed, and beyond.
+  // In the folder of a model, of one that would be removed, and of neither.
   for (const char* name : {"0", "2", "17"}) {
     fs::create_directories(folder_.File(name));
     const std::string photo =

@@ -10,7 +10,7 @@
 namespace adasfm {
 namespace {
 
-// Of two that work beside each other either may end first.
+// Two captures may overlap, and either may end first.
 TEST(CaptureOutput, OneCapturesAtATime) {
   const TemporaryFolder folder;
   std::streambuf* const before = std::cout.rdbuf();

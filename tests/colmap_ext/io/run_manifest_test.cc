@@ -75,7 +75,7 @@ TEST(RunManifest, DoneIsBelievedOnlyWithItsResult) {
                          }},
                         [&](const std::string& text) { messages += text; });
   };
-  // Work that leaves no result is not done, however often.
+  // Work that leaves no result does not count as done, however often it runs.
   works = false;
   for (int i = 0; i < 2; ++i) {
     const StatusOr<double> result = run();
@@ -87,7 +87,7 @@ TEST(RunManifest, DoneIsBelievedOnlyWithItsResult) {
   EXPECT_EQ(num_works, 3);
   ASSERT_TRUE(run().ok());
   EXPECT_EQ(num_works, 3);
-  // A result that is gone is made again, from what else is there.
+  // A missing result is made again without a reset, and later steps are new.
   is_there = false;
   ASSERT_TRUE(manifest.Begin("later", {}).ok());
   ASSERT_TRUE(run().ok());

@@ -38,7 +38,7 @@ TEST_F(RunProgramTest, FailuresSayWhatTheProgramSaid) {
             std::string::npos);
 }
 
-// Not before the program has ended.
+// RunProgram throws only after the program has ended.
 TEST_F(RunProgramTest, AThrowEndsTheProgram) {
   EXPECT_THROW(
       RunProgram({"yes"}, folder_.File("log"),

@@ -9,7 +9,7 @@
 namespace adasfm {
 namespace {
 
-// Of the world's camera as it is, or said to be of another model.
+// The lens error if the camera's model and parameters are stated as given.
 LensError MeasureAdjusted(const BundleWorldOptions& options,
                           const std::string& stated_model,
                           const std::vector<double>& stated_params) {
@@ -38,7 +38,8 @@ BundleWorldOptions World(const std::string& camera_model) {
   options.num_images = 40;
   options.num_keypoints_per_image = 300;
   options.pixel_noise_px = 0.2;
-  // Looking along the drive, points farther off or nearer explain any lens.
+  // If the camera only looked along the drive, changed depths of points could
+  // explain any lens.
   options.weave_rad = 0.8;
   options.camera_model = camera_model;
   if (camera_model != "PINHOLE") {
@@ -60,7 +61,8 @@ TEST(LensErrorTest, RightModelsHaveNone) {
   }
 }
 
-// This drive looks along the street, so that points take up much of it.
+// The camera looks along the street, so that the points absorb much of the
+// error.
 TEST(LensErrorTest, AnotherModelShows) {
   const std::vector<double> no_distortion = {480, 485, 400, 250};
   const std::vector<double> barrel = {480, 485, 400, 250, -0.15, 0, 0, 0};
@@ -78,7 +80,7 @@ TEST(LensErrorTest, AnotherModelShows) {
   }
 }
 
-// The sigma is that of the residuals; what is shared stays.
+// The sigma is that of the residuals; the shared error stays.
 TEST(LensErrorTest, NoiseHidesIt) {
   BundleWorldOptions options = World("PINHOLE");
   const std::vector<double> barrel = {480, 485, 400, 250, -0.05, 0, 0, 0};

@@ -44,15 +44,15 @@ TEST(InitialPair, HasTheParallaxAskedFor) {
         EXPECT_LE(pairs[i].num_points, pairs[i - 1].num_points);
       }
     }
-    // Of matches that the poses do not explain there are none.
+    // If the poses explain no matches, there are no pairs.
     InitialPairOptions strict;
     strict.max_epipolar_error_px = 1e-9;
     EXPECT_TRUE(FindInitialPairs(strict, *scene, 3).empty());
   }
 }
 
-// P_gb between registered images in another frame is the true pose there when
-// the coarse motions are true.
+// P_gb, computed from registered images in another frame, is the true pose in
+// that frame if the coarse motions are true.
 TEST(GlobalCandidate, FollowsTheLocalFrame) {
   for (uint64_t seed = 1; seed <= 3; ++seed) {
     MapperWorldOptions options = SmallWorld(seed);
@@ -131,7 +131,8 @@ TEST(CoarseEdges, AreThoseOfTheAugmentedGraph) {
   EXPECT_EQ(found, expected);
 }
 
-// Where keypoints hardly count, the part is bent as the coarse model is.
+// If keypoints have hardly any weight, the part takes the shape of the coarse
+// model.
 TEST(LocalMapper, CoarseMotionsDrawThePart) {
   const MapperWorld world = BuildMapperWorld(SmallWorld(1));
   const auto mean_angle_to_coarse_rad = [&world](bool use_coarse_motions) {

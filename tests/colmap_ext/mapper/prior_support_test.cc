@@ -15,7 +15,7 @@
 namespace adasfm {
 namespace {
 
-// The indices of the violated priors; all others can be told.
+// The indices of the violated priors; expects that all priors can be tested.
 std::vector<size_t> FindViolated(const std::vector<RelativePosePrior>& priors,
                                  const colmap::Reconstruction& model) {
   std::vector<size_t> violated;
@@ -56,7 +56,7 @@ class IsViolatedTest : public testing::TestWithParam<uint64_t> {
     }
   }
 
-  // The images from the 60th on are moved as one, as a wrong loop moves them.
+  // Moves the images from the 60th on rigidly, as a false loop closure does.
   void MoveRest(const Rigid3d& world_from_moved) {
     for (const image_t image_id : model_.RegImageIds()) {
       if (image_id < kFirstMoved) continue;
@@ -91,7 +91,7 @@ TEST_P(IsViolatedTest, AFoldTearsThePriorsThere) {
   EXPECT_EQ(FindViolated(priors_, model_), PriorsAcross());
 }
 
-// Of a gyroscope alone.
+// Priors of a gyroscope alone.
 TEST_P(IsViolatedTest, AWrongTurnViolatesRotations) {
   for (RelativePosePrior& prior : priors_) {
     prior.flags = kPriorRotation;

@@ -10,8 +10,8 @@
 namespace adasfm {
 namespace {
 
-// A coarse model of images 1 to 40, whose matches tie 1-12, 13-27, 28-37 and
-// 38-39; 40 has none. Image 41 has no coarse pose, and is matched with 30.
+// A coarse model of images 1 to 40. Matches connect 1-12, 13-27, 28-37 and
+// 38-39; image 40 has none. Image 41 has no coarse pose and is matched with 30.
 class LeftoverComponentsTest : public testing::Test {
  protected:
   LeftoverComponentsTest() {
@@ -27,7 +27,7 @@ class LeftoverComponentsTest : public testing::Test {
       if (image_id == 12 || image_id == 27 || image_id == 37) continue;
       component.data.pairs.push_back(Pair(image_id, image_id + 1));
     }
-    // Between stretches, as a false loop.
+    // A pair between two of these groups, as of a false loop closure.
     component.data.pairs.push_back(Pair(12, 13));
     component.data.pairs.push_back(Pair(30, 41));
     for (image_t image_id = 1; image_id <= 40; ++image_id) {
@@ -90,7 +90,7 @@ TEST_F(LeftoverComponentsTest, StretchesBecomeComponents) {
   }
   // No image is lost or counted twice.
   EXPECT_EQ(num_images, 41);
-  // The two images and the one by itself are too few.
+  // Images 38-39 and 40 are too few for components.
   EXPECT_EQ(components_[0].coarse.size(), 18);
   EXPECT_EQ(components_[0].data.images.size(), 18);
   EXPECT_EQ(components_[1].coarse.size(), 12);
@@ -98,7 +98,7 @@ TEST_F(LeftoverComponentsTest, StretchesBecomeComponents) {
   EXPECT_EQ(components_[1].data.frame_priors.size(), 11);
   EXPECT_EQ(components_[2].coarse.size(), 10);
   EXPECT_EQ(components_[2].data.images.count(41), 1);
-  // They go on with what the model has found of the camera.
+  // New components use the camera that the model has refined.
   EXPECT_EQ(components_[0].data.cameras.at(1).MeanFocalLength(), 700.0);
   EXPECT_EQ(components_[1].data.cameras.at(1).MeanFocalLength(), 650.0);
 }

@@ -26,7 +26,7 @@ namespace fs = std::filesystem;
 
 class MapperCheckpointsTest : public MapperStageTest {
  protected:
-  // The summary without what a clock says.
+  // The summary without measured times.
   static nlohmann::json Figures(const MapperStageSummary& summary) {
     nlohmann::json json = MapperSummaryToJson(summary);
     for (const char* name : {"plan", "parts", "merge", "refine"}) {
@@ -57,7 +57,7 @@ TEST_F(MapperCheckpointsTest, ContinuesFromWhatIsThere) {
   }
 }
 
-// Whatever is damaged is named and made again, and the model is the same.
+// A damaged checkpoint is reported and made again, and the model is the same.
 TEST_F(MapperCheckpointsTest, DamagedCheckpointsAreMadeAgain) {
   MapperWorldOptions options;
   options.world.num_images = 60;
@@ -169,8 +169,8 @@ TEST_F(MapperCheckpointsTest, ContinuesInsideTheRefinement) {
   const std::string saved = folder_ + "/checkpoints/refine_";
   EXPECT_FALSE(fs::exists(saved + "0"));
   EXPECT_TRUE(fs::exists(saved + "1"));
-  // Twice: the rest of the rounds, then nothing but reading, of a folder where
-  // a kill has left half of an earlier round.
+  // First the remaining rounds, then only reading, from a folder where a kill
+  // has left half of an earlier round.
   for (int run = 0; run < 2; ++run) {
     if (run == 1) fs::create_directory(saved + "2");
     const auto continued = Run(world);
@@ -188,7 +188,7 @@ TEST_F(MapperCheckpointsTest, ContinuesInsideTheRefinement) {
   EXPECT_FALSE(changed.Merge(true).ok());
 }
 
-// A short machine is no fault of the part: nothing is remembered of it.
+// Lack of memory is not a failure of the part, so that none is recorded.
 TEST_F(MapperCheckpointsTest, PartWithoutMemoryIsMadeLater) {
   MapperWorldOptions options;
   options.world.num_images = 80;
@@ -267,7 +267,7 @@ TEST_F(MapperCheckpointsTest, PartThatKeepsThrowingIsNamedAndTheOthersGoOn) {
   EXPECT_EQ(num_calls, 2);
   const auto model = stage.Merge(true);
   ASSERT_TRUE(model.ok());
-  // The coarse poses and the refinement stand in for the part.
+  // The coarse poses and the refinement replace the part.
   EXPECT_EQ(model->NumRegImages(), options.world.num_images);
   EXPECT_LT(ComputeAlignedErrors(Poses(*model), world.true_poses, {}).rmse_m,
             CoarseRmseM(world));
@@ -329,7 +329,8 @@ TEST_F(MapperCheckpointsTest, ChangedOptionsOrDataStartAnew) {
   EXPECT_FALSE(fs::exists(part));
 }
 
-// All that an import may change: a checkpoint of other sensors is not used.
+// Depends on all that an import may change, so that checkpoints of other sensor
+// data are not used.
 TEST(ComputePartsFingerprint, DependsOnAllThatSensorsMeasure) {
   SceneData data;
   data.priors.resize(1);
@@ -399,7 +400,8 @@ TEST_F(MapperCheckpointsTest, MergeNamesTheMissingParts) {
   ASSERT_FALSE(missing.ok());
   EXPECT_NE(missing.status().message().find("missing parts: 1"),
             std::string::npos);
-  // What is there can be merged all the same; the rest keeps coarse poses.
+  // The existing parts can be merged; images of missing parts keep coarse
+  // poses.
   MapperStage again(options_, world.data, world.coarse_poses, folder_);
   const auto model = again.Merge(false);
   ASSERT_TRUE(model.ok());

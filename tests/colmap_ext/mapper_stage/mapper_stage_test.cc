@@ -19,8 +19,8 @@
 namespace adasfm {
 namespace {
 
-// What a chain of num_images priors gathers between its ends when vision adds
-// nothing: an upper bound of the error that the tests allow.
+// The drift of a chain of num_images priors without vision: an upper bound of
+// the error that the tests allow.
 double PriorDriftM(const MapperWorldOptions& options) {
   const int n = options.world.num_images;
   const double length_m = n * options.world.spacing_m;
@@ -29,8 +29,8 @@ double PriorDriftM(const MapperWorldOptions& options) {
              std::sqrt(3.0);
 }
 
-// Of the priors' motions in a model, as the coarse stage states them
-// (colmap_ext/coarse/measure_size.h).
+// The lengths of the priors' motions in a model, as the coarse stage states
+// them (colmap_ext/coarse/measure_size.h).
 std::vector<InertialLength> LengthsOf(
     const std::map<image_t, Rigid3d>& cams_from_world,
     const std::vector<RelativePosePrior>& priors) {
@@ -94,7 +94,7 @@ TEST_F(MapperStageTest, WorksWithoutSensors) {
   EXPECT_FALSE(summary_.is_level);
 }
 
-// A filter at 4 px would leave a noise of 1.9 px.
+// With a filter at 4 px, noise of 3 px would be estimated as 1.9 px.
 TEST_F(MapperStageTest, FilterFollowsTheNoise) {
   for (uint64_t seed = 1; seed <= 3; ++seed) {
     MapperWorldOptions options;
@@ -123,7 +123,7 @@ TEST_F(MapperStageTest, FisheyeIsReconstructed) {
   RunAndExpectBetterThanCoarse(options);
 }
 
-// Images without texture are held by the priors between them.
+// The priors constrain images without texture.
 TEST_F(MapperStageTest, BlackoutIsBridgedByPriors) {
   MapperWorldOptions options;
   options.world.num_images = 100;
@@ -140,8 +140,8 @@ TEST_F(MapperStageTest, BlackoutIsBridgedByPriors) {
   EXPECT_LT(errors.rmse_m, 0.5 * CoarseRmseM(world));
 }
 
-// Only the priors know the way through the gaps when the coarse poses do not:
-// where these stand must not matter to the model.
+// Only the priors constrain the images in the gaps. The model must not depend
+// on the coarse poses, however wrong these are.
 TEST_F(MapperStageTest, GapsDoNotDependOnTheCoarsePoses) {
   for (uint64_t seed = 1; seed <= 3; ++seed) {
     MapperWorldOptions options = WorldWithGaps(seed);
@@ -163,8 +163,8 @@ TEST_F(MapperStageTest, GapsDoNotDependOnTheCoarsePoses) {
   }
 }
 
-// Sums in another order must not decide where an adjustment ends, however far
-// it has to go.
+// The order of summation must not decide where an adjustment converges, however
+// far it starts from there.
 TEST_F(MapperStageTest, ThreadsDoNotChangeTheResultOfBadCoarsePoses) {
   MapperWorldOptions options = WorldWithGaps(1);
   options.center_sigma_m = 2.0;
@@ -179,8 +179,8 @@ TEST_F(MapperStageTest, ThreadsDoNotChangeTheResultOfBadCoarsePoses) {
   }
 }
 
-// Nothing says where they are but a coarse pose: without priors, or with those
-// of a gyroscope alone or of a speed alone.
+// Images that only a coarse pose constrains are deregistered: without priors,
+// or with those of a gyroscope alone or of a speed alone.
 TEST_F(MapperStageTest, ImagesThatNothingHoldsAreLeftOut) {
   const uint32_t kNoPriors = 0;
   for (const uint32_t flags :
@@ -229,8 +229,8 @@ TEST_F(MapperStageTest, PrintsNothing) {
   EXPECT_EQ(testing::internal::GetCapturedStdout(), "");
 }
 
-// Photos whose camera nobody has calibrated. Without noise: the focal length of
-// a drive mostly straight ahead is weakly seen.
+// Photos of an uncalibrated camera. They have no noise, as a drive mostly
+// straight ahead observes the focal length only weakly.
 TEST_F(MapperStageTest, UnknownFocalLengthIsRefined) {
   MapperWorldOptions options;
   options.world.num_images = 40;
@@ -258,7 +258,8 @@ TEST_F(MapperStageTest, UnknownFocalLengthIsRefined) {
   EXPECT_EQ(run(true), 1.02);
 }
 
-// Rotations, and the lengths of the coarse model in metres of an accelerometer.
+// The priors keep their rotations and get the lengths of the coarse model, as
+// if an accelerometer had determined its metres.
 void LeaveToAnImu(MapperWorld* world) {
   for (RelativePosePrior& prior : world->data.priors) {
     prior.flags = kPriorRotation;
@@ -267,8 +268,8 @@ void LeaveToAnImu(MapperWorld* world) {
                      &world->data.priors);
 }
 
-// An IMU without wheels: images on few points whose coarse places are wrong do
-// not take the metres of the accelerometer along.
+// An IMU without wheels: images on few points with wrong coarse positions do
+// not change the scale that the accelerometer determined.
 TEST_F(MapperStageTest, WrongPlacesLeaveTheUnitOfTheAccelerometer) {
   for (const uint64_t seed : {1, 2, 3}) {
     MapperWorldOptions options;
@@ -310,10 +311,10 @@ MapperWorld BuildInertialDrive(uint64_t seed, int num_blackouts = 0) {
   return world;
 }
 
-// An IMU without wheels: the coarse model's metres, 2 % off, end within 3
-// sigmas of the truth, of which 0.2 % is what nothing sees. Noise of 0.005
-// m/s^2 sqrt(s) moves a second by 0.003 m, where the drive changes its speed by
-// 1 m/s.
+// An IMU without wheels: the coarse model is 2 % too large, and the final one
+// is within 3 sigmas of the truth. The sigma includes 0.2 % that no residual
+// shows. Noise of 0.005 m/s^2 sqrt(s) displaces a second by 0.003 m, while the
+// drive changes its speed by 1 m/s.
 TEST_F(MapperStageTest, TheAccelerometerTellsTheSizeOfTheFinalModel) {
   for (const uint64_t seed : {1, 2, 3}) {
     MapperWorld world = BuildInertialDrive(seed);
@@ -330,9 +331,10 @@ TEST_F(MapperStageTest, TheAccelerometerTellsTheSizeOfTheFinalModel) {
   }
 }
 
-// Photos of nothing in a drive by an IMU alone: the factors over three images
-// hold them. Its noise of 0.005 m/s^2 sqrt(s) moves the half second of two
-// photos by some millimetres, which two more on either side show.
+// Images without points in a drive with an IMU alone: the factors over three
+// images constrain them. Noise of 0.005 m/s^2 sqrt(s) displaces the half second
+// of two images by some millimetres, as an alignment with two more images on
+// either side shows.
 TEST_F(MapperStageTest, TheAccelerometerHoldsImagesWithoutPoints) {
   for (const uint64_t seed : {1, 2, 3}) {
     MapperWorld world = BuildInertialDrive(seed, 1);
@@ -354,12 +356,12 @@ TEST_F(MapperStageTest, TheAccelerometerHoldsImagesWithoutPoints) {
   }
 }
 
-// Wheels that the importer took for 2 % too short.
+// The importer has wrongly scaled the wheels' lengths by kScale.
 class WheelScaleTest : public MapperStageTest {
  protected:
   static constexpr double kScale = 1.02;
 
-  // The importer was this sure.
+  // `sigma` is the importer's 1 sigma of the scale.
   static MapperWorld Build(uint64_t seed, double sigma) {
     MapperWorld world = BuildInertialDrive(seed);
     for (auto& [image_id, pose] : world.coarse_poses) {
@@ -376,14 +378,14 @@ class WheelScaleTest : public MapperStageTest {
     return world;
   }
 
-  // How far the model's size is off.
+  // The size of the model over the true size.
   double RunSize(const MapperWorld& world) {
     std::filesystem::remove_all(folder_);
     return 1.0 / ComputeAlignedErrors(Run(world), world.true_poses, {}).scale;
   }
 };
 
-// Its sigma is that of the accelerometer on the final shape.
+// The final sigma is that of the accelerometer on the final shape.
 TEST_F(WheelScaleTest, TheAccelerometerCorrectsIt) {
   for (const uint64_t seed : {1, 2, 3}) {
     const double size = RunSize(Build(seed, 0.007));
@@ -398,8 +400,8 @@ TEST_F(WheelScaleTest, StaysWhereItIsKnownBetter) {
   EXPECT_NEAR(summary_.scale_sigma, 0.0005 / kScale, 1e-12);
 }
 
-// The coarse stage had no use for the wheels, and the step at a slip has the
-// accelerometer's length: the wheels hold the final model all the same.
+// The coarse stage did not use the wheels, and the step at a slip has the
+// accelerometer's length. The wheels determine the final scale nevertheless.
 TEST_F(WheelScaleTest, DoesNotFollowTheCoarseModel) {
   MapperWorld world = Build(1, 0.0005);
   world.data.inertial_scale_sigma = 0.02;

@@ -19,7 +19,7 @@ TEST(PartMemoryTest, ControlGroupsLimitWhatIsLeft) {
   EXPECT_TRUE(std::isinf(MemoryLeftInGroup(folder.Path())));
   folder.Write("memory.max", "10000000\n");
   EXPECT_EQ(MemoryLeftInGroup(folder.Path()), 7e6);
-  // Files that are only cached make room.
+  // Cached files count as available memory.
   folder.Write("memory.stat", "anon 1000000\ninactive_file 2000000\n");
   EXPECT_EQ(MemoryLeftInGroup(folder.Path()), 9e6);
   folder.Write("memory.max", "500000\n");
@@ -58,7 +58,7 @@ SceneData SceneOfPart(size_t num_keypoints, size_t num_matches) {
   return data;
 }
 
-// By how much the mapper grew while it made the part.
+// The measured growth of the mapper's memory while it made the part.
 TEST(PartMemoryTest, EstimateCoversWhatWasMeasured) {
   struct Part {
     size_t num_keypoints, num_matches;

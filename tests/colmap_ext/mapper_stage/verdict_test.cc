@@ -97,7 +97,7 @@ TEST_F(VerdictTest, ModelWithoutPointsFailed) {
   ExpectResult(Assess(), VerdictResult::kFailed, "the model has no points");
 }
 
-// Poses of a wrong log: the matches are there, and no points come of them.
+// Poses from a wrong log: the matches are there, but they give no points.
 TEST_F(VerdictTest, MatchedImagesWithoutPointsFailed) {
   std::vector<image_t> images = model_.RegImageIds();
   std::sort(images.begin(), images.end());
@@ -108,7 +108,7 @@ TEST_F(VerdictTest, MatchedImagesWithoutPointsFailed) {
   }
   ExpectResult(Assess(), VerdictResult::kFailed,
                "images with verified matches");
-  // Nobody expects points of images in the dark.
+  // Images without matches, as in the dark, only make the model doubtful.
   world_.data.pairs.erase(
       std::remove_if(world_.data.pairs.begin(), world_.data.pairs.end(),
                      [&](const ScenePair& pair) {
@@ -142,7 +142,7 @@ TEST_F(VerdictTest, SensorsThatContradictVision) {
   ExpectResult(Assess(), VerdictResult::kGood, "");
 }
 
-// Vision's shape is there, its unit is not.
+// The model has the shape of vision, but its scale contradicts the priors.
 TEST_F(VerdictTest, WrongLengthsAreDoubtfulUnlessKeypointsWereLetGo) {
   for (RelativePosePrior& prior : world_.data.priors) {
     prior.cam2_from_cam1.translation *= 2.0;
@@ -150,7 +150,7 @@ TEST_F(VerdictTest, WrongLengthsAreDoubtfulUnlessKeypointsWereLetGo) {
   ExpectResult(Assess(), VerdictResult::kDoubtful, "translations contradict");
   summary_.refine.keypoint_sigma_factor = 8.0;
   ExpectResult(Assess(), VerdictResult::kFailed, "translations contradict");
-  // Where the accelerometer said so, the model was made half as large.
+  // The accelerometer has made the model half as large: no contradiction.
   for (RelativePosePrior& prior : world_.data.priors) {
     prior.covariance.bottomRightCorner<3, 3>() *= 4.0;
   }
@@ -159,8 +159,8 @@ TEST_F(VerdictTest, WrongLengthsAreDoubtfulUnlessKeypointsWereLetGo) {
   ExpectResult(Assess(), VerdictResult::kGood, "");
 }
 
-// A camera-IMU rotation that is off rotates all directions of driving alike,
-// which the adjustment knows.
+// A wrong camera-IMU rotation rotates all directions of driving alike, which
+// the adjustment estimates.
 TEST_F(VerdictTest, DirectionsOffAlikeAreNoContradiction) {
   const SceneData honest = world_.data;
   const auto turn = [&](double angle_rad, bool alike) {
@@ -211,7 +211,7 @@ TEST_F(VerdictTest, WhatTheStagesSaid) {
   summary_.parts[0].failure.clear();
   summary_.is_metric = false;
   ExpectResult(Assess(), VerdictResult::kDoubtful, "no metres");
-  // An IMU alone tells no lengths.
+  // An IMU alone measures no lengths.
   for (RelativePosePrior& prior : world_.data.priors) {
     prior.flags &= ~kPriorLength;
   }
@@ -235,8 +235,8 @@ TEST_F(VerdictTest, SeveralModelsAreJudgedTogetherAndEachByItself) {
   EXPECT_EQ(verdict.num_points, 2 * static_cast<int>(model_.NumPoints3D()));
   EXPECT_EQ(verdict.priors[0].num_priors, 2 * 39);
 
-  // A model that failed by itself: behind one sound model it makes doubt, and
-  // where it holds most images all has failed.
+  // One failed model after sound ones makes the verdict doubtful; if failed
+  // models have most images, the verdict is failed.
   colmap::Reconstruction without_points = model_;
   for (const colmap::point3D_t point_id : model_.Point3DIds()) {
     without_points.DeletePoint3D(point_id);

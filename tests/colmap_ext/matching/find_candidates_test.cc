@@ -14,8 +14,8 @@ namespace {
 constexpr double kFocalLengthPx = 700.0;
 constexpr int kNumPoints = 400;
 
-// Points 3 to 60 m before camera 1, as both cameras see them, with a true
-// motion drawn by the prediction's covariance.
+// Points 3 to 60 m in front of camera 1, as both cameras see them. The true
+// motion is drawn from the prediction's covariance.
 struct Views {
   PlaneKeypoints keypoints1, keypoints2;
 };
@@ -67,8 +67,7 @@ class FindCandidatesTest : public testing::Test {
     return views;
   }
 
-  // Of the true matches (i, i) those among the candidates, and the share of all
-  // pairs that are.
+  // The share of the true matches (i, i) that are among the candidates.
   static double Recall(const MatchCandidates& candidates) {
     int num_found = 0;
     for (int i = 0; i < kNumPoints; ++i) {
@@ -107,8 +106,8 @@ TEST_F(FindCandidatesTest, TrueMatchesAreAmongFewCandidates) {
   }
 }
 
-// In the predicted direction only: a keypoint on the epipolar line, but where
-// only points behind the cameras would lie, is none.
+// Only keypoints in the predicted direction are candidates: one on the epipolar
+// line where only points behind the cameras would lie is not.
 TEST_F(FindCandidatesTest, TheWrongSideOfInfinityIsNoCandidate) {
   PredictedMotion prediction;
   prediction.cam2_from_cam1.translation = Eigen::Vector3d(1.0, 0.0, 0.0);

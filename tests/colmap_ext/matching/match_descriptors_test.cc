@@ -130,7 +130,7 @@ TEST_P(MatchDescriptorsTest, EqualsTheDoubleLoop) {
   size_t num_matches = 0;
   for (const uint64_t seed : {1, 2, 3, 4, 5}) {
     Random random(seed);
-    // Groups that are full and others that are not.
+    // Sizes with full groups, and with groups that are not full.
     for (const auto& [count1, count2] :
          {std::pair(0, 5), {5, 0}, {1, 1}, {7, 40}, {96, 64}, {131, 97}}) {
       const Bytes all = DrawDescriptors(count1 + count2, 90, &random);
@@ -149,7 +149,7 @@ TEST_P(MatchDescriptorsTest, EqualsTheDoubleLoop) {
   EXPECT_GT(num_matches, 100);
 }
 
-// Numbers that no sum of 16 bits holds.
+// Numbers whose products overflow sums of 16 bits.
 TEST_P(MatchDescriptorsTest, GreatestNumbers) {
   if (!HasKernel(GetParam())) GTEST_SKIP() << "not on this processor";
   BestTwo of1;
@@ -179,7 +179,8 @@ TEST(MatchCandidateDescriptors, EqualsTheDoubleLoopOverTheCandidates) {
   size_t num_without_candidates = 0;
   for (const uint64_t seed : {1, 2, 3}) {
     Random random(seed);
-    // Hardly any descriptor twice: a candidate's product is its own.
+    // Hardly any descriptor occurs twice, so that few candidates have equal
+    // products.
     const Bytes all = DrawDescriptors(kCount1 + kCount2, 90, &random);
     const Bytes first(all.begin(), all.begin() + kCount1 * kSiftDimensions);
     const Bytes second(all.begin() + kCount1 * kSiftDimensions, all.end());

@@ -11,7 +11,7 @@
 namespace adasfm {
 namespace {
 
-// Images that move by what a test says.
+// Images whose motion is set by each test.
 class OverlapPredictorTest : public testing::Test {
  protected:
   OverlapPredictorTest() {
@@ -62,13 +62,13 @@ TEST_F(OverlapPredictorTest, FallsWithDistanceAndTurn) {
     EXPECT_GT(near, 0.3);
     EXPECT_LT(near, 0.95);
     EXPECT_LT(Predict(step * step).value(), near);
-    // It is that of both images.
+    // The overlap is symmetric.
     EXPECT_NEAR(Predict(step.Inverse()).value(), near, 1e-9);
   }
   EXPECT_EQ(Predict(Move(0, 0, 180)), 0.0);
   EXPECT_EQ(Predict(Move(0, 60, 0)), 0.0);
   EXPECT_EQ(Predict(Move(60, 0, 0)), 0.0);
-  // A deeper scene is seen from further away.
+  // Images further apart overlap if the scene is deeper.
   const double shallow = Predict(Move(0, 30, 0)).value();
   options_.scene_depth_m = 60.0;
   EXPECT_GT(Predict(Move(0, 30, 0)).value(), 2.0 * shallow);
@@ -77,9 +77,9 @@ TEST_F(OverlapPredictorTest, FallsWithDistanceAndTurn) {
 TEST_F(OverlapPredictorTest, SaysNothingWhereTheOdometryIsNotSure) {
   EXPECT_FALSE(Predict(Move(0, 8, 0), 3.0).has_value());
   EXPECT_FALSE(Predict(Move(0, 60, 0), 5.0).has_value());
-  // So far away that it is sure all the same.
+  // So far apart that the uncertainty does not matter.
   EXPECT_EQ(Predict(Move(0, 600, 0), 5.0), 0.0);
-  // Rotation alone tells what looks elsewhere, and no more.
+  // Rotation alone only excludes the overlap of images that look elsewhere.
   EXPECT_FALSE(Predict(Move(0, 8, 0), 0.001, kPriorRotation).has_value());
   EXPECT_EQ(Predict(Move(0, 8, 180), 0.001, kPriorRotation), 0.0);
   EXPECT_FALSE(Predict(Move(0, 8, 180), 3.0, kPriorRotation).has_value());

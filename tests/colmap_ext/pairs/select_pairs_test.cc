@@ -77,7 +77,7 @@ TEST_F(SelectPairsTest, FindsTruePairsOfRevisits) {
     const double recall =
         RecallOfTruePairs(world_, selection.pairs, 10, &num_true);
     num_true_of_all += num_true;
-    // Of no pairs there is no recall.
+    // Without true pairs there is no recall.
     if (num_true > 0) {
       EXPECT_GT(recall, 0.95) << "seed " << seed;
     }
@@ -86,8 +86,7 @@ TEST_F(SelectPairsTest, FindsTruePairsOfRevisits) {
   EXPECT_GT(num_true_of_all, 100);
 }
 
-// Each pair that is matched costs time, and each true one that is not costs
-// accuracy.
+// Matching a pair costs time, and omitting a true one costs accuracy.
 TEST_F(SelectPairsTest, OdometryKeepsTruePairsAndSavesOthers) {
   for (const uint64_t seed : {1, 2, 5}) {
     SyntheticWorldOptions options = SmallWorld(180);
@@ -219,7 +218,7 @@ TEST_F(SelectPairsTest, TimesGoByWholeNames) {
   EXPECT_TRUE(by_time);
   EXPECT_TRUE(warnings.empty());
   EXPECT_TRUE(std::is_sorted(order->begin(), order->end()));
-  // Some images only, and none.
+  // Times of some images only, and of none.
   order = OrderImages(database_, folder_.Write("few.csv", times.substr(0, 50)),
                       &by_time, &warnings);
   ASSERT_TRUE(order.ok()) << order.status().message();
@@ -233,7 +232,7 @@ TEST_F(SelectPairsTest, TimesGoByWholeNames) {
                    .ok());
 }
 
-// Nothing is more similar than anything else.
+// All images are equally similar.
 TEST_F(SelectPairsTest, EqualDescriptorsLeaveTheNeighbours) {
   MakeDatabase(SmallWorld(12));
   {

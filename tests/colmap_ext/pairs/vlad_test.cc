@@ -20,7 +20,7 @@ RowMatrixXf RandomRows(int num_rows, int num_columns, Random* random) {
   return rows;
 }
 
-// By the definition, with loops.
+// VLAD by its definition, with loops.
 Eigen::RowVectorXf VladByLoops(const RowMatrixXf& words,
                                const RowMatrixXf& descriptors) {
   Eigen::MatrixXd sums = Eigen::MatrixXd::Zero(words.rows(), words.cols());
@@ -89,7 +89,7 @@ TEST(Vocabulary, FindsClustersAndRepeatsItself) {
     const RowMatrixXf words = TrainVocabulary(options, rows);
     ASSERT_EQ(words.rows(), 6);
     for (int k = 0; k < 6; ++k) {
-      // The mean of 50 rows is within five of its sigmas, 8 axes.
+      // The mean of 50 rows in 8 dimensions is within five of its sigmas.
       EXPECT_LT((words.rowwise() - centers.row(k)).rowwise().norm().minCoeff(),
                 5.0 * std::sqrt(8.0 / 50.0));
     }

@@ -41,7 +41,7 @@ TEST(FindRigCameras, TakesFoldersElseTheOrderOfIds) {
   ASSERT_TRUE(by_folder.ok()) << by_folder.status().message();
   EXPECT_TRUE(by_folder->at(8).is_reference);
   EXPECT_EQ(by_folder->at(3).rig_id, 8u);
-  // Trusted as a rig of the host's tables is.
+  // The sigmas are those of a rig from the host's tables.
   EXPECT_EQ(by_folder->at(3).rotation_sigma_rad,
             RigCamera().rotation_sigma_rad);
   EXPECT_EQ(by_folder->at(3).translation_sigma_m,
@@ -126,7 +126,7 @@ TEST(GroupFrames, ImagesOfOneTimeAreOneFrame) {
   EXPECT_EQ(times[6], 3'001'100'000);
   ASSERT_EQ(frames.size(), 3u);
   EXPECT_EQ(frames[1].image_id, 4u);
-  // Without a rig all stamps are frames.
+  // Without a rig each time stamp is a frame.
   EXPECT_EQ(GroupFrames(scene, {}, &stamps).size(), stamps.size());
 }
 

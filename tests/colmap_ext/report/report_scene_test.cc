@@ -34,7 +34,8 @@ TEST(ReportScene, PriorsWithoutErrorFollowTheModel) {
     exact.rotation_sigma_rad = exact.translation_sigma_m = 0.0;
     PriorTables tables;
     tables.priors = BuildSyntheticScene(world, exact).priors;
-    // Without its length the motion from the 11th image to the next is open.
+    // Without a length, the motion from the 11th image to the next starts a new
+    // run.
     tables.priors[10].flags = kPriorRotation;
     ReportScene scene = BuildReportScene({}, model, nullptr, tables);
     ChainPriors(tables.priors, &scene);
@@ -75,7 +76,7 @@ TEST(ReportScene, TheTruthComesIntoTheModelsWorld) {
                                    image.cam_from_world->TargetOriginInSource())
                                       .norm());
         }
-        // A model in metres does not get a wrong scale forgiven.
+        // A wrong scale counts as an error of a metric model.
         const bool fits = scale == 1.0 || !is_metric;
         EXPECT_EQ(max_error_m < 1e-6, fits);
         EXPECT_EQ(max_distance < 1e-6, fits);

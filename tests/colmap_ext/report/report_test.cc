@@ -34,7 +34,7 @@ int Count(const std::string& text, const std::string& pattern) {
                        std::sregex_iterator());
 }
 
-// The page without its scripts' insides.
+// The page without the contents of its scripts.
 std::string MarkupOf(std::string page) {
   size_t from = 0;
   while ((from = page.find("<script", from)) != std::string::npos) {
@@ -224,7 +224,7 @@ TEST_F(ReportTest, DrawsMatchesOnPhotos) {
   EXPECT_EQ(Count(*page, "<path class=\"kept\""), 2);
   EXPECT_EQ(*page, *BuildReport(options));
 
-  // Photos that are cut short or missing are counted, and the page stands.
+  // Truncated or missing photos are counted, and the page is made nevertheless.
   for (const SyntheticImage& image : world_.images) {
     folder_.Write("photos/" + image.name, "P6 8");
   }

@@ -11,12 +11,12 @@ namespace {
 
 constexpr int kNumImages = 60;
 
-// Upright cameras on a curved road of 300 m, in ENU, seen in another world.
+// Upright cameras on a road of 300 m, in ENU and in another world frame.
 struct Drive {
   PositionAlignmentInput input;
   Sim3d enu_from_world;
   std::map<image_t, Rigid3d> cams_from_enu;
-  // What an alignment that knows the wrong positions would be given.
+  // The positions without the wrong ones.
   std::vector<PositionPrior> right_positions;
 };
 
@@ -114,10 +114,11 @@ TEST(AlignToPositions, IsExactWithoutNoise) {
   }
 }
 
-// As the alignment that knows which positions are wrong: 15 m are so far beyond
-// where Tukey's loss ends that they weigh nothing. 60 positions of 1 m, a third
-// of them wrong at one end: the far end, 200 m from the middle of the rest,
-// errs by 0.6 m in each of three directions, 2 m are two such sigmas of all.
+// The result equals that without the wrong positions: 15 m are so far beyond
+// the range of Tukey's loss that these have no weight. With 60 positions of
+// 1 m, a third of them wrong at one end, the far end is 200 m from the middle
+// of the others and errs by 0.6 m in each of three directions; 2 m are two
+// sigmas in space.
 TEST(AlignToPositions, BridgesJumpsAndReflections) {
   for (const double share_wrong : {0.1, 0.35}) {
     for (uint64_t seed = 1; seed <= 20; ++seed) {
@@ -164,7 +165,7 @@ TEST(AlignToPositions, SaysWhyItFails) {
   drive.input.positions.resize(2);
   EXPECT_NE(AlignToPositions(drive.input).failure.find("only 2 positions"),
             std::string::npos);
-  // A machine that has not moved.
+  // A stationary machine.
   drive = MakeDrive({}, 2);
   Random random(5);
   for (auto& [image_id, pose] : drive.input.cams_from_world) {
@@ -175,7 +176,7 @@ TEST(AlignToPositions, SaysWhyItFails) {
   }
   EXPECT_NE(AlignToPositions(drive.input).failure.find("too close together"),
             std::string::npos);
-  // Latitude and longitude swapped: the way is mirrored.
+  // Latitude and longitude swapped: the trajectory is mirrored.
   DriveOptions options;
   drive = MakeDrive(options, 3);
   for (PositionPrior& prior : drive.input.positions) {

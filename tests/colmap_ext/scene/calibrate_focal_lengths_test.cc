@@ -30,7 +30,7 @@ SceneData SceneWithFocalLength(const SyntheticWorld& world, double factor) {
   return scene;
 }
 
-// What COLMAP guesses is half too long for phones, and too short for others.
+// COLMAP's guess is 50 % too long for phones, and too short for other cameras.
 TEST(CalibrateFocalLengths, FindsTheTruthWithinItsSigma) {
   for (const uint64_t seed : {1, 2, 3, 4}) {
     const SyntheticWorld world = BuildSyntheticWorld(Drive(seed));
@@ -50,8 +50,8 @@ TEST(CalibrateFocalLengths, FindsTheTruthWithinItsSigma) {
   }
 }
 
-// With the distortion taken for zero the second seed is 26 % too long, at a
-// sigma of 2 %.
+// If distortion were neglected, the focal length of the second seed would be
+// 26 % too long, at a sigma of 2 %.
 TEST(CalibrateFocalLengths, FindsTheTruthOfADistortingLens) {
   constexpr double kDistortion = -0.08;
   for (const uint64_t seed : {1, 2, 3}) {
@@ -69,7 +69,7 @@ TEST(CalibrateFocalLengths, FindsTheTruthOfADistortingLens) {
   }
 }
 
-// A phone's: outwards near the middle, inwards at the rim.
+// A phone's lens: distortion outwards near the middle, inwards at the rim.
 TEST(CalibrateFocalLengths, FindsTheTruthOfALensWithTwoRadialTerms) {
   constexpr double kFirst = 0.12;
   constexpr double kSecond = -0.12;
@@ -92,8 +92,8 @@ TEST(CalibrateFocalLengths, FindsTheTruthOfALensWithTwoRadialTerms) {
   }
 }
 
-// A shutter that opens row by row gives every pair a focal length of its own;
-// the search among them must end, and DescribeFocalLength's sigma hold.
+// With a rolling shutter every pair has a focal length of its own. The search
+// must converge, to within 2 sigmas of DescribeFocalLength (3.5 %).
 TEST(CalibrateFocalLengths, FindsALensBehindARollingShutter) {
   for (const uint64_t seed : {1, 2, 3}) {
     for (const double spacing_m : {1.5, 4.0}) {
@@ -154,7 +154,7 @@ TEST(CalibrateFocalLengths, KnownAndRightOnesStay) {
   EXPECT_TRUE(CalibrateFocalLengths(off, &unknown).empty());
 }
 
-// Pairs straight on say nothing: no focal length is made up from them.
+// Pairs without rotation do not determine a focal length, and none is made up.
 TEST(CalibrateFocalLengths, StraightOnNothingIsTaken) {
   const SyntheticWorld world = BuildSyntheticWorld(Drive(2));
   SceneData scene = SceneWithFocalLength(world, 1.6);
@@ -173,7 +173,7 @@ TEST(CalibrateFocalLengths, StraightOnNothingIsTaken) {
   scene.pairs = straight;
   const auto found =
       CalibrateFocalLengths(FocalLengthCalibrationOptions(), &scene);
-  // Where it is sure all the same, it is right.
+  // A focal length that is found nevertheless is right within its sigma.
   for (const CalibratedFocalLength& calibrated : found) {
     EXPECT_NEAR(std::log(calibrated.found_px / world.camera.focal_px), 0.0,
                 4.0 * calibrated.relative_sigma);

@@ -10,7 +10,7 @@
 namespace adasfm {
 namespace {
 
-// Motions of the world's neighbours with the lengths that they have in it.
+// Motions between neighbouring images, with the lengths of the model.
 std::vector<RelativePosePrior> PriorsOf(
     const colmap::Reconstruction& reconstruction) {
   std::vector<RelativePosePrior> priors;
@@ -59,7 +59,7 @@ TEST(KeepInertialUnit, WithoutItsLengthsNothingIsChanged) {
   colmap::Reconstruction world = BuildBundleWorld({});
   std::vector<RelativePosePrior> priors = PriorsOf(world);
   for (RelativePosePrior& prior : priors) prior.flags &= ~kPriorInertialLength;
-  // Of an image that the model has not.
+  // A prior of an image that is not in the model.
   priors.push_back(priors.front());
   priors.back().image_id2 = 99;
   priors.back().flags |= kPriorInertialLength;

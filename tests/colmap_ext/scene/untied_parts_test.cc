@@ -8,8 +8,8 @@
 namespace adasfm {
 namespace {
 
-// 30 images along a street, without all but so many of the points that both
-// images up to `last` and later ones see.
+// 30 images along a street, with only num_left of the points that images up to
+// `last` share with later ones.
 colmap::Reconstruction BuildCutWorld(image_t last, int num_left) {
   BundleWorldOptions options;
   options.num_images = 30;
@@ -50,12 +50,12 @@ TEST(FindUntiedParts, WholeMotionsTieAndRotationsDoNot) {
   EXPECT_EQ(FindUntiedParts({Prior(10, kPriorRotation)}, world).size(), 1);
   const uint32_t whole = kPriorRotation | kPriorDirection | kPriorLength;
   EXPECT_TRUE(FindUntiedParts({Prior(10, whole)}, world).empty());
-  // Within a part, or to an image that the model has not.
+  // Priors within a part, or to an image that is not in the model.
   EXPECT_EQ(FindUntiedParts({Prior(3, whole), Prior(30, whole)}, world).size(),
             1);
 }
 
-// Images that see next to nothing are no part of their own.
+// Images with next to no points are not a part of their own.
 TEST(FindUntiedParts, FewPointsAreNoPart) {
   colmap::Reconstruction world = BuildCutWorld(1, 0);
   EXPECT_TRUE(FindUntiedParts({}, world).empty());

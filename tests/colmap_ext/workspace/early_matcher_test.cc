@@ -51,8 +51,8 @@ class EarlyMatcherTest : public testing::Test {
     SqliteConnection(path, SqliteConnection::Mode::kWrite).Execute(sql);
   }
 
-  // As an extraction: one transaction an image, on a connection that waits for
-  // no other.
+  // As an extraction: one transaction per image, on a connection that does not
+  // wait for locks.
   static void Extract(int begin, int end, const std::string& from,
                       SqliteConnection* database) {
     database->Execute("PRAGMA busy_timeout = 0");
@@ -132,7 +132,7 @@ class EarlyMatcherTest : public testing::Test {
   SyntheticWorld world_;
   PairSelectionOptions pairs_;
   std::vector<ImagePair> neighbors_;
-  // With all features, and one that gets them.
+  // A database with all features, and one that gets them during a test.
   std::string all_ = folder_.File("all.db");
   std::string database_ = folder_.File("database.db");
   std::string early_ = EarlyDatabasePath(folder_.Path());
@@ -154,7 +154,7 @@ TEST_F(EarlyMatcherTest, TheResultIsTheSameAsWithout) {
     Extract(17, 21, all_, &database);
     matcher.Finish();
   }
-  // What is here already stays.
+  // Matches are moved, and existing rows stay.
   const StatusOr<int> moved = TakeEarlyMatches(early_, "these", database_);
   ASSERT_TRUE(moved.ok()) << moved.status().message();
   const int num_early = *moved;
@@ -167,8 +167,7 @@ TEST_F(EarlyMatcherTest, TheResultIsTheSameAsWithout) {
   EXPECT_TRUE(Rows(database_) == Rows(all_));
 }
 
-// As after a kill: what was matched for the same inputs is taken, and nothing
-// else.
+// As after a kill: only matches made for the same inputs are taken.
 TEST_F(EarlyMatcherTest, OtherInputsAreOutdated) {
   SqliteConnection database(database_, SqliteConnection::Mode::kWrite);
   database.Execute("PRAGMA journal_mode = WAL");
@@ -181,7 +180,7 @@ TEST_F(EarlyMatcherTest, OtherInputsAreOutdated) {
     WaitForEarlyMatches(neighbors_.size());
   };
   match("these");
-  // Half written.
+  // One pair is half written.
   Execute(early_,
           "DELETE FROM matches WHERE pair_id = (SELECT MIN(pair_id) FROM "
           "matches)");
@@ -197,7 +196,7 @@ TEST_F(EarlyMatcherTest, OtherInputsAreOutdated) {
   EXPECT_EQ(*TakeEarlyMatches(early_, "these", database_), 0);
 }
 
-// In SQLite's older journal mode reading keeps others from writing.
+// In SQLite's older journal mode a reader would block the extraction.
 TEST_F(EarlyMatcherTest, DoesNotStandInTheWayOfTheExtraction) {
   Execute(database_, "PRAGMA journal_mode = DELETE");
   EXPECT_THROW(OpenEarlyDatabase(database_, "these", early_), SqliteError);

@@ -19,12 +19,12 @@ struct Drive {
 };
 
 struct DriveOptions {
-  // The true camera from the stated one.
+  // Rotation vector of the true camera from the stated one.
   Eigen::Vector3d camera_imu_deg = Eigen::Vector3d::Zero();
-  // Largest turn of a step.
+  // Largest rotation of a step.
   double turn_rad = 0.05;
   double noise_px = 0.5;
-  // Of the steps that follow each other.
+  // Whether priors of consecutive images have translations.
   bool has_positions = true;
   int num_images = 120;
 };
@@ -47,8 +47,8 @@ Bearing Observe(const Eigen::Vector3d& point_in_cam, double noise_px,
   return bearing;
 }
 
-// 1 m and 0.1 s a step along winding streets, points 5 to 40 m ahead of the
-// pair's middle; every pair of up to five steps has matches.
+// Winding streets with 1 m and 0.1 s a step. Each pair of images up to five
+// steps apart has matches of points 10 to 40 m ahead of its first image.
 Drive BuildDrive(const DriveOptions& options, uint64_t seed) {
   Random random(seed);
   Drive drive;
@@ -91,7 +91,7 @@ Drive BuildDrive(const DriveOptions& options, uint64_t seed) {
   return drive;
 }
 
-// The direction of driving is wrong by this rotation vector.
+// Rotates the direction of driving of all priors by this rotation vector.
 void TurnDirections(const Eigen::Vector3d& turn, Drive* drive) {
   for (RelativePosePrior& prior : drive->priors) {
     Rigid3d& motion = prior.cam2_from_cam1;
@@ -121,9 +121,9 @@ TEST(CorrectCameraImuRotation, FindsTheTurnAboutAllAxes) {
     const CameraImuRotationReport report =
         Correct(&drive, CameraImuRotationOptions());
     ASSERT_TRUE(report.corrected) << "seed " << seed;
-    // The steps' 5e-3 of direction, mostly persistent, is 0.29 deg for one step
-    // and a tenth of it for 120; turns of 0.05 know the roll to 1e-3 / 0.1 for
-    // one pair and a twentieth of it for all.
+    // The error of 5e-3 in the direction of a step is 0.29 deg, and a tenth of
+    // that for 120 steps. Rotations of 0.05 rad determine the roll to 1e-3 /
+    // 0.1 with one pair and to a twentieth of that with all.
     EXPECT_LT(ErrorDeg(report, options.camera_imu_deg), 0.15)
         << "seed " << seed;
     EXPECT_LT(ErrorDeg(report, options.camera_imu_deg),
@@ -153,7 +153,7 @@ TEST(CorrectCameraImuRotation, LeavesARightRotationAsItIs) {
   }
 }
 
-// Straight ahead nothing tells the roll: it stays zero, the others are found.
+// A straight road leaves the roll open: it stays zero, the others are found.
 TEST(CorrectCameraImuRotation, KeepsWhatAStraightRoadDoesNotTellAtZero) {
   DriveOptions options;
   options.camera_imu_deg = Eigen::Vector3d(0.6, -1.0, 1.5);
@@ -167,7 +167,7 @@ TEST(CorrectCameraImuRotation, KeepsWhatAStraightRoadDoesNotTellAtZero) {
   EXPECT_NEAR(RadToDeg(report.rotation_rad.y()), -1.0, 0.15);
 }
 
-// Without wheels the axis of the turns remains.
+// Without wheels the axis of the vehicle's turns still constrains the rotation.
 TEST(CorrectCameraImuRotation, SeesTheAxisOfTurnsWithoutPositions) {
   DriveOptions options;
   options.camera_imu_deg = Eigen::Vector3d(2.0, 0.0, -3.0);
@@ -211,10 +211,10 @@ TEST(CorrectCameraImuRotation, OptionsDecide) {
   EXPECT_NE(error.find("max_num_steps"), std::string::npos);
 }
 
-// The direction of driving is wrong and the camera-IMU rotation is not, or both
-// are: bends about one axis cannot tell the yaw of the one from that of the
-// other, and the sigma says so. Of 24 seeds 4 beyond 3 sigmas have a
-// probability of 1e-6 where the sigmas are right.
+// The direction of driving is wrong, and the camera-IMU rotation is right or
+// wrong. Bends about one axis cannot separate the yaws of the two, and the
+// stated sigma must cover that. If the sigmas are right, 4 of 24 seeds exceed 3
+// sigmas with a probability of 1e-6.
 TEST(CorrectCameraImuRotation, SharesTheBlameWithTheDirectionOfDriving) {
   for (const double camera_imu_sigma_deg : {0.0, 1.0}) {
     int num_failures = 0;
@@ -223,16 +223,16 @@ TEST(CorrectCameraImuRotation, SharesTheBlameWithTheDirectionOfDriving) {
       DriveOptions options;
       options.camera_imu_deg = random.GaussianVector(camera_imu_sigma_deg);
       Drive drive = BuildDrive(options, seed);
-      // 1 sigma of what the odometry chain grants the direction.
+      // 1 sigma of the direction of driving in the odometry chain.
       const Eigen::Vector3d turn = random.GaussianVector(0.01);
       TurnDirections(turn, &drive);
       const CameraImuRotationReport report =
           Correct(&drive, CameraImuRotationOptions());
-      // Of the angle: along its axis.
+      // Error along the axis of the estimated rotation.
       const double error = report.rotation_rad.normalized().dot(
           report.rotation_rad - DegToRad(1.0) * options.camera_imu_deg);
       num_failures += std::abs(error) > 3.0 * report.sigma_rad;
-      // A direction that is wrong is no reason to report a tiny turn.
+      // A wrong direction of driving must not cause a tiny correction.
       const CameraImuRotationOptions limits;
       EXPECT_TRUE(!report.corrected ||
                   RadToDeg(report.rotation_rad.norm()) >=
@@ -244,7 +244,8 @@ TEST(CorrectCameraImuRotation, SharesTheBlameWithTheDirectionOfDriving) {
   }
 }
 
-// What is left of both in the priors, by the frames that they were made with.
+// Remaining errors of the camera-IMU rotation and of the direction of driving
+// in the priors, in the frames that the priors were made with.
 Eigen::Matrix<double, 6, 1> LeftInPriors(const CameraImuRotationReport& report,
                                          const Eigen::Vector3d& camera_imu_deg,
                                          const Eigen::Vector3d& driving) {
@@ -257,10 +258,11 @@ Eigen::Matrix<double, 6, 1> LeftInPriors(const CameraImuRotationReport& report,
   return left;
 }
 
-// Both are wrong. What is left of them is where the covariance says: of 24
-// seeds 4 beyond the chi-square of 6 degrees of freedom that 3 in 1,000 exceed
-// have a probability of 1e-6. And it says more than was known before: how far
-// from the plane of its turns the machine drives.
+// Camera-IMU rotation and direction of driving are both wrong. The remaining
+// errors must agree with the stated covariance: 3 in 1,000 exceed this bound of
+// the chi-square of 6 degrees of freedom, so 4 of 24 seeds exceed it with a
+// probability of 1e-6. Vision must also constrain the angle between the
+// direction of driving and the plane of the turns better than the prior does.
 TEST(CorrectCameraImuRotation, TellsWhatIsLeftInThePriors) {
   constexpr double kChi2 = 20.06;
   constexpr double kDrivingSigmaRad = 0.01;
@@ -282,7 +284,7 @@ TEST(CorrectCameraImuRotation, TellsWhatIsLeftInThePriors) {
       error.head<3>() -= found.camera_imu_rad;
       error.tail<3>() -= found.driving_direction_rad;
       num_failures += error.dot(found.covariance.ldlt().solve(error)) > kChi2;
-      // The turns are about y: x is the climb.
+      // The turns are about y, so the difference in x is the climb.
       Eigen::Matrix<double, 6, 1> climb = Eigen::Matrix<double, 6, 1>::Zero();
       climb(0) = -1.0;
       climb(3) = 1.0;

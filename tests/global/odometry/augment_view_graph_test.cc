@@ -36,14 +36,14 @@ int NumAdded(const RelativePosePrior& prior) {
 }
 
 TEST(AddSensorEdges, TakesLongPriorsThatErrLittle) {
-  // Short ones whatever their error: it stands in their weight.
+  // Short priors whatever their error: their weight accounts for the error.
   EXPECT_EQ(NumAdded(Step(0.4, 0.1, 0.01)), 1);
   EXPECT_EQ(NumAdded(Step(0.4, 3.0, 0.3)), 1);
   // A photo every second.
   EXPECT_EQ(NumAdded(Step(1.0, 0.1, 0.01)), 1);
   EXPECT_EQ(NumAdded(Step(1.0, 3.0, 0.01)), 0);
   EXPECT_EQ(NumAdded(Step(1.0, 0.1, 0.3)), 0);
-  // Lengths are measured by themselves.
+  // The error of a translation counts relative to its length.
   RelativePosePrior far = Step(1.0, 0.1, 0.3);
   far.cam2_from_cam1.translation *= 20.0;
   EXPECT_EQ(NumAdded(far), 1);

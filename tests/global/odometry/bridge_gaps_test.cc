@@ -18,8 +18,8 @@ constexpr int kNumSeeds = 20;
 constexpr double kRotationSigma = 2e-4;
 using Poses = std::map<image_t, Rigid3d>;
 
-// A walk whose images first to last saw nothing, and what came behind them is a
-// model in a frame and unit of its own.
+// A walk in which images first to last have no poses. The images behind the gap
+// are a model in a frame and unit of its own.
 struct WalkWithGap {
   WalkWithGap(uint64_t seed, image_t first, image_t last,
               int num_images = 240) {
@@ -67,8 +67,8 @@ const RelativePosePrior& PriorBehind(const InertialOdometry& odometry,
   return odometry.priors.at(image_id - 1);
 }
 
-// The error of the way across the gap, in the axes of the image behind it, and
-// its stated covariance.
+// The error of the translation across the gap, in the axes of the image behind
+// it, and its stated covariance.
 struct GapError {
   Eigen::Vector3d error = Eigen::Vector3d::Zero();
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
@@ -92,8 +92,9 @@ GapError ErrorAcross(const WalkWithGap& walk, const InertialOdometry& odometry,
   return sum;
 }
 
-// Of as many gaps of 1.5 s, the covariance is that of the errors, and tells
-// something. The smoother grants the IMU more noise than this one has.
+// Over kNumSeeds gaps of 1.5 s, the stated covariance must agree with the
+// errors and be small enough to be useful. The smoother assumes more IMU noise
+// than the simulation has.
 void ExpectHonest(int num_images) {
   double chi2 = 0.0;
   for (uint64_t seed = 1; seed <= kNumSeeds; ++seed) {
@@ -105,15 +106,15 @@ void ExpectHonest(int num_images) {
     EXPECT_LT(std::sqrt(sum.covariance.trace() / 3.0), 0.06);
     chi2 += sum.error.dot(sum.covariance.ldlt().solve(sum.error));
   }
-  // Of 60 degrees of freedom, 0.1 % are above 1.66; half the noise of the
-  // accelerometer alone gives 0.25.
+  // Of the chi-square of 60 degrees of freedom, 0.1 % exceed 1.66 per degree.
+  // Half of the assumed accelerometer noise alone gives 0.25.
   EXPECT_LT(chi2 / (3.0 * kNumSeeds), 1.66);
   EXPECT_GT(chi2 / (3.0 * kNumSeeds), 0.15);
 }
 
 TEST(BridgeGaps, TellsTheWayAcross) { ExpectHonest(240); }
 
-// The model behind the gap is too short for the accelerometer to tell its size.
+// The accelerometer cannot determine the size of a model this short.
 TEST(BridgeGaps, FindsTheSizeOfAShortModel) {
   ExpectHonest(165);
   for (uint64_t seed = 1; seed <= kNumSeeds; ++seed) {
@@ -142,7 +143,7 @@ TEST(BridgeGaps, StepsWithinModelsAreVisionsInMetres) {
         walk.TrueMotion(prior.image_id1, prior.image_id2).translation;
     const Eigen::Matrix3d covariance =
         prior.covariance.bottomRightCorner<3, 3>();
-    // 16 is beyond 0.1 % of 3 degrees of freedom.
+    // Of the chi-square of 3 degrees of freedom, 0.1 % exceed 16.3.
     EXPECT_LT(error.dot(covariance.ldlt().solve(error)), 16.3);
     EXPECT_EQ(prior.cam2_from_cam1.rotation.coeffs(),
               walk.walk.rotations[prior.image_id1 - 1]
@@ -150,7 +151,7 @@ TEST(BridgeGaps, StepsWithinModelsAreVisionsInMetres) {
   }
 }
 
-// Images in a row that no model ties although they all are in one.
+// Two consecutive images without a common model, although each is in a model.
 TEST(BridgeGaps, ParallelModelsMeetBetweenTwoImages) {
   const WalkWithGap walk(2, 121, 120);
   const InertialOdometry odometry = walk.Bridge();

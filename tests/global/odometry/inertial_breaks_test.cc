@@ -42,7 +42,7 @@ Eigen::Vector3d Way(uint64_t seed, double length_m) {
   return length_m * random.GaussianVector(1.0).normalized();
 }
 
-// Images that are moved are found, all of them and no other.
+// Exactly the images that were moved must be found.
 void ExpectFound(image_t first, image_t last) {
   for (uint64_t seed = 1; seed <= kNumSeeds; ++seed) {
     WalkData walk = Walk(seed);

@@ -14,7 +14,7 @@ std::optional<InertialScale> Estimate(const WalkData& data) {
   return EstimateInertialScale(data.motions, data.cams_from_world);
 }
 
-// Twenty walks: errors are within three of their own sigmas but for one.
+// At most one of twenty walks has an error above three of its own sigmas.
 void ExpectHonest(const WalkOptions& options, double max_sigma) {
   int num_outside = 0;
   for (uint64_t seed = 1; seed <= 20; ++seed) {

@@ -28,8 +28,8 @@ Eigen::Matrix<double, 6, 1> ErrorOf(const Rigid3d& motion,
   return error;
 }
 
-// Of 1,500 draws: in the frame in which the stated covariance is the identity,
-// sampled variances have a standard error of sqrt(2 / n) = 3.7 %.
+// In the frame in which the stated covariance is the identity, variances of
+// 1,500 draws have a standard error of sqrt(2 / n) = 3.7 %.
 void ExpectSpread(const Matrix6d& stated, const Matrix6d& sampled) {
   const Matrix6d whitener = Matrix6d(stated.llt().matrixL()).inverse();
   const Eigen::SelfAdjointEigenSolver<Matrix6d> eigen(whitener * sampled *
@@ -100,7 +100,7 @@ TEST(OdometryChain, FollowersHaveTheirLeadersPlace) {
       PosesNear(followers.cam2_from_cam1,
                 cam_from_rig * leaders.cam2_from_cam1 * cam_from_rig.Inverse(),
                 1e-9, 1e-9));
-  // The extrinsics' errors of 1 mrad come to the odometry's.
+  // The extrinsics' errors of 1 mrad add to those of the odometry.
   const auto rotation_variance = [](const ChainMotion& motion) {
     return Eigen::Matrix3d(motion.covariance.topLeftCorner<3, 3>()).trace();
   };
@@ -126,8 +126,8 @@ TEST(OdometryChain, CovarianceAgreesWithMonteCarlo) {
   options.driving_direction_sigma_rad = 0.003;
   options.persistent_translation_ratio = 0.3;
   Random random(7);
-  // noise: 0 for the truth. The bias is that of the stated sigma at the earlier
-  // image, and walks from there on.
+  // noise: 0 for the truth. The bias has the stated sigma at the earlier image
+  // and walks from there on.
   const auto draw = [&](double noise, int earlier) {
     const double scale = 1.0 + noise * random.Gaussian(options.scale_sigma);
     Eigen::Vector3d bias =
@@ -173,9 +173,9 @@ TEST(OdometryChain, CovarianceAgreesWithMonteCarlo) {
   }
 }
 
-// Turns that vision has found are taken out, and the rest of them has the
-// spread of their covariance: a drive up a helix, whose priors have the
-// rotation and the direction of driving wrong together.
+// Shared rotations that vision has found are removed, and the errors that
+// remain must agree with their covariance. The drive goes up a helix; its
+// priors have camera-IMU rotation and direction of driving wrong together.
 TEST(OdometryChain, SharedErrorsAgreeWithMonteCarlo) {
   constexpr int kNumSteps = 120;
   constexpr int kNumDraws = 1500;
@@ -192,7 +192,7 @@ TEST(OdometryChain, SharedErrorsAgreeWithMonteCarlo) {
   options.gyro_bias_sigma_rad_s = 0.0;
   options.gyro_bias_walk_rad_s_sqrt_s = 0.0;
   options.persistent_translation_ratio = 0.0;
-  // White noise is what turns of all steps do not change to first order.
+  // Isotropic: rotations of all steps do not change it to first order.
   const double variance = 1e-8;
   std::vector<RelativePosePrior> truth;
   for (int k = 1; k <= kNumSteps; ++k) {
@@ -200,7 +200,7 @@ TEST(OdometryChain, SharedErrorsAgreeWithMonteCarlo) {
     truth.back().covariance = variance * Matrix6d::Identity();
   }
   const ChainMotion expected = OdometryChain(truth, options).Motion(11, 111);
-  // Priors that these turns make true.
+  // Priors that these rotations correct to the truth.
   const auto turn_away = [&](const Eigen::Vector3d& camera_imu_rad,
                              const Eigen::Vector3d& driving_rad) {
     std::vector<RelativePosePrior> priors = truth;
@@ -243,8 +243,8 @@ TEST(OdometryChain, SharedErrorsAgreeWithMonteCarlo) {
   ExpectSpread(stated.covariance, sampled);
 }
 
-// An axis that the import knows badly is the one that errs, by its rate times
-// the time.
+// The stated bias covariance is used for each axis: the rotation error is the
+// rate error times the time.
 TEST(OdometryChain, StatedBiasReplacesTheAssumedOne) {
   Random random(7);
   std::vector<RelativePosePrior> priors;
@@ -268,8 +268,8 @@ TEST(OdometryChain, StatedBiasReplacesTheAssumedOne) {
   EXPECT_NEAR(stated(0, 0), 1e-8 * seconds * seconds, 1e-9);
 }
 
-// The scale changes at each step, and nothing brings it back: a drive round a
-// block does not close then.
+// The scale is a random walk over the steps, so a drive round a block does not
+// close.
 TEST(OdometryChain, ScaleDriftAgreesWithMonteCarlo) {
   constexpr int kNumSteps = 120;
   constexpr int kNumDraws = 1500;
@@ -303,8 +303,8 @@ TEST(OdometryChain, ScaleDriftAgreesWithMonteCarlo) {
     Eigen::Matrix3d sampled = Eigen::Matrix3d::Zero();
     for (int k = 0; k < kNumDraws; ++k) {
       const OdometryChain drawn = draw(options.scale_drift_ratio);
-      // The part before the earlier image scales the whole; only the change
-      // since then is the chain's.
+      // The scale up to the earlier image is common to all steps; only its
+      // change since then is an error of the chain.
       const image_t earlier = std::min(from, to);
       const double scale =
           drawn.Motion(earlier, earlier + 1).cam2_from_cam1.translation.norm() /
@@ -314,7 +314,7 @@ TEST(OdometryChain, ScaleDriftAgreesWithMonteCarlo) {
           expected.cam2_from_cam1.translation;
       sampled += error * error.transpose() / kNumDraws;
     }
-    // As above; the drift is 10 % after 100 steps, which is not quite linear.
+    // See ExpectSpread; a drift of 10 % after 100 steps is not quite linear.
     const Eigen::Matrix3d whitener =
         Eigen::Matrix3d(covariance.llt().matrixL()).inverse();
     const Eigen::Vector3d eigenvalues =

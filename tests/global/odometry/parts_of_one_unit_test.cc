@@ -15,8 +15,9 @@ namespace {
 constexpr int kNumImages = 9;
 constexpr image_t kHinge = 5;
 
-// Nine images in a row. A camera that turns on the spot at the fifth: no pair
-// leads past it, and no landmark is matched both before and behind.
+// Nine images in a row, with a camera that rotates on the spot at the fifth: no
+// pair spans it and, unless shares_landmarks, no landmark is matched both
+// before and behind.
 //   1 - 2 - 3 - 4 - 5 - 6 - 7 - 8 - 9
 TestScene BuildHingedScene(bool shares_landmarks) {
   TestSceneOptions options;
@@ -60,7 +61,7 @@ TEST(FindPartsOfOneUnit, SharedLandmarksTieSizes) {
 }
 
 TEST(FindPartsOfOneUnit, SplitsAtAHinge) {
-  // The hinge goes to the first of two sets of five.
+  // The hinge belongs to two sets of five and is assigned to the first.
   EXPECT_EQ(PartsOf(BuildHingedScene(false), {}),
             std::vector<int>({0, 0, 0, 0, 0, 5, 5, 5, 5}));
 }
@@ -73,7 +74,7 @@ TEST(FindPartsOfOneUnit, MetresOnBothSidesTieSizes) {
             std::vector<int>({0, 0, 0, 0, 0, 5, 5, 5, 5}));
 }
 
-// The rotations of an IMU tie the two sides of the hinge no better.
+// The rotations of an IMU do not connect the scales beside the hinge.
 TEST(FindPartsOfOneUnit, CoarsePosesSplitAtAHingeWithAnImuToo) {
   Random random(1);
   for (const bool shares_landmarks : {true, false}) {
@@ -91,7 +92,7 @@ TEST(FindPartsOfOneUnit, CoarsePosesSplitAtAHingeWithAnImuToo) {
   }
 }
 
-// By hand: units {1, 2, 3}, {3, 4, 5}, and an image that no length reaches.
+// A graph made by hand, with the unit of each edge.
 class Units {
  public:
   void Add(image_t id1, image_t id2, int unit, int num_inliers = 50) {
@@ -121,15 +122,16 @@ TEST(FindPartsOfOneUnit, TwoImagesTieSizesAndOneDoesNot) {
     world.Add(id1, id2, unit);
   }
   EXPECT_EQ(world.Parts(), std::vector<int>({0, 0, 0, 3, 3}));
-  // A third unit that both others share one image with only ties nothing; with
-  // two of the first it is of that size, and then shares two with the second.
+  // A third unit that shares one image with each of the others connects
+  // nothing. With two images of the first it has the first's size, and both
+  // then share two images with the second.
   world.Add(1, 4, 2);
   EXPECT_EQ(world.Parts(), std::vector<int>({0, 0, 0, 3, 3}));
   world.Add(2, 4, 2);
   EXPECT_EQ(world.Parts(), std::vector<int>(5, 0));
 }
 
-// Units {1, 2, 3} and {4, 5, 6}, and bars of units of their own between them.
+// Units {1, 2, 3} and {4, 5, 6}; each bar (edge) between them is one more.
 Units BuildUnitsWithBars(const std::vector<std::pair<image_t, image_t>>& bars,
                          const std::map<image_t, Eigen::Vector3d>& centers) {
   Units world;
@@ -159,16 +161,16 @@ TEST(FindPartsOfOneUnit, AClosedTriangleOfUnitsTiesTheirSizes) {
   }
   EXPECT_EQ(BuildUnitsWithBars({{3, 6}}, centers).Parts(),
             std::vector<int>({0, 0, 0, 3, 3, 3}));
-  // The bars are of the second unit's size, the first is hinged at image 3.
+  // The bars have the size of the second unit; the first is hinged at image 3.
   EXPECT_EQ(BuildUnitsWithBars({{3, 6}, {3, 4}}, centers).Parts(),
             std::vector<int>({0, 0, 2, 2, 2, 2}));
-  // A third bar, which meets the first unit elsewhere, closes one more.
+  // A third bar, to another image of the first unit, closes one more triangle.
   EXPECT_EQ(BuildUnitsWithBars({{3, 6}, {3, 4}, {1, 4}}, centers).Parts(),
             std::vector<int>(6, 0));
 }
 
-// Four bars of four directions in a plane change their sizes freely, out of it
-// they do not.
+// The sizes of a ring of four bars with four directions are free if it lies in
+// a plane, and constrained if it does not.
 TEST(FindPartsOfOneUnit, ARingOfFourTiesSizesOutOfItsPlaneOnly) {
   std::map<image_t, Eigen::Vector3d> centers;
   for (int i = 0; i < 3; ++i) {
@@ -183,7 +185,7 @@ TEST(FindPartsOfOneUnit, ARingOfFourTiesSizesOutOfItsPlaneOnly) {
             std::vector<int>(6, 0));
 }
 
-// A triangle of one line has sizes in every proportion.
+// A triangle with all sides on one line allows any proportion of sizes.
 TEST(FindPartsOfOneUnit, ARingInOneLineTiesNothing) {
   std::map<image_t, Eigen::Vector3d> centers;
   for (int i = 1; i <= 6; ++i) centers[i] = Eigen::Vector3d(i, 0.0, 0.0);

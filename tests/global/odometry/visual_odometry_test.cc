@@ -19,8 +19,8 @@ struct StepProblem {
   std::map<ImagePair, double> known_lengths_m;
 };
 
-// An arc of which the sensors saw the rotations, and the positions of the steps
-// that has_position picks.
+// An arc. The sensors measure all rotations, but positions only of the steps
+// that has_position selects.
 template <typename Function>
 StepProblem BuildProblem(uint64_t seed, Function has_position) {
   StepProblem problem;
@@ -54,7 +54,7 @@ VisualOdometryEdges Complete(const StepProblem& problem,
                            problem.known_lengths_m, problem.priors);
 }
 
-// The way from the first image to the last, as the completed chain has it.
+// Estimated over true distance from first to last image, by the full chain.
 double LengthRatioOfTheWay(const StepProblem& problem,
                            const VisualOdometryEdges& steps) {
   const OdometryChain chain(steps.priors, OdometryChainOptions());
@@ -77,7 +77,7 @@ TEST(AddVisualOdometry, SpreadsMetresToTheStepsWithoutPosition) {
     EXPECT_EQ(steps.num_by_vision, kNumImages - 1 - 4);
     EXPECT_EQ(steps.unit_m, 1.0);
     EXPECT_NEAR(LengthRatioOfTheWay(problem, steps), 1.0, 0.1) << seed;
-    // What the sensors saw stays.
+    // Motions that the sensors measured are kept.
     EXPECT_EQ(steps.priors[2].cam2_from_cam1.translation,
               problem.priors[2].cam2_from_cam1.translation);
   }
@@ -101,7 +101,7 @@ double TranslationVariance(const RelativePosePrior& prior) {
   return prior.covariance.bottomRightCorner<3, 3>().trace();
 }
 
-// Vision that drifts more is believed less.
+// Larger stated drift of visual odometry gives larger sigmas.
 TEST(AddVisualOdometry, SigmasFollowTheOptions) {
   const StepProblem problem = BuildProblem(1, [](int) { return false; });
   VisualOdometryOptions options;
@@ -112,7 +112,7 @@ TEST(AddVisualOdometry, SigmasFollowTheOptions) {
             4.0 * plain);
 }
 
-// What neither sensors nor vision see stays open.
+// Steps that neither sensors nor vision observe stay open.
 TEST(AddVisualOdometry, NothingGoesOnThroughAHole) {
   StepProblem problem = BuildProblem(1, [](int) { return false; });
   for (ViewGraphEdge& edge : problem.scene.graph.edges) {

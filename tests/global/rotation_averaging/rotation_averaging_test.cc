@@ -127,7 +127,7 @@ TEST(RotationAveraging, AgreesWithADenseSolver) {
     const GlobalRotations result =
         EstimateGlobalRotations(options, problem.graph);
     ASSERT_TRUE(result.success);
-    // From another start, so that nothing of the result is taken over.
+    // From another start, so that the reference does not reuse the result.
     const Rotations reference = SolveDensely(problem.graph, problem.truth);
     // The iterations' linearisation drops terms of second order in the noise.
     EXPECT_LT(ComputeAlignedRotationError(result.cams_from_world, reference),

@@ -75,7 +75,7 @@ TEST(BoundNegativeEigenvalue, HoldsAndIsTightAgainstADenseSolver) {
     for (const double guess : {0.0, 0.9 * std::max(0.0, -smallest)}) {
       const double bound = BoundNegativeEigenvalue(lower, guess);
       EXPECT_GE(bound, -smallest) << "seed " << seed;
-      // The search doubles.
+      // The search doubles its bound.
       EXPECT_LE(bound, 2.0 * std::max(0.0, -smallest) + 1e-9);
     }
   }
@@ -124,7 +124,7 @@ TEST(SolveRotationSdp, CertifiesGlobalOptimaFromAnyStart) {
   }
 }
 
-// Whatever wrong edges did to the solution: nothing costs less than the bound.
+// Wrong edges or not: no rotations cost less than the bound.
 TEST(SolveRotationSdp, BoundsTheCostOfAllRotations) {
   for (uint64_t seed = 1; seed <= 10; ++seed) {
     const double outlier_ratio = 0.06 * seed;
@@ -132,7 +132,7 @@ TEST(SolveRotationSdp, BoundsTheCostOfAllRotations) {
     const RotationSdpProblem costs(problem.edges, problem.truth.size());
     Random random(seed);
     RotationSdpOptions options;
-    // Also when it stops long before the optimum.
+    // Even seeds stop long before the optimum.
     options.max_num_sweeps = seed % 2 == 0 ? 2 : 500;
     const RotationSdpSolution solution =
         SolveRotationSdp(options, problem.edges, RandomRotations(12, &random));

@@ -20,9 +20,9 @@ struct Sights {
   Sim3d a_from_b;
 };
 
-// A camera that goes along x, 0.2 between images; part a ends and part b begins
-// at x = 0. Points of either part stand around; the first images of b see those
-// of a, the last ones of a those of b. step: of the images near the end.
+// A camera moves along x; part a ends and part b begins at x = 0. The points of
+// both parts are nearby. The first images of b see points of a, the last images
+// of a see points of b. step: distance of the images near the end.
 Sights BuildSights(double step, double outlier_ratio, uint64_t seed) {
   Random random(seed);
   const auto draw = [&random](double sigma) {
@@ -79,11 +79,11 @@ TEST(EstimatePartJoin, FindsPlaceAndSizeWithinTheirSigma) {
           10.0 * kNoiseRad);
     }
   }
-  // Mean of 20 squares: within five of its sigmas.
+  // The mean of 20 squared normal variables: within five standard errors.
   EXPECT_LT(chi2, 1.0 + 5.0 * std::sqrt(2.0 / (2 * kNumSeeds)));
 }
 
-// All images at one place tell no size.
+// Images at one place do not constrain the size.
 TEST(EstimatePartJoin, KnowsNoSizeOfACameraThatTurnsOnTheSpot) {
   for (int seed = 1; seed <= kNumSeeds; ++seed) {
     const auto join = Estimate(BuildSights(0.0, 0.0, seed));

@@ -14,7 +14,7 @@ std::set<image_t> Images() {
   return images;
 }
 
-// Each track is seen by length consecutive images, 50 of them begin anywhere.
+// At each image 50 tracks begin; each is seen by `length` consecutive images.
 std::vector<Track> Tracks(int length) {
   std::vector<Track> tracks;
   for (image_t first = 1; first + length - 1 <= kNumImages; ++first) {
@@ -80,7 +80,7 @@ TEST(SelectKeyframes, KeepsImagesThatNothingCarries) {
   EXPECT_EQ(keyframes.count(20), 1);
   EXPECT_EQ(keyframes.count(21), 1);
   EXPECT_LT(keyframes.size(), kNumImages / 2);
-  // Priors in a circle begin nowhere.
+  // A circle of priors has no beginning.
   priors = Priors(kComplete);
   priors.push_back(priors.back());
   priors.back().image_id1 = kNumImages;

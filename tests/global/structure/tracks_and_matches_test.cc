@@ -19,8 +19,8 @@ std::vector<Track> FindTracks(
   return SelectTracks(options, BuildTracks(options, matches));
 }
 
-// Images 1 2 3; keypoint 0 everywhere is one point, and a wrong match would
-// join keypoint 5 of image 3 to it:
+// Images 1 2 3: keypoint 0 is the same point in all of them. A wrong match
+// would join keypoint 5 of image 3 to this point:
 //   1:0 - 2:0 - 3:0      2:0 - 3:5 (in a pair with fewer matches, so later)
 TEST(BuildTracks, KeepsOneKeypointPerImage) {
   std::map<ImagePair, std::vector<FeatureMatch>> matches;
@@ -69,7 +69,7 @@ TEST(BuildTracks, ShortensLongTracksEvenly) {
       }
       for (const TrackElement& element : track) ++num_tracks[element.image_id];
     }
-    // No image falls out of all tracks.
+    // Each image keeps some of its tracks.
     if (max_length >= 12) {
       EXPECT_EQ(num_tracks.size(), kNumImages);
     }
@@ -107,7 +107,7 @@ TEST(TriangulateTracks, FindsThePointsDespiteWrongObservations) {
     for (int k = 0; k < options.num_landmarks; ++k) {
       tracks.emplace_back();
       for (const image_t image_id : scene.graph.images) {
-        // Image 4 sees something else.
+        // Image 4 observes other landmarks.
         const point2D_t wrong = (k + 7) % options.num_landmarks;
         tracks.back().push_back({image_id, image_id == 4 ? wrong : k});
       }
@@ -157,12 +157,13 @@ TEST(RefineMatches, RecoversTrueMatchesAndDropsFalseOnes) {
         num_true_kept += match.point2D_idx1 == match.point2D_idx2;
       }
     }
-    // Twice 0.7 px of noise against 4 px: nearly all; a wrong match lies in the
-    // band by chance in about 4 px of 500.
+    // Noise of twice 0.7 px is small against 4 px: nearly all true matches are
+    // kept. A wrong match lies in the epipolar band by chance in about 4 px of
+    // 500.
     EXPECT_GT(num_true_kept, 0.97 * num_true);
     EXPECT_GT(num_true_kept, 0.96 * num_kept);
     EXPECT_EQ(report.num_removed_pairs, 0);
-    // Half of a pair's points are seen under a larger angle.
+    // Half of a pair's points have more than the median parallax.
     for (const RefinedPair& pair : report.pairs) {
       const auto centre = [&](image_t image_id) {
         return scene.cams_from_world.at(image_id).TargetOriginInSource();

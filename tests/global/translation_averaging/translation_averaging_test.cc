@@ -178,7 +178,7 @@ TEST(TranslationAveraging, IsNeverSilentAboutDisconnectedGraphs) {
                    .success);
 }
 
-// Without lengths and without noise along a line, whatever comes is finite.
+// Along a line, without lengths and noise, the result must be finite.
 TEST(TranslationAveraging, NeverReturnsNaN) {
   const PositionProblem problem = BuildProblem(20, 10, 0, 0.3, true, 3);
   const GlobalPositions result = EstimateGlobalPositions(

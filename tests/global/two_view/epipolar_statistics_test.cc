@@ -18,8 +18,8 @@ namespace {
 using Vector5d = Eigen::Matrix<double, 5, 1>;
 
 constexpr int kNumTrials = 200;
-// What the mean of as many squared normal variables (of variance 2) and the
-// mean of as many normal ones may be off by, with 4 sigmas.
+// Tolerances of 4 sigmas for the mean of kNumTrials squared normal variables
+// (of variance 2) and for the mean of kNumTrials normal variables.
 const double kChi2Tolerance = 4.0 * std::sqrt(2.0 / kNumTrials);
 const double kMeanTolerance = 4.0 / std::sqrt(kNumTrials);
 
@@ -66,7 +66,7 @@ TEST(LinearizeEpipolarDistance, AgreesWithNumericDerivatives) {
 }
 
 struct ErrorStatistics {
-  Vector5d mean = Vector5d::Zero();  // rotation, direction; by the rms
+  Vector5d mean = Vector5d::Zero();  // rotation, direction; over the rms
   double rotation_chi2 = 0.0;        // per axis, against the stated sigma
   double direction_chi2 = 0.0;       // against the larger axis' sigma
 };
@@ -74,7 +74,7 @@ struct ErrorStatistics {
 struct Setting {
   TwoViewSceneOptions scene;
   RelativePoseRefinementOptions refinement;
-  // Directions under the true rotation instead.
+  // Estimates the direction under the true rotation instead.
   bool hold_rotation = false;
 };
 
@@ -140,13 +140,13 @@ std::string Describe(const Setting& setting) {
          std::to_string(setting.scene.outlier_ratio);
 }
 
-// A bias of a fifth of the noise does not matter.
+// A bias of a fifth of the noise is allowed.
 void ExpectNoBias(const Setting& setting, const ErrorStatistics& statistics) {
   EXPECT_LT(statistics.mean.cwiseAbs().maxCoeff(), 0.2 + kMeanTolerance)
       << Describe(setting) << ": " << statistics.mean.transpose();
 }
 
-// A tenth for what a linear covariance cannot know.
+// A tenth is allowed for the error of a linearised covariance.
 void ExpectChi2(const Setting& setting, double chi2, double least,
                 double largest) {
   EXPECT_GT(chi2, least - kChi2Tolerance - 0.1) << Describe(setting);
@@ -158,17 +158,17 @@ TEST(RefineRelativePoses, IsUnbiasedWithHonestSigmas) {
     const ErrorStatistics statistics = Measure(setting);
     ExpectNoBias(setting, statistics);
     ExpectChi2(setting, statistics.rotation_chi2, 1.0, 1.0);
-    // Of two axes the larger one counts. Wrong matches of large parallax move
-    // directions by more than their number tells.
+    // The sigma is that of the larger of two axes, hence 1 to 2. Wrong matches
+    // of large parallax bias directions by more than their number suggests.
     if (setting.scene.outlier_ratio == 0.0) {
       ExpectChi2(setting, statistics.direction_chi2, 1.0, 2.0);
     }
   }
 }
 
-// With a loss below the noise, as the importer has it. There the wrong matches
-// of largest parallax pull by a tenth of a degree of direction and a few
-// hundredths of rotation, which no derivative mends.
+// The loss scale is below the noise, as in the importer. Wrong matches
+// (skipped) of large parallax then bias directions by a tenth of a degree and
+// rotations by a few hundredths, which no derivative corrects.
 TEST(RefineRelativePoses, IsUnbiasedWithHonestSigmasUnderANarrowLoss) {
   for (Setting setting : BuildSettings()) {
     if (setting.scene.outlier_ratio > 0.0) continue;

@@ -72,7 +72,7 @@ TEST(RelativeTranslations, NearZeroBaselineSaysNothing) {
   TestSceneOptions options;
   options.noise_px = 0.5;
   TestScene scene = BuildTestScene(options, 3);
-  // Image 2 stands where image 1 stands: the same rays with other noise.
+  // Image 2 has the pose of image 1: the same rays with other noise.
   const Rigid3d pose = scene.cams_from_world.at(1);
   TestScene other = BuildTestScene(options, 3);
   other.correspondences.bearings[2] = scene.correspondences.bearings.at(1);
@@ -91,9 +91,9 @@ TEST(RelativeTranslations, NearZeroBaselineSaysNothing) {
   EXPECT_TRUE(other.graph.edges[1].has_translation);
 }
 
-// Image 2 stands where image 1 stands, up to a rotation; a part of the matches
-// has gross noise, or lies on a car that passes. Those agree with one direction
-// very well, which says nothing of the camera.
+// Image 2 has the position of image 1. A quarter of the matches has gross
+// noise, or lies on a passing car; these agree very well with one direction
+// that does not depend on the camera's motion.
 TEST(RefineRelativePoses, StandstillHasNoBaselineWhateverMovesBeforeIt) {
   for (const bool is_car : {false, true}) {
     for (uint64_t seed = 1; seed <= 5; ++seed) {
@@ -166,8 +166,8 @@ TEST(RefineRelativePoses, ReachesTheTruthFromAFewDegreesOff) {
   }
 }
 
-// A prediction is followed where the matches leave the rotation open (few of
-// them), and ignored where they contradict it clearly.
+// A prediction decides where few matches leave the rotation open, and is
+// ignored where the matches clearly contradict it.
 TEST(RefineRelativePoses, PredictionHelpsButCannotOverruleMatches) {
   TestSceneOptions options;
   options.noise_px = 0.5;

@@ -190,7 +190,7 @@ TEST_F(Bags, ADamagedChunkIsLeftOut) {
 
 TEST_F(Bags, HugeClaimsAreDamageAndTakeNoMemory) {
   const std::string huge(8, '\xff');
-  // Of the first record behind the header: opcode, then its length.
+  // Offset of the first record behind the header: opcode, then its length.
   const std::string path = WriteImuBag("drive.mcap", {"zstd"});
   const size_t chunk = 8 + 9 + 4 + 4 + 4 + 4;
   Overwrite(path, chunk + 9 + 16, huge);  // the chunk's uncompressed size

@@ -13,9 +13,9 @@
 namespace adasfm {
 namespace {
 
-// A focal length twice too long halves the turns that pictures show. A drive of
-// five seconds that ends within its bend looks then as if the bend came later,
-// and no clock is to be blamed for that.
+// A focal length twice too long halves the rotations that vision measures. In a
+// drive of five seconds that ends within its bend, the bend then seems to come
+// later; the error must not be reported as a time offset.
 TEST(CheckAgainstVision, HalvedTurnsAreNoClockShift) {
   constexpr int kNumImages = 51;
   const auto yaw_rad = [](double time_s) {

@@ -20,7 +20,7 @@ WheelCheck Check(const Dataset& data) {
                      true, data.calibration);
 }
 
-// Each drive, with what change does to it, must be contradicted in these words.
+// Each drive, modified by `change`, must be contradicted in these words.
 template <typename Change>
 void ExpectNamed(Change change, const std::string& words) {
   for (const uint64_t seed : kSeeds) {
@@ -85,7 +85,7 @@ TEST(CheckWheels, NamesWheelsThatCountBackwards) {
       "count backwards");
 }
 
-// A short drive that slips half of the time is healthy.
+// A short drive that slips half of the time must pass.
 TEST(CheckWheels, TakesEightSlipsInSixteenSeconds) {
   for (uint64_t seed = 1; seed <= 10; ++seed) {
     SyntheticWorldOptions options = SmallWorld(seed, 60);
@@ -95,8 +95,8 @@ TEST(CheckWheels, TakesEightSlipsInSixteenSeconds) {
   }
 }
 
-// Wheels spin by a factor of 1.7 while a straight drive gains its speed, which
-// is nearly all that the accelerometer sees of it.
+// Wheels spin by a factor of 1.7 while a straight drive gains its speed, and
+// the accelerometer observes nearly nothing else of the drive.
 TEST(CheckWheels, DoesNotRefuseWheelsThatSpinAtTheStart) {
   SyntheticWorldOptions options = SmallWorld(2, 60);
   options.trajectory = SyntheticTrajectory::kStraight;
@@ -185,7 +185,7 @@ TEST(CheckWheels, NamesTheWheelsClock) {
   }
 }
 
-// The same way driven from its end.
+// The same drive with its wheel readings in reverse order.
 TEST(CheckWheels, NamesTheLogOfAnotherDrive) {
   ExpectNamed(
       [](Dataset* data) {

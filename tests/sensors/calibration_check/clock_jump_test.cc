@@ -10,7 +10,7 @@
 namespace adasfm {
 namespace {
 
-// The error of a drive whose IMU clock jumps in its middle.
+// The error message of a drive whose IMU clock jumps in its middle.
 std::string ErrorOf(uint64_t seed, double jump_s, double shift_s) {
   const SyntheticWorld world = BuildSyntheticWorld(SmallWorld(seed, 160));
   Dataset data = ToDataset(world);

@@ -16,8 +16,8 @@ namespace {
 
 constexpr double kPi = 3.141592653589793;
 
-// Turns about all axes, at three frequencies each: slow bends and a car's
-// springs. What a first-order low-pass filter makes of a sine is known.
+// Rotations at six frequencies about random axes: slow bends and a car's
+// springs. The response of a first-order low-pass filter to a sine is known.
 class Wobble {
  public:
   explicit Wobble(uint64_t seed) : random_(seed) {
@@ -28,7 +28,7 @@ class Wobble {
     }
   }
 
-  // Through the filter, rad/s.
+  // The filtered rate, rad/s.
   Eigen::Vector3d Rate(double time_s, const GyroscopeFilter& filter) const {
     Eigen::Vector3d rate = Eigen::Vector3d::Zero();
     for (const Wave& wave : waves_) {
@@ -52,7 +52,7 @@ class Wobble {
     return log;
   }
 
-  // Ten images a second from 1 s to 19 s, each with the next two.
+  // Ten images a second from 1 s to 19 s, each paired with the next two.
   std::vector<TimedRotation> Vision(double sigma_rad) {
     std::vector<Eigen::Quaterniond> world_from_camera(
         181, Eigen::Quaterniond::Identity());
@@ -116,7 +116,7 @@ TEST(GyroscopeFilter, KeepsTimesForcesAndShortLogs) {
   EXPECT_EQ(log[1].angular_velocity, Eigen::Vector3d(1, 2, 3));
 }
 
-// Over ten drives: the filter's time constant and what it delays slow turns by.
+// Over ten drives: the filter's time constant and its delay of slow rotations.
 TEST(GyroscopeFilter, IsFoundFromVision) {
   const GyroscopeFilter filter = {0.05, 0.02};
   constexpr int kNumSeeds = 10;
@@ -136,13 +136,13 @@ TEST(GyroscopeFilter, IsFoundFromVision) {
   }
   const double rms = std::sqrt(squares / kNumSeeds);
   EXPECT_LT(rms, 0.01);
-  // It is searched for to a millisecond.
+  // The search has a resolution of a millisecond.
   EXPECT_LT(std::abs(lags / kNumSeeds),
             1e-3 + 3.0 * rms / std::sqrt(kNumSeeds));
   RecordProperty("lag_rms_ms", std::to_string(1e3 * rms));
 }
 
-// A shift is no filter, neither is a slightly turned T_cam_imu.
+// Neither a time offset nor a slightly wrong T_cam_imu is taken for a filter.
 TEST(GyroscopeFilter, IsNotFoundWhereThereIsNone) {
   for (int seed = 1; seed <= 10; ++seed) {
     Wobble wobble(seed);

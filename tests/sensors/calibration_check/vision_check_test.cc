@@ -13,7 +13,7 @@
 namespace adasfm {
 namespace {
 
-// What users get wrong, and the words that must be in the answer.
+// A mistake of users, and the words that the error message must contain.
 struct Mistake {
   const char* name;
   void (*make)(Dataset*);
@@ -27,7 +27,7 @@ TEST_P(Mistakes, AreNamed) {
     const SyntheticWorld world = BuildSyntheticWorld(SmallWorld(seed, 120));
     Dataset data = ToDataset(world);
     GetParam().make(&data);
-    // As the importer does: first the reader's checks of the log alone.
+    // As in the importer, the reader's checks of the log alone come first.
     const Status units = CheckImuUnits(
         data.logs.imu,
         LogOrigin::Numbered("imu.csv", data.logs.imu.size(), "line"));
@@ -44,7 +44,7 @@ TEST_P(Mistakes, AreNamed) {
     EXPECT_NE(estimate.status().message().find(GetParam().words),
               std::string::npos)
         << estimate.status().message();
-    // The user may insist.
+    // The user may switch the check off.
     PriorEstimationOptions options;
     options.check_against_vision = false;
     EXPECT_TRUE(EstimatePriors(data.images, data.logs, data.calibration, vision,
@@ -121,7 +121,7 @@ PriorEstimate EstimateFrom(const Dataset& data,
   return estimate.ok() ? *estimate : PriorEstimate();
 }
 
-// Without asking: what vision tells clearly, of the size of a phone's.
+// Phone-sized time offsets that vision clearly observes are corrected.
 TEST(VisionCheck, ClearClockShiftsAreCorrected) {
   for (const double shift_s : {-0.053, -0.045, 0.062, 0.12}) {
     SyntheticWorldOptions world_options = SmallWorld(4, 120);
@@ -170,8 +170,8 @@ std::vector<VisualRotation> Film(
   return rotations;
 }
 
-// As the camera turns, and as a stabilised video shows it: the mean over a
-// second, which keeps the bends and loses what shakes.
+// The camera's rotations, or as a stabilised video shows them: means over a
+// second, which keep the bends and remove the shaking.
 std::map<image_t, Eigen::Quaterniond> ShownRotations(const Dataset& data,
                                                      bool is_stabilized) {
   std::map<image_t, Eigen::Quaterniond> shown;
@@ -192,8 +192,8 @@ std::map<image_t, Eigen::Quaterniond> ShownRotations(const Dataset& data,
   return shown;
 }
 
-// A hand-held camera: each image turned by some degrees, and the gyroscope's
-// log turned with it.
+// Simulates a hand-held camera: rotates each image by some degrees, and changes
+// the gyroscope's log accordingly.
 void Shake(double amplitude_rad, double speed, Dataset* data) {
   const auto turn_at = [=](timestamp_t time_ns) -> Eigen::Vector3d {
     const double t = speed * SecondsFromNs(time_ns % 1'000'000'000'000);
@@ -242,7 +242,7 @@ TEST(VisionCheck, StabilizedVideoLeavesTheImuOut) {
     EXPECT_NE(estimate.summary.warnings.back().find("stabilised"),
               std::string::npos);
 
-    // The same shaking, as it was filmed.
+    // The same shaking without stabilisation.
     const PriorEstimate honest =
         EstimateFrom(data, Film(data, ShownRotations(data, false), &random));
     EXPECT_FALSE(honest.summary.imu_was_left_out);
@@ -250,7 +250,7 @@ TEST(VisionCheck, StabilizedVideoLeavesTheImuOut) {
   }
 }
 
-// The camera's poses some time after those of the log of its images.
+// The camera's rotations at random offsets from the times of the images.
 std::map<image_t, Eigen::Quaterniond> RotationsAtJitteredTimes(
     const Dataset& data, double sigma_s, Random* random) {
   std::map<image_t, Eigen::Quaterniond> shown = ShownRotations(data, false);
@@ -268,8 +268,8 @@ std::map<image_t, Eigen::Quaterniond> RotationsAtJitteredTimes(
   return shown;
 }
 
-// Times that jitter by 10 ms: between two images by sqrt(2) of that. Exact
-// times show none.
+// Image times jitter by 10 ms, intervals by sqrt(2) of that. Exact times must
+// show no jitter.
 TEST(VisionCheck, JitterOfTheImagesWidensThePriors) {
   constexpr double kSigmaS = 0.01;
   for (const uint64_t seed : {1, 2, 3}) {
@@ -296,14 +296,14 @@ TEST(VisionCheck, JitterOfTheImagesWidensThePriors) {
       turns += LogSo3(exact.priors[i].cam2_from_cam1.rotation).squaredNorm() /
                std::pow(SecondsFromNs(exact.priors[i].dt_ns), 2);
     }
-    // About all three axes.
+    // Summed over all three axes.
     EXPECT_NEAR(wider, 3.0 * expected * expected * turns,
                 0.6 * 3.0 * expected * expected * turns);
   }
 }
 
-// Between two frames (0.2 s) the shift is found to a hundredth of a frame, as
-// far to one side as to the other, also with a slightly turned T_cam_imu.
+// With 0.2 s between frames, the time offset is found to a hundredth of a frame
+// and without bias, also with a slightly wrong T_cam_imu.
 TEST(VisionCheck, TimeShiftsAreExactAndUnbiased) {
   constexpr int kNumSeeds = 20;
   double sum = 0.0, squares = 0.0;
@@ -335,8 +335,8 @@ TEST(VisionCheck, TimeShiftsAreExactAndUnbiased) {
   RecordProperty("mean_ms", std::to_string(1e3 * sum / kNumSeeds));
 }
 
-// A straight road hardly turns the cameras: what little there is drowns in the
-// noise of vision, and no refusal may come of that.
+// On a straight road the cameras hardly rotate, less than the noise of vision.
+// A right calibration must not be rejected because of that.
 TEST(VisionCheck, AcceptsARightCalibrationOnAStraightRoad) {
   for (uint64_t seed = 1; seed <= 20; ++seed) {
     SyntheticWorldOptions options = SmallWorld(seed, 51);
@@ -355,8 +355,8 @@ TEST(VisionCheck, AcceptsARightCalibrationOnAStraightRoad) {
   }
 }
 
-// Images of one drive with the log of another: refused, or at the least not
-// called agreement (two drives through blocks may bend at the same times).
+// Images of one drive with the log of another: rejected, or at least reported
+// as not checkable (two drives through blocks may bend at the same times).
 TEST(VisionCheck, NoticesTheLogOfAnotherDrive) {
   int num_refused = 0;
   for (const uint64_t seed : {1, 2, 3, 4, 5, 6}) {
@@ -419,8 +419,8 @@ TEST(VisionCheck, AcceptsARightCalibration) {
   }
 }
 
-// Logs that end or begin in the middle of a drive cover few of the images, and
-// no time shift covers more: nothing may be read into that.
+// Logs that end or begin in the middle of a drive cover less than half of the
+// images, and no time offset covers more. That is no evidence of an offset.
 TEST(VisionCheck, AcceptsLogsOfAPartOfTheDrive) {
   for (const uint64_t seed : {1, 2, 3, 4}) {
     const SyntheticWorld world = BuildSyntheticWorld(SmallWorld(seed, 120));

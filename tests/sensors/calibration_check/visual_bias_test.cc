@@ -14,8 +14,8 @@ namespace {
 const Eigen::Vector3d kBias(0.004, -0.003, 0.001);
 const Eigen::Vector3d kOffset(-0.003, 0.002, 0.0);
 
-// A phone's walk of 50 s at 6 photos a second: vision errs by 0.2 deg an axis,
-// by the offset, and for 3 s by what moves in the scene.
+// A walk with a phone, 50 s at 6 photos a second. Vision errs by 0.2 deg an
+// axis, by the offset, and for 3 s by moving objects.
 RotationComparison Walk(int max_gap, uint64_t seed) {
   constexpr double kFrameS = 1.0 / 6.0;
   Random random(seed);
@@ -54,13 +54,13 @@ TEST(VisualBias, TellsARateFromWhatAllPairsErrBy) {
   }
   EXPECT_LT(std::sqrt(square), 1.0e-3);
   EXPECT_LT(std::sqrt(square), 0.25 * std::sqrt(square_of_medians));
-  // 60 values tell a variance to 18 %; the sigma errs on the safe side, by what
-  // moves in the scene.
+  // 60 values determine a variance to 18 %. The moving objects make the sigma
+  // conservative.
   EXPECT_GT(sigma, 0.7 * std::sqrt(square));
   EXPECT_LT(sigma, 2.0 * std::sqrt(square));
 }
 
-// Intervals of one length cannot tell the two apart, and the sigma says so.
+// Intervals of one length do not separate the two; the sigma covers that.
 TEST(VisualBias, OneLengthOfIntervalsLeavesTheOffsetIn) {
   for (const uint64_t seed : {1, 2, 3}) {
     const VisualBias bias =

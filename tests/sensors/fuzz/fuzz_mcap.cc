@@ -2,7 +2,7 @@
 #include "memory_file.h"
 #include "sensors/bags/mcap_bag.h"
 
-// Any bytes as an MCAP file: all messages are visited, whose bytes are there.
+// Any bytes as an MCAP file: every message is visited and its bytes are read.
 extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   using namespace adasfm;
   const MemoryFile file(data, size);

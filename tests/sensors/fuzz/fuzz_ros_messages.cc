@@ -7,7 +7,7 @@
 namespace adasfm {
 namespace {
 
-// What a message points to must be there.
+// Reads all bytes that a message refers to; they must be valid memory.
 void Touch(const ByteSpan& bytes) {
   uint64_t sum = 0;
   for (size_t i = 0; i < bytes.size; ++i) sum += bytes.data[i];

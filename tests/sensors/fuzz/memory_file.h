@@ -34,12 +34,12 @@ class MemoryFile {
   std::string path_;
 };
 
-// What a parser promises must hold for every input.
+// Traps when a guarantee of a parser is violated.
 inline void Require(bool holds) {
   if (!holds) __builtin_trap();
 }
 
-// Accepted logs have strictly ascending times; refusals have one line.
+// Times of accepted logs ascend (strictly); error messages have one line.
 template <typename Log>
 void RequireAscending(const Log& log, bool strictly = true) {
   if (!log.ok()) {
@@ -53,7 +53,7 @@ void RequireAscending(const Log& log, bool strictly = true) {
   }
 }
 
-// And every number in an accepted IMU log is finite.
+// Moreover, every number in an accepted IMU log is finite.
 template <typename Log>
 void RequireSoundImuLog(const Log& log) {
   RequireAscending(log);

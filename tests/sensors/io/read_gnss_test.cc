@@ -71,7 +71,7 @@ TEST_F(ReadGnssTest, CsvColumnsGoByTheirNames) {
   EXPECT_EQ(fix.position.height_m, 500.0);
   EXPECT_NEAR(fix.covariance(0, 0), 0.25, 1e-12);
   EXPECT_NEAR(fix.covariance(2, 2), 4.0, 1e-12);
-  // What is not stated is the receiver's usual noise; longitudes wrap.
+  // Noise that is not stated is the receiver's usual one; longitudes wrap.
   EXPECT_NEAR(log->fixes[1].position.longitude_deg, -11.6, 1e-9);
   EXPECT_NEAR(log->fixes[1].covariance(0, 0), 4.0, 1e-12);
   EXPECT_NEAR(log->fixes[1].covariance(2, 2), 16.0, 1e-12);

@@ -71,7 +71,7 @@ nav_msgs::Odometry OdometryMessage(int i) {
 
 template <typename Message>
 void Write(rosbag::Bag* bag, const std::string& topic, const Message& message) {
-  // It arrives a little later than it is stamped.
+  // Messages arrive a little later than they are stamped.
   bag->write(topic, message.header.stamp + ros::Duration(0.01), message);
 }
 

@@ -203,8 +203,8 @@ TEST(CleanImu, RefusesMicroseconds) {
   EXPECT_NE(cleaned.status().message().find("microseconds"), std::string::npos);
 }
 
-// A kerb: some 50 m/s^2 that ring for a few hundredths of a second, and the
-// body pitches.
+// Kerbs: forces of some 50 m/s^2 that ring for a few hundredths of a second,
+// while the body pitches.
 void AddBumps(uint64_t seed, Log* log) {
   Random random(seed);
   for (int bump = 0; bump < 20; ++bump) {
@@ -249,7 +249,7 @@ TEST(CleanImu, KeepsHardBumps) {
   }
 }
 
-// A quantised log at rest repeats itself by the hundred.
+// A quantised log at rest has hundreds of equal readings in a row.
 TEST(CleanImu, KeepsQuantisedReadings) {
   Log log = Drive();
   for (ImuSample& sample : log) {

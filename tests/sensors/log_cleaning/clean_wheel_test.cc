@@ -25,7 +25,7 @@ CleanedLog<WheelSample> Clean(const Log& log) {
   return *cleaned;
 }
 
-// A stretch where the machine is under way.
+// A sample at which the machine is moving.
 size_t UnderWay(const Log& log) {
   size_t i = log.size() / 2;
   while (log[i].first < 3.0) ++i;

@@ -15,8 +15,8 @@ namespace {
 
 const Eigen::Vector3d kGravity(0.0, 0.0, -9.81);
 
-// Motion in closed form: a body that turns at a constant rate while its
-// velocity in the world swings.
+// A motion in closed form: the body rotates at a constant rate while its
+// velocity in the world oscillates.
 struct Motion {
   Eigen::Vector3d rate{0.3, -0.5, 0.8};
   Eigen::Vector3d amplitude{1.0, 2.0, 0.5};
@@ -53,7 +53,7 @@ std::vector<ImuSample> Sample(const Motion& motion, double rate_hz,
 TEST(PreintegrateImu, FollowsAnalyticMotion) {
   const Motion motion;
   const std::vector<ImuSample> samples = Sample(motion, 1000.0, 1.0);
-  // Ends between samples: interpolation at both.
+  // Both ends lie between samples, so both are interpolated.
   const double t1 = 0.12345, t2 = 0.87654, dt = t2 - t1;
   const ImuPreintegration imu =
       PreintegrateImu(samples, 123'450'000, 876'540'000, ImuBias(), ImuNoise());
@@ -133,7 +133,7 @@ TEST(PreintegrateImu, BiasCorrectionIsFirstOrder) {
       PreintegrateImu(samples, 0, 500'000'000, ImuBias(), ImuNoise());
   const ImuPreintegration exact =
       PreintegrateImu(samples, 0, 500'000'000, bias, ImuNoise());
-  // The remainder is quadratic: (0.007 rad/s * 0.5 s)^2 and its like.
+  // The remainder is quadratic, for the rotation (0.007 rad/s * 0.5 s)^2.
   EXPECT_LT(AngleBetweenRad(zero.CorrectedRotation(bias), exact.delta_rotation),
             2e-5);
   EXPECT_LT((zero.CorrectedVelocity(bias) - exact.delta_velocity).norm(), 1e-3);

@@ -36,7 +36,7 @@ TEST(PreintegrateWheel, DrivesAnArc) {
 }
 
 TEST(PreintegrateWheel, FollowsTheProfileOfTheGyroscope) {
-  // Wheels see no turn; the gyroscope does, about an axis of its own frame.
+  // Only the gyroscope measures yaw, about an axis of its own frame.
   const Eigen::Quaterniond imu_from_wheel =
       ExpSo3(Eigen::Vector3d(0.1, 0.2, 1.0));
   const Eigen::Vector3d rate = imu_from_wheel * Eigen::Vector3d(0, 0, 0.7);
@@ -52,7 +52,7 @@ TEST(PreintegrateWheel, FollowsTheProfileOfTheGyroscope) {
             1e-3);
 }
 
-// The moment tells how the displacement changes with the rotation at the end.
+// The moment is the derivative of the displacement by the rotation at the end.
 TEST(PreintegrateWheel, RotationMomentMatchesNumericDerivative) {
   const auto integrate = [](const Eigen::Vector3d& rate) {
     std::vector<RotationAtTime> profile;
@@ -76,8 +76,8 @@ TEST(PreintegrateWheel, RotationMomentMatchesNumericDerivative) {
         LogSo3(motion.profile_rotation.conjugate() * plus.profile_rotation) /
         kStep;
     const Eigen::Vector3d moment = motion.rotation_moment * phi.cross(forward);
-    // phi is taken to grow in proportion to time: true up to a share of the
-    // turn (0.3 rad / 6), here of 5 m * 0.5.
+    // The moment assumes that phi grows in proportion to time: true up to a
+    // share of the rotation (0.3 rad / 6), here of 5 m * 0.5.
     EXPECT_LT((numeric - moment).norm(), 0.3 / 6.0 * 2.5 + 0.02);
   }
 }
@@ -140,9 +140,9 @@ TEST(ComputeWheelSpeeds, TicksAreSpeedsBetweenCounts) {
   EXPECT_NEAR(speeds[0].yaw_rate, 0.2, 1e-9);
 }
 
-// Counters round at both ends of an interval, whatever lies in between: coarse
-// ticks are no noise of the speed. The errors of single intervals, between
-// counts too, stay within what the motion claims.
+// Counters round once at each end of an interval, whatever lies in between:
+// coarse ticks are no noise of the speed. Errors of single intervals, also of
+// those that begin or end between counts, must agree with the stated variances.
 TEST(PreintegrateWheel, CountersRoundOnceAtEachEnd) {
   SensorCalibration calibration;
   calibration.wheel_type = WheelType::kTicks;
@@ -177,7 +177,7 @@ TEST(PreintegrateWheel, CountersRoundOnceAtEachEnd) {
       distance += std::pow(motion.distance_m - seconds * speed, 2) / kNumRuns;
       yaw += motion.yaw_rad * motion.yaw_rad / kNumRuns;
     }
-    // Between counts the speed averages neighbouring ones: somewhat less.
+    // Between counts speeds are averaged: the errors are somewhat smaller.
     EXPECT_LT(distance, 1.2 * motion.covariance(0, 0)) << seconds;
     EXPECT_GT(distance, 0.2 * motion.covariance(0, 0)) << seconds;
     EXPECT_LT(yaw, 1.2 * motion.yaw_variance) << seconds;

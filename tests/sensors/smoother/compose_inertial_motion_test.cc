@@ -74,7 +74,7 @@ struct Chain {
       samples.back().angular_velocity += bias.gyroscope;
       samples.back().specific_force += bias.accelerometer;
     }
-    // Links are integrated about another bias than the one found later.
+    // Links are integrated about another bias than the one estimated later.
     ImuBias assumed;
     assumed.accelerometer = random.GaussianVector(0.1);
     OdometryState state;
@@ -119,9 +119,9 @@ TEST(ComposeInertialMotion, HoldsTheTrueMotionWithTheBias) {
         chain.cam_from_imu.rotation * chain.bias.accelerometer;
 
     // The trapezoidal rule errs by h^2/12 of the second derivative: of the
-    // force, which turns with the body, and of the rate, which tilts the force.
-    // Three axes swing, and the first-order correction for the gyroscope's bias
-    // errs by the square of its turn over a link.
+    // force, which rotates with the body, and of the rate, which tilts the
+    // force. Three axes oscillate. The first-order correction for the
+    // gyroscope's bias errs by the square of its rotation over a link.
     const double force = kGravity.norm() + std::sqrt(3.0) * kPositionAmplitude *
                                                kFrequency * kFrequency;
     const double rate = std::sqrt(3.0) * kTurnAmplitude * kFrequency;
@@ -149,8 +149,8 @@ TEST(ComposeInertialMotion, HoldsTheTrueMotionWithTheBias) {
         (position_error + world_from_cam1 * (motion->position_by_bias * bias))
             .norm(),
         0.5 * acceleration_error * dt * dt);
-    // Without the bias they do not hold; the body turns, so that not all of it
-    // adds up.
+    // Without the bias terms the bounds are exceeded. The body rotates, so that
+    // the bias does not add up completely.
     EXPECT_GT(velocity_error.norm(), 0.5 * bias.norm() * dt);
     EXPECT_GT(position_error.norm(), 0.25 * bias.norm() * dt * dt);
 

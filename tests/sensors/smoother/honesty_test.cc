@@ -14,28 +14,27 @@ namespace {
 
 constexpr int kNumSeeds = 24;
 
-// What is wrong with the machine and with what is said of it.
+// Errors of the machine and of its stated calibration.
 struct Mismatch {
   std::string name;
-  // Yaw rate of a machine that is not quite still while its wheels stand: a
-  // ringing of this amplitude (rad/s) and frequency (Hz), any phase.
+  // The machine's yaw rate rings while its wheels stand: amplitude (rad/s) and
+  // frequency (Hz), at any phase.
   double ringing = 0.0;
   double frequency_hz = 1.0;
-  // It grows by this per second towards the start, from the amplitude at the
-  // standstill's end.
+  // Factor per second by which the amplitude grows, up to `ringing` at the end
+  // of the standstill.
   double growth = 1.0;
   // Left wheel longer, right wheel shorter by half of this.
   double wheel_difference = 0.0;
-  // An error of the speed that the wheels share for seconds (memory 1 s), m/s.
+  // Error of the speed that both wheels share, of correlation time 1 s, m/s.
   double slow_wheel_error = 0.0;
   // Stated noise figures of IMU and wheels over the true ones.
   double noise_factor = 1.0;
-  // The wheels' readings come later than their times say, s.
+  // Delay of the wheels' readings with respect to their stamps, s.
   double wheel_delay_s = 0.0;
 };
 
-// The machine's motion while its wheels stand: a turn about the vertical, and
-// the force that goes with swaying on springs of that frequency.
+// Adds the yaw rate of a machine that rings while its wheels stand.
 void AddRinging(const Mismatch& mismatch, double phase, double standstill_s,
                 Dataset* data) {
   const timestamp_t start_ns = data->logs.imu.front().timestamp_ns;
@@ -72,7 +71,7 @@ Dataset SpoiltDataset(const SyntheticWorld& world, const Mismatch& mismatch,
   calibration.imu_noise.gyroscope_noise_density *= mismatch.noise_factor;
   calibration.imu_noise.accelerometer_noise_density *= mismatch.noise_factor;
   calibration.wheel_speed_noise *= mismatch.noise_factor;
-  // The world's biases hardly walk, so that they are known.
+  // The biases of the worlds hardly walk; the stated random walks are small.
   calibration.imu_noise.gyroscope_random_walk = 2e-5;
   calibration.imu_noise.accelerometer_random_walk = 2e-4;
   return data;
@@ -80,9 +79,9 @@ Dataset SpoiltDataset(const SyntheticWorld& world, const Mismatch& mismatch,
 
 class Honesty : public testing::TestWithParam<Mismatch> {};
 
-// Gyroscope bias (all axes), wheel scale and the wheels' delay are within three
-// of their sigmas of the truth in 95 % of seeds: of 24 seeds, at most 4 are not
-// with a probability of 0.99 then.
+// Gyroscope bias (all axes), wheel scale and wheel delay are within three of
+// their sigmas of the truth in 95 % of seeds. Then at most 4 of 24 seeds are
+// not, with a probability of 0.99.
 TEST_P(Honesty, SharedErrorsAreWithinThreeSigmas) {
   constexpr int kMaxNumFailures = 4;
   const Mismatch& mismatch = GetParam();
@@ -123,7 +122,7 @@ TEST_P(Honesty, SharedErrorsAreWithinThreeSigmas) {
   EXPECT_LE(num_bias_failures, kMaxNumFailures);
   EXPECT_LE(num_scale_failures, kMaxNumFailures);
   EXPECT_LE(num_delay_failures, kMaxNumFailures);
-  // And the sigmas are no cheat: three seconds at rest tell a bias.
+  // The sigmas must be small, too: three seconds at rest determine a bias.
   EXPECT_LT(bias_sigma, 3.0 * std::max(1.0, mismatch.noise_factor) * 3e-4);
 }
 
@@ -139,7 +138,7 @@ INSTANTIATE_TEST_SUITE_P(
         Mismatch{"LateWheels", 0.0, 1.0, 1.0, 0.0, 0.0, 1.0, 0.025}),
     [](const auto& mismatch) { return mismatch.param.name; });
 
-// Relative errors of the priors' lengths, less their mean: the scale.
+// Relative errors of the priors' lengths, less their mean, which is the scale.
 std::vector<double> LengthErrors(const Dataset& data,
                                  const PriorEstimate& estimate) {
   std::vector<double> errors;

@@ -120,7 +120,7 @@ TEST(LinkResiduals, JacobianMatchesNumericDerivative) {
   }
 }
 
-// Where the world's heading points has no bearing on any residual.
+// The heading of the world must not change any residual.
 TEST(LinkResiduals, HeadingIsFree) {
   RandomLink r(6);
   const Eigen::VectorXd before =
@@ -198,7 +198,7 @@ TEST_F(ChainElimination, SolutionEqualsTheDenseOne) {
 }
 
 TEST_F(ChainElimination, CovariancesEqualTheDenseOnes) {
-  // The heading's own prior would be information that links do not have.
+  // A prior of the heading would be information that real links do not have.
   first_.h.row(2).setZero();
   first_.h.col(2).setZero();
   first_.h(2, 2) = 1e-12;
@@ -206,7 +206,7 @@ TEST_F(ChainElimination, CovariancesEqualTheDenseOnes) {
   ComputeChainCovariances(
       kNumLinks, first_, [this](size_t k) { return links_[k]; },
       [this](size_t k, const LinkCovariance& covariance) {
-        // Hold the heading of state k.
+        // Fixes the heading of state k.
         Eigen::MatrixXd h = dense_h_;
         h(k * kState + 2, k * kState + 2) += 1e12;
         const Eigen::MatrixXd dense = h.inverse();

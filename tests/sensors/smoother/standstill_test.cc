@@ -54,7 +54,7 @@ struct Rest {
     MarkStandstills(times_ns, logs, noise, &links);
   }
 
-  // 1 sigma of the mean yaw rate that the links state.
+  // 1 sigma of the mean yaw rate, as the links state it.
   double StatedSigma() const {
     double time = 0.0;
     for (const OdometryLink& link : links) {
@@ -81,11 +81,11 @@ TEST(Standstill, AQuietMachineKeepsItsLinks) {
     }
     density += rest.links[0].standstill_rate_density.z() / 20.0;
   }
-  // Chance makes some of the spectrum's estimates larger than white noise.
+  // By chance some estimates of the spectrum exceed white noise.
   EXPECT_LT(density, 5e-4);
 }
 
-// A link that turns by 6 sigma of its mean is taken out, the others stay.
+// A link whose mean rotates by 6 sigma is excluded, the others are kept.
 TEST(Standstill, ALinkThatTurnsIsTakenOut) {
   const Rest rest(5.0, 1, [](double time_s) {
     return time_s >= 3.0 && time_s < 3.5 ? 0.0045 : 0.0;
@@ -97,9 +97,9 @@ TEST(Standstill, ALinkThatTurnsIsTakenOut) {
   }
 }
 
-// Rates that wander with a memory of a quarter of a second: the variance of
-// their mean over 20 s is five times that of white noise. It is stated to
-// within a half (blocks of seconds still see a little less than all of it).
+// Yaw rates with a correlation time of a quarter of a second: the variance of
+// their mean over 20 s is five times that of white noise. The stated variance
+// is right to a factor of 1.5 (blocks of seconds miss a little of it).
 TEST(Standstill, SlowMotionWidensTheMean) {
   double chi2 = 0.0, chi2_white = 0.0;
   constexpr int kNumSeeds = 100;
@@ -132,7 +132,7 @@ TEST(Standstill, SlowMotionWidensTheMean) {
   EXPECT_GT(chi2_white, 5.0 * 0.58);
 }
 
-// A machine that glides shows the IMU no more than one at rest.
+// An IMU cannot distinguish gliding from rest; cameras can.
 TEST(Standstill, CamerasThatSeeMotionOutvoteAQuietImu) {
   MotionLogs logs;
   logs.seen_moving_ns = {{2'000'000'000, 4'000'000'000},
@@ -144,7 +144,7 @@ TEST(Standstill, CamerasThatSeeMotionOutvoteAQuietImu) {
     EXPECT_EQ(moving.links[k].standstill == StandstillKind::kNone, is_seen)
         << k;
   }
-  // Wheels know better what the machine does than cars in the pictures.
+  // Wheels outweigh cameras, which may see passing cars.
   for (timestamp_t time_ns = 0; time_ns <= 10'000'000'000;
        time_ns += 20'000'000) {
     logs.wheel.push_back({time_ns, 0.0, 0.0});
@@ -163,7 +163,7 @@ TEST(FindSeenMotion, IsThatOfImagesInARow) {
                           motion_rad};
   };
   using Intervals = std::vector<std::pair<timestamp_t, timestamp_t>>;
-  // Noise of the keypoints, and images that are not in a row or have no time.
+  // Ignored: keypoint noise, images not in a row or without a time.
   EXPECT_EQ(FindSeenMotion({pair(7, 3, 0.002), pair(7, 5, 0.1), pair(4, 9, 0.1),
                             pair(5, 4, 0.0)},
                            times_ns),

@@ -26,11 +26,11 @@ struct BundleWorldOptions {
   // COLMAP's name and parameters of the camera.
   std::string camera_model = "PINHOLE";
   std::vector<double> camera_params = {480, 485, 400, 250};
-  // How far the camera looks to the left and to the right of the street.
+  // Largest yaw of the camera to the left and to the right of the street.
   double weave_rad = 0.15;
   // When positive, every other image is of camera 2, whose keypoints have this
-  // noise, and each camera sees two fifths of the points alone, as lenses that
-  // look to different sides do.
+  // noise. Two fifths of the points are seen by camera 1 only, two fifths by
+  // camera 2 only, as with lenses that look to different sides.
   double second_camera_noise_px = 0.0;
   uint64_t seed = 1;
 };

@@ -40,7 +40,7 @@ inline std::vector<PosePriorEdge> TruePriors(
   return edges;
 }
 
-// Winds the x axis around a circle, and the model with it.
+// Bends the model: winds its x axis around a circle.
 inline void Bend(double radius_m, colmap::Reconstruction* reconstruction) {
   const auto bend = [radius_m](const Eigen::Vector3d& X) {
     const double angle_rad = X.x() / radius_m;
@@ -64,7 +64,7 @@ inline void Bend(double radius_m, colmap::Reconstruction* reconstruction) {
   }
 }
 
-// RMSE of the camera centres against the world's, as they stand.
+// RMSE of the camera centres against the world's, without alignment.
 inline double CenterError(const BundleWorldOptions& options,
                           const colmap::Reconstruction& reconstruction) {
   double sum = 0.0;
@@ -76,7 +76,7 @@ inline double CenterError(const BundleWorldOptions& options,
   return std::sqrt(sum / reconstruction.NumRegImages());
 }
 
-// The same after the best similarity; its scale is returned in `scale`.
+// The same after the best similarity, whose scale is returned in `scale`.
 inline double AlignedCenterError(const BundleWorldOptions& options,
                                  const colmap::Reconstruction& reconstruction,
                                  double* scale = nullptr) {

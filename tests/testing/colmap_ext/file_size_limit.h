@@ -7,8 +7,8 @@
 
 namespace adasfm {
 
-// While it lives, no write of this process goes beyond so many bytes of a file:
-// what a full disk or a quota does.
+// While an object exists, files that this process writes cannot exceed this
+// size, as on a full disk or under a quota.
 class FileSizeLimit {
  public:
   explicit FileSizeLimit(rlim_t num_bytes) {

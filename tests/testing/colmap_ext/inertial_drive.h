@@ -19,9 +19,9 @@ struct TimedPose {
   Rigid3d cam_from_world;
 };
 
-// What an IMU beside the camera integrates between the images of the drive:
-// with white noise (m/s^2 sqrt(s)), this bias, and velocities as differences of
-// the positions tell them. One of many motions that pass the images.
+// Integrals of an IMU beside the camera between the images of the drive, with
+// white noise (m/s^2 sqrt(s)) and this bias. Velocities are differences of the
+// positions: one of many motions that pass the images.
 struct InertialDriveOptions {
   double noise = 0.0;
   Eigen::Vector3d bias = Eigen::Vector3d::Zero();  // m/s^2, camera's axes
@@ -62,8 +62,8 @@ inline std::vector<InertialMotion> IntegrateDrive(
     motion.camera_from_imu_origin = options.lever;
     motion.velocity_by_bias = -dt * Eigen::Matrix3d::Identity();
     motion.position_by_bias = -0.5 * dt * dt * Eigen::Matrix3d::Identity();
-    // Of white noise: the mean over the interval, and what its integral differs
-    // from that by.
+    // White noise: its mean over the interval, and the deviation of its
+    // integral from that of the mean.
     const Eigen::Vector3d of_velocity =
         random.GaussianVector(options.noise * std::sqrt(dt));
     const Eigen::Vector3d of_position =

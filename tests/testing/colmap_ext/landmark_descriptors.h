@@ -14,7 +14,7 @@ namespace adasfm {
 
 inline constexpr int kNumDimensions = 128;
 
-// A descriptor as SIFT's: a unit vector of positive numbers times 512.
+// A descriptor like SIFT's: a unit vector of positive numbers.
 inline Eigen::RowVectorXd RandomDescriptor(Random* random) {
   Eigen::RowVectorXd descriptor(kNumDimensions);
   for (int i = 0; i < kNumDimensions; ++i) {
@@ -23,8 +23,8 @@ inline Eigen::RowVectorXd RandomDescriptor(Random* random) {
   return descriptor.normalized();
 }
 
-// The descriptor of every keypoint: its landmark's with noise, which turns it
-// by about 20 degrees (SIFT's nearest neighbours accept 30 to 40).
+// The descriptor of each keypoint is its landmark's with noise, which rotates
+// it by about 20 degrees (SIFT's nearest neighbours accept 30 to 40).
 class LandmarkDescriptors {
  public:
   LandmarkDescriptors(const SyntheticWorld& world, uint64_t seed)
@@ -55,7 +55,7 @@ class LandmarkDescriptors {
   std::vector<Eigen::RowVectorXd> descriptors_;
 };
 
-// Descriptors of all keypoints into the world's database.
+// Writes descriptors of all keypoints into the world's database.
 inline void WriteLandmarkDescriptors(const SyntheticWorld& world, uint64_t seed,
                                      const std::string& database_path) {
   LandmarkDescriptors descriptors(world, seed);

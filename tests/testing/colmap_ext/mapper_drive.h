@@ -20,7 +20,7 @@ inline MapperWorld BuildDrive(uint64_t seed) {
   return BuildMapperWorld(options);
 }
 
-// By vision alone, in the frame of the coarse poses.
+// Reconstructs the drive by vision alone, in the frame of the coarse poses.
 inline colmap::Reconstruction Reconstruct(const MapperWorld& world) {
   std::set<image_t> images;
   for (const auto& image : world.data.images) images.insert(image.first);

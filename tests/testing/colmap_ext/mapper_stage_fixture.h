@@ -14,7 +14,7 @@
 
 namespace adasfm {
 
-// The mapper stage in a folder of its own, on worlds that several parts share.
+// Runs the mapper stage in a folder of its own, on worlds of several parts.
 class MapperStageTest : public testing::Test {
  protected:
   void SetUp() override {
@@ -53,8 +53,8 @@ class MapperStageTest : public testing::Test {
     EXPECT_LT(errors.rmse_m, 0.5 * CoarseRmseM(world));
   }
 
-  // Sums in another order end an adjustment elsewhere within its tolerance: far
-  // below what 0.5 px leave open.
+  // Another order of sums makes an adjustment converge elsewhere within its
+  // tolerance: far below what 0.5 px leave open.
   static void ExpectSamePoses(const std::map<image_t, Rigid3d>& expected,
                               const std::map<image_t, Rigid3d>& poses) {
     ASSERT_EQ(poses.size(), expected.size());
@@ -63,7 +63,7 @@ class MapperStageTest : public testing::Test {
     }
   }
 
-  // Two gaps that only priors bridge, of a good gyroscope and good wheels.
+  // Two gaps that only the priors of a good gyroscope and good wheels bridge.
   static MapperWorldOptions WorldWithGaps(uint64_t seed) {
     MapperWorldOptions options;
     options.world.num_images = 100;
@@ -83,7 +83,7 @@ class MapperStageTest : public testing::Test {
   MapperStageOptions options_;
   MapperStageSummary summary_;
   const TemporaryFolder temporary_;
-  // What a test may remove and make again.
+  // A folder that a test may remove and make again.
   const std::string folder_ = temporary_.File("mapper");
 };
 

@@ -13,8 +13,8 @@
 
 namespace adasfm {
 
-// What the mapper starts from, without the stages before it: the scene of a
-// synthetic world, and poses that are the truth with noise.
+// Input of the mapper without the stages before it: the scene of a synthetic
+// world, and poses that are the truth with noise.
 struct MapperWorld {
   SceneData data;
   std::map<image_t, Rigid3d> true_poses;
@@ -24,7 +24,7 @@ struct MapperWorld {
 struct MapperWorldOptions {
   SyntheticWorldOptions world;
   SyntheticPriorOptions priors;
-  // Of the coarse poses, each image on its own.
+  // Sigmas of the coarse poses, independent for each image.
   double center_sigma_m = 0.2;
   double rotation_sigma_rad = 0.005;
 };

@@ -21,8 +21,8 @@ struct OptionCase {
   std::function<double(const Options&)> get;
 };
 
-// A case of "AdaSfm" name and the member of Options, where that is what a test
-// calls its struct.
+// Makes an OptionCase of option "AdaSfm" name and this member of `Options`, for
+// tests that name their struct so.
 #define ADASFM_OPTION(name, value, member)                      \
   {                                                             \
     "AdaSfm" name, value,                                       \
@@ -63,8 +63,8 @@ void ExpectEachSetsItsOwnField(const std::vector<OptionCase<Options>>& cases,
   }
 }
 
-// -7 is wrong for nearly all: the error names the option as it is typed.
-// Returns how many refuse it.
+// -7 is invalid for nearly all options: the error must name the option as
+// typed. Returns the number of options that reject it.
 template <typename Options>
 int ExpectWrongValuesAreNamed(const std::vector<OptionCase<Options>>& cases,
                               OptionAdder<Options> add) {
@@ -86,8 +86,7 @@ int ExpectWrongValuesAreNamed(const std::vector<OptionCase<Options>>& cases,
   return num_refused;
 }
 
-// The help has these options and no others of ours, so that none is without a
-// case.
+// The help lists exactly the AdaSfm options that have a case.
 template <typename Options>
 void ExpectHelpNamesAll(const std::vector<OptionCase<Options>>& cases,
                         OptionAdder<Options> add) {

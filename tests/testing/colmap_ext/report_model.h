@@ -6,8 +6,8 @@
 
 namespace adasfm {
 
-// Poses of the world as a model, some keypoints seen where they should be, and
-// moved by `shift_px`.
+// A model with the world's poses. Each image has num_points keypoints, moved by
+// `shift_px` from the projections of their points.
 colmap::Reconstruction MakeModel(const SyntheticWorld& world, int num_points,
                                  double shift_px);
 

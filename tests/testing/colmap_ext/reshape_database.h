@@ -11,10 +11,9 @@ namespace adasfm {
 // rig_configurator.
 const std::vector<std::string>& DatabaseForms();
 
-// Gives a database that COLMAP 3.8 made the form of another version: its tables
-// and columns, its way to write poses and matrices that are missing (which all
-// poses of two-view geometries become), and its user_version. Throws
-// SqliteError.
+// Gives a database of COLMAP 3.8 the form of another version: its tables and
+// columns, its encoding of missing poses and matrices (all poses of two-view
+// geometries become missing), and its user_version. Throws SqliteError.
 void ReshapeDatabase(const std::string& path, const std::string& form);
 
 // Makes cameras 1 and 2 of a database of COLMAP 3.12 or later the rig of
@@ -23,8 +22,8 @@ void ReshapeDatabase(const std::string& path, const std::string& form);
 void MakeStereoRig(const std::string& path, int num_frames,
                    const std::string& sensor_from_rig);
 
-// What COLMAP 4.2 does to an older file when it opens it: columns and tables
-// that are missing, NULL for poses and matrices that mean "none".
+// Changes an older file as COLMAP 4.2 does on opening: adds missing columns and
+// tables, and writes NULL for poses and matrices that mean "none".
 void MigrateToColmap4(const std::string& path);
 
 }  // namespace adasfm

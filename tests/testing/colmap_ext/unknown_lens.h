@@ -8,9 +8,8 @@
 
 namespace adasfm {
 
-// Keypoints of a lens with two radial terms, of which the database knows
-// neither these (it gives one that is zero) nor the focal length: it gives this
-// multiple of the camera's.
+// Distorts keypoints by two radial terms. The database has one radial term of
+// zero instead, and this multiple of the camera's focal length.
 inline void UseUnknownLens(double k1, double k2, double given_ratio,
                            SceneData* scene, camera_t camera_id = 1) {
   colmap::Camera& camera = scene->cameras.at(camera_id);

@@ -13,7 +13,7 @@
 
 namespace adasfm {
 
-// What EstimateCoarsePoses takes, and the truth.
+// Input of EstimateCoarsePoses, and the truth.
 struct CoarseProblem {
   ViewGraph graph;
   GlobalCorrespondences correspondences;
@@ -22,17 +22,17 @@ struct CoarseProblem {
   std::set<ImagePair> aliases;
 };
 
-// Of a synthetic world. Priors: true motion with 0.02 deg and 1 % of white
+// From a synthetic world. Priors: true motion with 0.02 deg and 1 % of white
 // noise a step and 0.4 % of common scale.
 CoarseProblem BuildCoarseProblem(const SyntheticWorldOptions& options);
 
-// 160 images with look-alike places and one blackout.
+// 160 images with aliased places and one blackout.
 SyntheticWorldOptions AliasedWorld(uint64_t seed);
 
-// Leaves of a prior what an IMU without wheels does.
+// Reduces a prior to what an IMU without wheels measures.
 void DropPosition(RelativePosePrior* prior);
 
-// The same images under ids in random order, and how they were captured.
+// The same images under ids in random order, with their order of capture.
 CoarseProblem Shuffle(const CoarseProblem& problem, uint64_t seed);
 
 struct KeptPairs {

@@ -25,7 +25,7 @@ struct Walk {
     }
   }
 
-  // Of the IMU, m, and its derivatives.
+  // Position of the IMU, m, or a derivative of it.
   Eigen::Vector3d Position(double t, int derivative = 0) const {
     Eigen::Vector3d sum = derivative == 0   ? Eigen::Vector3d(0.7 * t, 0.0, 0.0)
                           : derivative == 1 ? Eigen::Vector3d(0.7, 0.0, 0.0)

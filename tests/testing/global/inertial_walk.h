@@ -29,9 +29,9 @@ struct WalkOptions {
   bool is_at_rest = false;
 };
 
-// A camera that is carried about, its image ids 1, 2, ... every 0.1 s:
-// accelerations of about 1 m/s^2 within some seconds, turns of half a radian;
-// with what an IMU of white noise integrates, by small steps.
+// A hand-carried camera with image ids 1, 2, ... every 0.1 s: accelerations of
+// about 1 m/s^2 within some seconds, rotations of half a radian. The motions
+// are those of an IMU with white noise, integrated by small steps.
 WalkData SimulateWalk(const WalkOptions& options, uint64_t seed);
 
 }  // namespace adasfm

@@ -18,7 +18,7 @@ struct TestScene {
   std::map<image_t, Rigid3d> cams_from_world;
   ViewGraph graph;  // noise-free relative poses, unit translations
   GlobalCorrespondences correspondences;
-  // Shares keypoint k of every image with landmark k.
+  // Keypoint k of every image is landmark k.
   std::vector<Eigen::Vector3d> landmarks;
 };
 

@@ -20,8 +20,8 @@ struct TwoViewSceneOptions {
   TwoViewLayout layout = TwoViewLayout::kBothSides;
   int num_matches = 150;
   double noise_px = 0.5;
-  // Share of wrong matches: their second keypoint is anywhere in the image that
-  // verification allows, up to max_outlier_px off the true epipolar geometry.
+  // Share of wrong matches. Their second keypoint is anywhere in the image that
+  // verification allows: up to max_outlier_px off the true epipolar geometry.
   double outlier_ratio = 0.0;
   double max_outlier_px = 4.0;
   double step_m = 1.0;  // forwards

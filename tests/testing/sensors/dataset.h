@@ -25,8 +25,8 @@ bool ReadDataset(const std::string& name, Dataset* dataset);
 // By logs alone, with default options. Throws what an import would report.
 PriorEstimate EstimateOrThrow(const Dataset& dataset);
 
-// Errors of the chained priors over all stretches of a length (KITTI's
-// measure), relative to it.
+// Errors of the chained priors over all trajectory segments of a length
+// (KITTI's measure), relative to the length.
 struct SegmentErrors {
   int num_segments = 0;
   double translation = 0.0;         // rms, share of the length

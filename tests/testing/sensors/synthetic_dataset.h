@@ -9,21 +9,20 @@
 
 namespace adasfm {
 
-// A drive whose pictures hardly matter.
+// A drive with few keypoints, for tests of the logs.
 SyntheticWorldOptions SmallWorld(uint64_t seed, int num_images = 80);
 
 Dataset ToDataset(const SyntheticWorld& world);
 
 struct VisionNoise {
-  // Of images that follow each other, rad per axis; grows with the root of
-  // the gap.
+  // Sigma for consecutive images, rad per axis; grows with the root of the gap.
   double sigma_rad = 1e-3;
   int max_gap = 1;
   // Share of rotations that are off by a tenth of a radian.
   double wrong_ratio = 0.0;
 };
 
-// Two-view rotations of near images.
+// Two-view rotations of images up to max_gap apart.
 std::vector<VisualRotation> SimulateVision(const SyntheticWorld& world,
                                            uint64_t seed,
                                            const VisionNoise& noise = {});
