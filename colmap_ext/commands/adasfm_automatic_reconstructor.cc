@@ -15,20 +15,21 @@ namespace {
 void AddBagOptions(BagExtractionOptions* bag,
                    AutomaticReconstructionPaths* paths,
                    CommandOptions* command) {
-  command->AddDefault("bag_path", &paths->bag_path,
-                      "in place of --image_path: a ROS 2 bag (.mcap, .db3 or "
-                      "its folder) or a ROS 1 bag with photos, logs and "
-                      "calibration");
+  command->AddDefault(
+      "bag_path", &paths->bag_path,
+      "in place of --image_path: a ROS 2 bag (.mcap, .db3 or bag folder) or a "
+      "ROS 1 bag with photos, logs and calibration");
   AddBagTopicOptions(&bag->topics, command);
-  command->AddDefault("image_topic", &bag->topics.image,
-                      "topic of the photos in the bag; when empty, the only "
-                      "one");
+  command->AddDefault(
+      "image_topic", &bag->topics.image,
+      "image topic of the bag; when empty, the only image topic");
   command->AddDefault("image_step", &bag->photos.image_step,
-                      "every so many photos of the bag are used; of a video, "
-                      "the sharpest of every so many frames or half of them");
-  command->AddDefault("image_distance_m", &bag->photos.image_distance_m,
-                      "photos of the bag or video are this far apart by the "
-                      "wheels, or 10 degrees of turn [m]; 0: all");
+                      "n: use every n-th photo of the bag; of a video, the "
+                      "sharpest frame in the first half of every n frames");
+  command->AddDefault(
+      "image_distance_m", &bag->photos.image_distance_m,
+      "smallest distance between used photos of the bag or video by the wheel "
+      "log, unless they turn by 10 deg [m]; 0: all");
 }
 
 void AddPaths(AutomaticReconstructionOptions* options,
@@ -38,17 +39,16 @@ void AddPaths(AutomaticReconstructionOptions* options,
                       "folder of the recording");
   AddBagOptions(&options->bag, paths, command);
   command->AddDefault("video_path", &paths->video_path,
-                      "in place of --image_path: a film, read by ffmpeg; times "
-                      "are the container's");
+                      "in place of --image_path: a video, read by ffmpeg; "
+                      "frame times are those of the file");
   command->AddDefault("video_start_ns", &options->video_start_ns,
-                      "time of the video's beginning on the clock of the logs "
-                      "[ns]");
-  command->AddRequired("workspace_path", &paths->workspace_path,
-                       "folder for all results; the same command on it again "
-                       "continues");
+                      "start time of the video on the clock of the logs [ns]");
+  command->AddRequired(
+      "workspace_path", &paths->workspace_path,
+      "folder for all results; the same command continues an earlier run");
   command->AddDefault("data_format", &paths->data_format,
-                      "euroc, 4seasons, kitti or tum: logs, times and camera "
-                      "are found in the recording; none when empty");
+                      "layout of the recording, which provides logs, times and "
+                      "camera: euroc, 4seasons, kitti or tum; none when empty");
   AddLogOptions(paths, command);
   command->AddDefault("sensors_path", &paths->sensors_path,
                       "YAML file with the calibration of the sensors");
@@ -61,31 +61,32 @@ void AddPaths(AutomaticReconstructionOptions* options,
 void AddFeatureOptions(FeatureOptions* features, CommandOptions* command) {
   command->AddDefault("camera_model", &features->camera_model,
                       "COLMAP's camera model, such as PINHOLE or OPENCV");
-  command->AddDefault("camera_params", &features->camera_params,
-                      "parameters of the model, comma-separated [px]; when "
-                      "empty, the focal length is EXIF's or 1.2 times the "
-                      "longer side");
-  command->AddDefault("single_camera", &features->single_camera,
-                      "1: one camera took all photos, 0: each its own, 2: one "
-                      "a folder, -1: photos of equal size and focal length "
-                      "share one");
-  command->AddDefault("max_image_size", &features->max_image_size,
-                      "larger photos are scaled down for the detector [px]");
+  command->AddDefault(
+      "camera_params", &features->camera_params,
+      "parameters of the camera model, comma-separated [px]; when empty, the "
+      "focal length from EXIF, else 1.2 times the longer side");
+  command->AddDefault(
+      "single_camera", &features->single_camera,
+      "1: one camera for all photos, 0: one per photo, 2: one per folder, -1: "
+      "one for all photos of equal size and focal length");
+  command->AddDefault(
+      "max_image_size", &features->max_image_size,
+      "photos with a longer side are scaled down for SIFT [px]");
   command->AddDefault("max_num_features", &features->max_num_features,
-                      "features of a photo at most");
+                      "largest number of features per photo");
   command->AddDefault("extractor", &features->extractor,
-                      "SIFT by colmap, or by opencv: on the CPU in less than "
-                      "half of the time, not for the GPU");
+                      "SIFT implementation: colmap, or opencv (CPU only, takes "
+                      "less than half of the time)");
   command->AddDefault("first_octave", &features->first_octave,
-                      "SIFT begins with the photo at twice its size (-1), or "
-                      "as it is (0): four times as fast, with fewer features");
+                      "SIFT on the photo at twice its size (-1), or at its own "
+                      "size (0): four times as fast, with fewer features");
   command->AddDefault("use_gpu", &features->use_gpu,
-                      "SIFT on the GPU: 0, 1, or -1: when COLMAP was built "
-                      "with CUDA and finds a device");
-  command->AddDefault("matcher", &features->matcher,
-                      "adasfm: compares all descriptors; host: COLMAP's "
-                      "matcher, as always on the GPU and with "
-                      "ADASFM_HOST_COLMAP");
+                      "SIFT on the GPU: 0, 1, or -1: if COLMAP was built with "
+                      "CUDA and a device is present");
+  command->AddDefault(
+      "matcher", &features->matcher,
+      "adasfm: compares all descriptors; host: COLMAP's matcher, always used "
+      "on the GPU and with ADASFM_HOST_COLMAP");
 }
 
 void PrintResult(const AutomaticReconstructionResult& result) {
@@ -106,9 +107,8 @@ Status RunAdasfmAutomaticReconstructor(int argc, char** argv) {
   AutomaticReconstructionOptions options;
   CommandOptions command(
       "adasfm_automatic_reconstructor",
-      "From a folder of photos, and the logs of an IMU and wheels where there "
-      "are any, from a film or from a ROS bag, to a model and a report about "
-      "it.");
+      "Reconstructs a model, with a report, from a folder of photos with "
+      "optional logs of IMU, wheels and GNSS, from a video or from a ROS bag.");
   AddPaths(&options, &paths, &command);
   AddFeatureOptions(&options.features, &command);
   command.AddDefault("refine_intrinsics", &options.refine_intrinsics,
@@ -116,23 +116,24 @@ Status RunAdasfmAutomaticReconstructor(int argc, char** argv) {
                      "camera_params is empty");
   command.AddDefault("num_temporal_neighbors",
                      &options.pairs.num_temporal_neighbors,
-                     "every image is matched with so many of the next ones");
-  command.AddDefault("num_similar_images", &options.pairs.num_similar_images,
-                     "and with so many of the most similar ones beyond them");
-  command.AddDefault("guided_matching", &options.guided_matching,
-                     "1: where sensor logs predict the motion between two "
-                     "photos, compare only features near their epipolar "
-                     "lines; 0: compare all");
-  command.AddDefault("restart", &options.restart,
-                     "1: remove what earlier runs left in the workspace, and "
-                     "do it all anew; 0: continue");
-  command.AddDefault("max_memory_gb", &options.max_memory_gb,
-                     "for each of the stages from priors to the model, which "
-                     "do not begin when they may take more [GB]; -1: no bound");
+                     "number of following images to match each image with");
   command.AddDefault(
-      "num_threads", &options.num_threads,
-      "-1: all of the machine's, and pairs are matched while features "
-      "are extracted");
+      "num_similar_images", &options.pairs.num_similar_images,
+      "number of further, similar images to match each image with");
+  command.AddDefault(
+      "guided_matching", &options.guided_matching,
+      "1: where sensor logs predict the motion between two photos, compare "
+      "only features near the epipolar lines; 0: compare all");
+  command.AddDefault("restart", &options.restart,
+                     "1: remove the results of earlier runs in the workspace "
+                     "and start again; 0: continue");
+  command.AddDefault(
+      "max_memory_gb", &options.max_memory_gb,
+      "memory limit of prior import, coarse model and mapper each; a stage "
+      "that may need more does not start [GB]; -1: no limit");
+  command.AddDefault("num_threads", &options.num_threads,
+                     "number of threads; -1: all of the machine, and pairs are "
+                     "matched while features are extracted");
   const Status parsed = command.Parse(argc, argv);
   if (!parsed.ok() || command.HelpShown()) return parsed;
   const Status valid =

@@ -71,17 +71,18 @@ Status RunAdasfmDatabaseMerger(int argc, char** argv) {
   MergeDatabasesOptions options;
   CommandOptions command(
       "adasfm_database_merger",
-      "Joins COLMAP databases: shards of one list of images, or several "
-      "sessions whose names a prefix keeps apart.");
+      "Joins COLMAP databases: shards of one image list, or several sessions "
+      "whose image names get different prefixes.");
   command.AddDefault("input_paths", &input_paths,
                      "the databases, separated by commas");
-  command.AddDefault("input_list_path", &input_list_path,
-                     "in place of --input_paths: text file with a path a line");
+  command.AddDefault(
+      "input_list_path", &input_list_path,
+      "in place of --input_paths: text file with one path per line");
   command.AddRequired("output_path", &output_path,
-                      "the joined database; one that exists is joined into");
+                      "the joined database; an existing database is extended");
   command.AddDefault("prefixes", &prefixes,
-                     "put before the image names of each database, separated "
-                     "by commas, as monday/,tuesday/");
+                     "prefixes of the image names of each database, separated "
+                     "by commas, e.g. monday/,tuesday/");
   command.AddDefault("share_cameras", &options.share_cameras,
                      "equal cameras of databases with the same prefix become "
                      "one");

@@ -21,15 +21,15 @@ struct PairOptions {
 
 void AddPairOptions(PairOptions* options, CommandOptions* command) {
   command->AddDefault("database_path", &options->database_path,
-                      "database whose verified pairs are compared too, as "
-                      "they were before and as they are after adasfm_global; "
-                      "none when empty");
+                      "database whose verified pairs are compared too, both "
+                      "before and after adasfm_global; none when empty");
   command->AddDefault("landmarks_path", &options->landmarks_path,
-                      "what each keypoint truly sees, lines `name id id ...` "
-                      "(adasfm_synthesizer's landmarks.txt), for precision "
-                      "and recall of matches; none when empty");
-  command->AddDefault("pairs_json_path", &options->json_path,
-                      "file for the pairs' figures as JSON; none when empty");
+                      "true landmark of each keypoint, lines `name id id ...` "
+                      "(adasfm_synthesizer's landmarks.txt), for precision and "
+                      "recall of matches; none when empty");
+  command->AddDefault(
+      "pairs_json_path", &options->json_path,
+      "file for the results of the pairs as JSON; none when empty");
 }
 
 Status ComparePairs(const PairOptions& options, const NamedPoses& truth) {
@@ -58,13 +58,13 @@ Status RunAdasfmEvaluator(int argc, char** argv) {
                       "true poses: a COLMAP model, a TUM trajectory, or lines "
                       "`name qw qx qy qz tx ty tz` (cam_from_world)");
   command.AddDefault("json_path", &json_path,
-                     "file for the figures as JSON; none when empty");
+                     "file for the results as JSON; none when empty");
   command.AddDefault("image_times_path", &options.image_times_path,
-                     "times of the images, for a trajectory; when empty, the "
-                     "names' digits are nanoseconds");
-  command.AddDefault("max_time_gap_s", &options.max_time_gap_s,
-                     "a trajectory is interpolated between poses at most this "
-                     "far apart [s]");
+                     "image times, for a ground-truth trajectory; when empty, "
+                     "the digits of an image name are nanoseconds");
+  command.AddDefault(
+      "max_time_gap_s", &options.max_time_gap_s,
+      "largest gap between trajectory poses that is interpolated [s]");
   PairOptions pairs;
   AddPairOptions(&pairs, &command);
   const Status parsed = command.Parse(argc, argv);

@@ -59,26 +59,26 @@ Status WriteInFrame(const GeoreferencerOptions& options) {
 
 Status RunAdasfmGeoreferencer(int argc, char** argv) {
   GeoreferencerOptions options;
-  CommandOptions command(
-      "adasfm_georeferencer",
-      "Writes a model that was made with positions in another frame of the "
-      "Earth.");
+  CommandOptions command("adasfm_georeferencer",
+                         "Converts a georeferenced model to ECEF, UTM or the "
+                         "ENU frame of another origin.");
   command.AddRequired("input_path", &options.input_path,
-                      "model in the frame of georeference.json beside it");
+                      "model folder, in the ENU frame of --georeference_path");
   command.AddRequired("output_path", &options.output_path,
                       "folder for the model");
-  command.AddDefault("frame", &options.frame,
-                     "ecef, utm (of the origin's zone), or enu of the origin "
-                     "below");
+  command.AddDefault(
+      "frame", &options.frame,
+      "ecef, utm (zone of the model's origin), or enu at the given origin");
   command.AddDefault("latitude_deg", &options.enu_origin.latitude_deg,
-                     "origin of --frame enu [deg]");
+                     "latitude of the origin of --frame enu [deg]");
   command.AddDefault("longitude_deg", &options.enu_origin.longitude_deg,
-                     "origin of --frame enu [deg]");
-  command.AddDefault("height_m", &options.enu_origin.height_m,
-                     "origin of --frame enu, above the ellipsoid [m]");
+                     "longitude of the origin of --frame enu [deg]");
+  command.AddDefault(
+      "height_m", &options.enu_origin.height_m,
+      "height of the origin of --frame enu above the ellipsoid [m]");
   command.AddDefault("georeference_path", &options.georeference_path,
-                     "georeference of the model; when empty, "
-                     "georeference.json in the folder above it");
+                     "ENU origin of the model; when empty, georeference.json "
+                     "in the parent of --input_path");
   const Status parsed = command.Parse(argc, argv);
   if (!parsed.ok() || command.HelpShown()) return parsed;
   if (options.georeference_path.empty()) {

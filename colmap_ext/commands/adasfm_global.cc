@@ -22,7 +22,7 @@ void AddOptions(GlobalCommandOptions* options, CommandOptions* command) {
   command->AddRequired("database_path", &options->database_path,
                        "COLMAP database with verified matches");
   command->AddRequired("output_path", &options->output_path,
-                       "folder for the coarse model (0, 1, ...)");
+                       "folder for the coarse models (0, 1, ...)");
   AddGlobalOptions(&options->stage, command);
 }
 

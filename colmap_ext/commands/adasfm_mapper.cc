@@ -33,8 +33,8 @@ Status RunAdasfmMapper(int argc, char** argv) {
   MapperCommandOptions options;
   CommandOptions command(
       "adasfm_mapper",
-      "Reconstructs overlapping parts incrementally, steered by the coarse "
-      "model, and merges them into one; of each coarse model.");
+      "Divides each coarse model into overlapping parts, reconstructs the "
+      "parts incrementally, guided by the coarse poses, and merges them.");
   command.AddRequired("database_path", &options.request.database_path,
                       "COLMAP database with verified matches");
   command.AddRequired("input_path", &options.request.input_path,
@@ -46,7 +46,7 @@ Status RunAdasfmMapper(int argc, char** argv) {
   command.AddDefault("AdaSfmMapper.stage", &options.stage,
                      "what to run: all, plan, part or merge");
   command.AddDefault("AdaSfmMapper.part_index", &options.request.part_index,
-                     "which part --AdaSfmMapper.stage part makes, from 0");
+                     "index of the part for --AdaSfmMapper.stage part, from 0");
   AddMapperOptions(&options.map, &command);
   Status status = command.Parse(argc, argv);
   if (!status.ok() || command.HelpShown()) return status;

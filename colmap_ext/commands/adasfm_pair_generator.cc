@@ -16,22 +16,23 @@ Status RunAdasfmPairGenerator(int argc, char** argv) {
   PairSelectionOptions options;
   std::string database_path;
   std::string output_path;
-  CommandOptions command(
-      "adasfm_pair_generator",
-      "Chooses the pairs of images to match: neighbours in time and the most "
-      "similar ones; for matches_importer --match_type pairs.");
+  CommandOptions command("adasfm_pair_generator",
+                         "Selects the image pairs to match (neighbours in "
+                         "time, pairs with predicted overlap, similar images) "
+                         "for matches_importer --match_type pairs.");
   command.AddRequired("database_path", &database_path,
                       "COLMAP database with extracted features");
-  command.AddRequired("output_path", &output_path,
-                      "text file for the pairs, a line `name1 name2` each");
-  command.AddDefault("image_times_path", &options.image_times_path,
-                     "times of the images: EuRoC data.csv, 4Seasons times.txt "
-                     "or TUM rgb.txt; when empty, those that "
-                     "adasfm_prior_importer left in the database, else the "
-                     "order of the names");
+  command.AddRequired(
+      "output_path", &output_path,
+      "text file for the pairs, one line `name1 name2` per pair");
+  command.AddDefault(
+      "image_times_path", &options.image_times_path,
+      "image times: EuRoC data.csv, 4Seasons times.txt or TUM rgb.txt; when "
+      "empty, the times that adasfm_prior_importer stored in the database, "
+      "else the order of the image names");
   AddPairOptions(&options, &command);
   command.AddDefault("num_threads", &options.descriptors.num_threads,
-                     "-1: all of the machine's");
+                     "number of threads; -1: all of the machine");
   const Status parsed = command.Parse(argc, argv);
   if (!parsed.ok() || command.HelpShown()) return parsed;
   const Status valid = CheckOptions(options);

@@ -16,17 +16,17 @@ void AddPathOptions(PriorImportPaths* paths, CommandOptions* command) {
   command->AddRequired("database_path", &paths->database_path,
                        "COLMAP database with the images");
   command->AddDefault("sensors_path", &paths->sensors_path,
-                      "YAML file with the calibration of the sensors; a "
-                      "trajectory of the camera itself needs none");
+                      "YAML file with the calibration of the sensors; not "
+                      "needed for a trajectory of the camera");
   AddLogOptions(paths, command);
   command->AddDefault("bag_path", &paths->bag_path,
-                      "a ROS 2 bag (.mcap, .db3 or its folder) or a ROS 1 bag "
-                      "with the logs that no path is given for");
+                      "a ROS 2 bag (.mcap, .db3 or bag folder) or a ROS 1 bag, "
+                      "for the logs for which no path is given");
   AddBagTopicOptions(&paths->bag_topics, command);
-  command->AddDefault("trajectory_path", &paths->trajectory_path,
-                      "in place of logs: metric poses as a TUM trajectory or "
-                      "a COLMAP model, of which the motions between images "
-                      "are used");
+  command->AddDefault(
+      "trajectory_path", &paths->trajectory_path,
+      "in place of logs: metric poses as a TUM trajectory or a COLMAP model; "
+      "the relative poses of images become priors");
 }
 
 }  // namespace
@@ -36,16 +36,16 @@ Status RunAdasfmPriorImporter(int argc, char** argv) {
   PriorImportOptions options;
   bool force = false;
   std::string summary_path;
-  CommandOptions command(
-      "adasfm_prior_importer",
-      "Turns logs of an IMU, wheels and GNSS into priors in the database.");
+  CommandOptions command("adasfm_prior_importer",
+                         "Computes pose priors from IMU, wheel and GNSS logs "
+                         "and stores them in the database.");
   AddPathOptions(&paths, &command);
-  command.AddDefault("force", &force,
-                     "import although vision and gyroscope contradict each "
-                     "other (0 or 1)");
+  command.AddDefault(
+      "force", &force,
+      "import even if the sensors contradict vision or each other (0 or 1)");
   command.AddDefault("summary_path", &summary_path,
-                     "file for the summary as JSON; when empty, the database's "
-                     "path with .priors.json");
+                     "file for the summary as JSON; when empty, the database "
+                     "path followed by .priors.json");
   AddImporterOptions(&options, &command);
   const Status parsed = command.Parse(argc, argv);
   if (!parsed.ok() || command.HelpShown()) return parsed;

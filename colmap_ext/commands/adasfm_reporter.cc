@@ -13,16 +13,16 @@ Status RunAdasfmReporter(int argc, char** argv) {
   ReportOptions options;
   std::string output_path;
   CommandOptions command("adasfm_reporter",
-                         "Shows a model, and how it came about, in one HTML "
-                         "file that needs no network.");
+                         "Writes a report of a model and its reconstruction as "
+                         "one HTML file that needs no network.");
   command.AddRequired("output_path", &output_path, "HTML file to write");
-  command.AddRequired("input_path", &options.input_path,
-                      "model folder, or a folder of models, of which the "
-                      "largest is shown; the summary of adasfm_mapper beside "
-                      "it is read too");
+  command.AddRequired(
+      "input_path", &options.input_path,
+      "model folder, or a folder of models, of which the largest is shown; the "
+      "summary of adasfm_mapper beside the models is also read");
   command.AddDefault("coarse_path", &options.coarse_path,
-                     "the model of adasfm_global, likewise; its summary and "
-                     "removed pairs are read too");
+                     "model folder or folder of models of adasfm_global; its "
+                     "summary and removed pairs are also read");
   command.AddDefault("database_path", &options.database_path,
                      "COLMAP database, for the priors and the view graph; the "
                      "summary of adasfm_prior_importer beside it is read too");
@@ -33,16 +33,16 @@ Status RunAdasfmReporter(int argc, char** argv) {
                      "true poses: a COLMAP model, a TUM trajectory, or lines "
                      "`name qw qx qy qz tx ty tz` (cam_from_world)");
   command.AddDefault("image_times_path", &options.ground_truth.image_times_path,
-                     "times of the images, for a trajectory; when empty, the "
-                     "names' digits are nanoseconds");
-  command.AddDefault("max_time_gap_s", &options.ground_truth.max_time_gap_s,
-                     "a trajectory is interpolated between poses at most this "
-                     "far apart [s]");
+                     "image times, for a ground-truth trajectory; when empty, "
+                     "the digits of an image name are nanoseconds");
+  command.AddDefault(
+      "max_time_gap_s", &options.ground_truth.max_time_gap_s,
+      "largest gap between trajectory poses that is interpolated [s]");
   command.AddDefault("max_num_points", &options.max_num_points,
                      "largest number of points in the 3D view");
   command.AddDefault("max_num_examples", &options.max_num_examples,
-                     "largest number of pairs on photos, of each of removed "
-                     "and kept ones; each adds about 60 kB");
+                     "largest number of pairs shown with photos, for removed "
+                     "and for kept pairs; each pair adds about 60 kB");
   const Status parsed = command.Parse(argc, argv);
   if (!parsed.ok() || command.HelpShown()) return parsed;
   Status valid = CheckOptions(options);

@@ -11,8 +11,8 @@ Status RunAdasfmRestorer(int argc, char** argv) {
   std::string database_path;
   CommandOptions command(
       "adasfm_restorer",
-      "Puts the two-view geometries back that adasfm_global rewrote, byte for "
-      "byte, and the priors' rotations that it corrected.");
+      "Restores, byte for byte, the two-view geometries that adasfm_global "
+      "rewrote and the prior rotations that adasfm_global corrected.");
   command.AddRequired("database_path", &database_path,
                       "COLMAP database that adasfm_global rewrote");
   const Status parsed = command.Parse(argc, argv);

@@ -37,30 +37,33 @@ void AddDriveOptions(SynthesizerOptions* options, CommandOptions* command) {
     command->AddDefault(name, value, help);
   };
   SyntheticWorldOptions* world = &options->world;
-  add("num_images", &world->num_images, "images of the drive, of each camera");
+  add("num_images", &world->num_images, "number of images of each camera");
   add("stereo_baseline", &world->stereo_baseline_m,
-      "above 0: a second camera so far to the right of the "
-      "first, with images at the same times [m]");
+      "baseline length to a second, synchronous camera on the right [m]; 0: "
+      "one camera");
   add("seed", &world->seed, "equal seeds give equal worlds");
   add("spacing", &world->spacing_m, "mean distance between images [m]");
   add("image_interval", &world->image_interval_s,
-      "mean time between images under way; 0: that of 8 m/s, "
-      "within 0.05 to 0.4 s [s]");
+      "mean time between images while driving [s]; 0: that of 8 m/s (lanes: 1 "
+      "m/s), within 0.05 to 0.4 s");
   add("trajectory", &options->trajectory,
-      "town (bends and revisits), straight, parallel (streets "
-      "that look alike, up and down), floors (of a car park, "
-      "which look alike) or lanes (of a mower)");
+      "town (bends and revisits), straight, parallel (similar streets in "
+      "alternating directions), floors (similar floors of a car park) or lanes "
+      "(of a mower)");
   add("street_blocks", &world->street_num_blocks,
-      "parallel: length of a street [60 m]");
+      "trajectory parallel: length of a street [60 m]");
   add("floor_height", &world->floor_height_m,
-      "floors: height from one to the next [m]");
+      "trajectory floors: height from floor to floor [m]");
   add("lane_spacing", &world->lane_spacing_m,
-      "lanes: distance between neighbouring ones [m]");
-  add("lane_length", &world->lane_length_m, "lanes: length of each [m]");
-  add("stops", &world->num_stops, "stops under way; images go on");
+      "trajectory lanes: distance between neighbouring lanes [m]");
+  add("lane_length", &world->lane_length_m,
+      "trajectory lanes: length of a lane [m]");
+  add("stops", &world->num_stops, "number of stops, with images at rest");
   add("stop_duration", &world->stop_duration_s, "duration of a stop [s]");
-  add("spins", &world->num_spins, "turns by 360 deg on the spot; images go on");
-  add("spin_duration", &world->spin_duration_s, "duration of such a turn [s]");
+  add("spins", &world->num_spins,
+      "number of turns by 360 deg on the spot, with images");
+  add("spin_duration", &world->spin_duration_s,
+      "duration of a turn on the spot [s]");
 }
 
 void AddImageOptions(SynthesizerOptions* options, CommandOptions* command) {
@@ -69,7 +72,7 @@ void AddImageOptions(SynthesizerOptions* options, CommandOptions* command) {
   };
   SyntheticWorldOptions* world = &options->world;
   add("camera_model", &options->camera_model,
-      "camera of the drive: PINHOLE or OPENCV_FISHEYE");
+      "camera model: PINHOLE or OPENCV_FISHEYE");
   add("image_width", &world->image_width, "width of an image [px]");
   add("image_height", &world->image_height, "height of an image [px]");
   add("num_keypoints", &world->num_keypoints_per_image,
@@ -80,19 +83,21 @@ void AddImageOptions(SynthesizerOptions* options, CommandOptions* command) {
       "time from the first to the last row of an image; 0: "
       "global shutter [s]");
   add("focal_breathing", &world->focal_breathing_ratio,
-      "autofocus: largest error of an image's focal length, as a share of the "
-      "camera's, which stays stated");
+      "autofocus: largest relative deviation of an image's focal length from "
+      "the calibrated one");
   add("focal_steps", &world->num_focal_steps,
-      "changes of that error under way, constant in between; 0: a slow wave");
+      "number of steps of the focal_breathing deviation, constant in between; "
+      "0: a slow wave");
   add("moving_ratio", &world->moving_keypoint_ratio,
       "share of keypoints on cars that drive ahead");
   add("outlier_ratio", &world->outlier_match_ratio,
       "share of raw matches that are wrong");
-  add("num_blackouts", &world->num_blackouts, "intervals without texture");
+  add("num_blackouts", &world->num_blackouts,
+      "number of blackouts (intervals without texture)");
   add("blackout_images", &world->blackout_num_images,
-      "images of each such interval");
+      "number of images of each blackout");
   add("blackout_keypoints", &world->blackout_num_keypoints,
-      "keypoints at most of such an image");
+      "largest number of keypoints of an image in a blackout");
 }
 
 void AddPhotoOptions(SynthesizerOptions* options, CommandOptions* command) {
@@ -101,12 +106,12 @@ void AddPhotoOptions(SynthesizerOptions* options, CommandOptions* command) {
   };
   SyntheticWorldOptions* world = &options->world;
   add("exposure_jumps", &world->exposure_jump_ratio,
-      "render: share of photos with more or less light than the one before");
+      "render: share of photos that are darker or brighter than the previous "
+      "photo");
   add("exposure_factor", &world->exposure_jump_factor,
-      "render: by which factor; grey levels end at white");
+      "render: brightness factor of exposure jumps, saturating at white");
   add("exposure_time", &world->exposure_time_s,
-      "render: time for which the shutter is open, so that motion blurs; 0: "
-      "none [s]");
+      "render: exposure time, which causes motion blur [s]; 0: no blur");
   add("render", &options->render, "1: photos in images/ instead of a database");
 }
 
@@ -115,12 +120,12 @@ void AddPairOptions(SyntheticWorldOptions* world, CommandOptions* command) {
     command->AddDefault(name, value, help);
   };
   add("num_neighbors", &world->num_sequential_neighbors,
-      "images matched with so many of the next ones");
+      "number of following images to match each image with");
   add("alias_ratio", &world->alias_pair_ratio,
-      "share of pairs that join look-alike places");
+      "share of pairs that are false by perceptual aliasing");
   add("spurious_ratio", &world->spurious_pair_ratio,
-      "share of pairs that join images with nothing in common "
-      "by 15 to 25 matches");
+      "share of pairs that are false, between images without overlap, with 15 "
+      "to 25 matches");
   add("rotation_outliers", &world->rotation_outlier_ratio,
       "share of true pairs whose rotation is wrong");
 }
@@ -130,19 +135,21 @@ void AddSensorOptions(SyntheticWorldOptions* world, CommandOptions* command) {
     command->AddDefault(name, value, help);
   };
   add("wheel_slips", &world->num_wheel_slips,
-      "intervals in which the wheels slip");
+      "number of intervals in which the wheels slip");
   add("wheel_slip_noise", &world->wheel_slip_sigma,
-      "gravel: random slip of each wheel over a second, 1 "
-      "sigma, as a share of its speed; not declared");
+      "gravel: random slip of each wheel, correlated over 1 s, 1 sigma as a "
+      "share of its speed; not in sensors.yaml");
   add("gyro_drift", &world->gyro_drift,
-      "growth of the gyroscope's bias about the vertical, not "
-      "declared [rad/s^2]");
+      "drift of the gyroscope bias about the vertical, not in sensors.yaml "
+      "[rad/s^2]");
   add("gnss_rate", &world->gnss_rate_hz,
-      "positions of a receiver, in gnss.csv; 0: none [Hz]");
-  add("gnss_noise", &world->gnss_noise_m, "their noise per axis, 1 sigma [m]");
+      "rate of the GNSS positions in gnss.csv [Hz]; 0: no positions");
+  add("gnss_noise", &world->gnss_noise_m,
+      "noise of the GNSS positions per axis, 1 sigma [m]");
   add("gnss_jumps", &world->num_gnss_jumps,
-      "intervals of 5 s in which they are 15 m off");
-  add("wheel_scale", &world->wheel_scale, "true speed per logged speed");
+      "number of intervals of 5 s with GNSS positions 15 m off");
+  add("wheel_scale", &world->wheel_scale,
+      "true speed divided by the logged wheel speed");
   add("wheel_noise", &world->wheel_speed_noise,
       "noise of the wheel speeds, 1 sigma [m/s]");
   add("standstill", &world->standstill_s, "time at rest at the start [s]");
@@ -152,7 +159,7 @@ void AddSensorOptions(SyntheticWorldOptions* world, CommandOptions* command) {
 
 void AddOptions(SynthesizerOptions* options, CommandOptions* command) {
   command->AddRequired("output_path", &options->output_path,
-                       "folder for the world");
+                       "folder for the simulated data");
   AddDriveOptions(options, command);
   AddImageOptions(options, command);
   AddPairOptions(&options->world, command);
@@ -260,8 +267,8 @@ Status RunAdasfmSynthesizer(int argc, char** argv) {
   SynthesizerOptions options;
   CommandOptions command(
       "adasfm_synthesizer",
-      "Makes a drive through a town with ground truth: IMU and wheel logs, and "
-      "a database with verified matches or photos.");
+      "Simulates a drive with ground truth: IMU and wheel logs, and either a "
+      "database with verified matches or photos.");
   AddOptions(&options, &command);
   Status status = command.Parse(argc, argv);
   if (!status.ok() || command.HelpShown()) return status;

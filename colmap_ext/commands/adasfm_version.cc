@@ -8,11 +8,10 @@
 namespace adasfm {
 
 Status RunAdasfmVersion(int argc, char** argv) {
-  CommandOptions command(
-      "adasfm_version",
-      "Prints this program's version, that of the COLMAP library inside, and "
-      "the host's colmap, which gets all commands that do not begin with "
-      "adasfm_.");
+  CommandOptions command("adasfm_version",
+                         "Prints the versions of this program, of the linked "
+                         "COLMAP library and of the host's colmap, which runs "
+                         "all commands that do not begin with adasfm_.");
   const Status parsed = command.Parse(argc, argv);
   if (!parsed.ok() || command.HelpShown()) return parsed;
 

@@ -195,7 +195,7 @@ CommandOptions::CommandOptions(const std::string& name,
   options_.add_options()("help,h", "Show this help.");
   options_.add_options()(
       "project_path", po::value<std::string>(&project_path_),
-      "an .ini file with options; those of the command line win");
+      ".ini file with options; options of the command line override it");
   AddDefault("log_to_stderr", &log_to_stderr_,
              "print COLMAP's informational log lines too (0 or 1)");
   AddDefault("log_level", &log_level_,

@@ -11,31 +11,33 @@ void AddFusionOptions(OdometryFusionOptions* fusion, CommandOptions* command) {
   const auto add = [command](const char* name, auto* value, const char* help) {
     command->AddDefault(std::string("AdaSfmPriors.") + name, value, help);
   };
-  add("gravity_m_s2", &fusion->gravity_m_s2, "the Earth's pull [m/s^2]");
+  add("gravity_m_s2", &fusion->gravity_m_s2,
+      "magnitude of the gravity vector [m/s^2]");
   add("gyroscope_bias_sigma_rad_s", &fusion->gyroscope_bias_sigma,
-      "gyroscope bias before any data, 1 sigma [rad/s]");
+      "prior 1 sigma of the gyroscope bias, per axis [rad/s]");
   add("accelerometer_bias_sigma_m_s2", &fusion->accelerometer_bias_sigma,
-      "accelerometer bias before any data, 1 sigma [m/s^2]");
+      "prior 1 sigma of the accelerometer bias, per axis [m/s^2]");
   add("wheel_scale_sigma", &fusion->wheel_scale_sigma,
-      "scale of the wheels before any data, 1 sigma [1 = 100 %]");
+      "prior 1 sigma of the wheel scale [1 = 100 %]");
   add("wheel_track_sigma", &fusion->wheel_track_sigma,
-      "scale of the track width before any data, 1 sigma [1 = 100 %]");
+      "prior 1 sigma of the scale of the track width [1 = 100 %]");
   add("wheel_curvature_sigma_per_m", &fusion->wheel_curvature_sigma,
-      "difference of the wheels before any data, 1 sigma [1/m]");
+      "prior 1 sigma of the path curvature caused by unequal wheels [1/m]");
   add("driving_direction_sigma_deg", &fusion->driving_direction_sigma_deg,
-      "driving direction against T_imu_wheel, 1 sigma [deg]; 0 trusts it");
+      "prior 1 sigma of the driving direction relative to T_imu_wheel [deg]; "
+      "0: fixed");
   add("wheel_delay_sigma_s", &fusion->wheel_delay_sigma_s,
-      "how long wheel readings lie behind their times, 1 sigma [s]");
+      "prior 1 sigma of the delay of wheel readings behind the motion [s]");
   add("lateral_speed_noise_m_s_sqrt_hz", &fusion->lateral_speed_noise,
-      "sideways speed of the wheel frame [m/s/sqrt(Hz)]");
+      "noise of the lateral speed of the wheel frame [m/s/sqrt(Hz)]");
   add("vertical_speed_noise_m_s_sqrt_hz", &fusion->vertical_speed_noise,
-      "vertical speed of the wheel frame [m/s/sqrt(Hz)]");
+      "noise of the vertical speed of the wheel frame [m/s/sqrt(Hz)]");
   add("planar_rotation_noise_rad_sqrt_s", &fusion->planar_rotation_noise,
-      "roll and pitch of a machine without IMU [rad/sqrt(s)]");
+      "noise of roll and pitch of a machine without IMU [rad/sqrt(s)]");
   add("slip_threshold_sigma", &fusion->slip_threshold_sigma,
-      "wheels further than this from the IMU lose weight [sigma]");
+      "wheel readings that differ more from the IMU are downweighted [sigma]");
   add("slip_min_speed_m_s", &fusion->slip_min_speed_m_s,
-      "slip is reported beyond this error of the speed [m/s]");
+      "smallest speed error that is reported as wheel slip [m/s]");
   add("standstill_speed_sigma_m_s", &fusion->standstill_speed_sigma,
       "speed of a machine at rest, 1 sigma [m/s]");
   add("standstill_rate_sigma_rad_s", &fusion->standstill_rate_sigma,
@@ -43,7 +45,7 @@ void AddFusionOptions(OdometryFusionOptions* fusion, CommandOptions* command) {
   add("unaided_speed_sigma_m_s", &fusion->unaided_speed_sigma,
       "speed of an IMU without wheels, 1 sigma [m/s]");
   add("max_num_iterations", &fusion->max_num_iterations,
-      "iterations of the smoother");
+      "largest number of iterations of the smoother");
 }
 
 void AddOldNames(CommandOptions* command) {
@@ -75,26 +77,25 @@ void AddOtherSources(PriorImportOptions* options, CommandOptions* command) {
                       "images, 1 sigma [m/m]");
   command->AddDefault(
       "AdaSfmTrajectory.sigma_deg_per_m", &trajectory->sigma_deg_per_m,
-      "error of its rotation between two images, 1 sigma [deg/m]");
+      "error of the trajectory's rotation between two images, 1 sigma [deg/m]");
   command->AddDefault("AdaSfmTrajectory.max_gap_s", &trajectory->max_gap_s,
-                      "longest gap of the trajectory to bridge [s]");
-  command->AddDefault("AdaSfmRig.rotation_sigma_deg",
-                      &options->rig.rotation_sigma_deg,
-                      "error of the cameras of a rig against each other, 1 "
-                      "sigma per axis [deg]");
-  command->AddDefault("AdaSfmRig.translation_sigma_m",
-                      &options->rig.translation_sigma_m,
-                      "the same for their distances [m]");
+                      "longest gap of the trajectory to interpolate [s]");
+  command->AddDefault(
+      "AdaSfmRig.rotation_sigma_deg", &options->rig.rotation_sigma_deg,
+      "error of relative rotations in a rig, 1 sigma per axis [deg]");
+  command->AddDefault(
+      "AdaSfmRig.translation_sigma_m", &options->rig.translation_sigma_m,
+      "error of relative positions in a rig, 1 sigma per axis [m]");
   PositionPriorOptions* positions = &options->positions;
   command->AddDefault("AdaSfmGnss.max_fix_gap_s", &positions->max_fix_gap_s,
-                      "longest gap of the positions to bridge [s]");
+                      "longest gap of the GNSS positions to interpolate [s]");
   command->AddDefault("AdaSfmGnss.max_image_gap_s", &positions->max_image_gap_s,
-                      "a position between two images at most this far apart "
-                      "belongs to both [s]");
+                      "a GNSS position between two images at most this far "
+                      "apart constrains both [s]");
   command->AddDefault("AdaSfmGnss.correlation_time_s",
                       &positions->correlation_time_s,
-                      "for so long errors of positions persist; 0: no longer "
-                      "than to the next one [s]");
+                      "correlation time of the errors of GNSS positions [s]; "
+                      "0: independent errors");
 }
 
 }  // namespace
@@ -109,29 +110,31 @@ void AddImporterOptions(PriorImportOptions* options, CommandOptions* command) {
   add("max_wheel_gap_s", &estimation->max_wheel_gap_s,
       "longest gap of the wheel log to bridge [s]");
   add("max_link_s", &estimation->max_link_s,
-      "images further apart get states between them [s]");
+      "longest interval between two states of the smoother [s]");
   add("max_lead_s", &estimation->max_lead_s,
-      "logs are used from this long before the first image on [s]");
+      "logs are used up to this time before the first and after the last image "
+      "[s]");
   add("use_visual_rotations", &estimation->use_visual_rotations,
-      "two-view rotations help to find the gyroscope's bias, and where wheels "
-      "without an IMU slip (0 or 1)");
+      "use two-view rotations to estimate the gyroscope bias and, without an "
+      "IMU, to detect wheel slip (0 or 1)");
   add("visual_bias_sigma_rad_s", &estimation->visual_bias_sigma,
-      "what all of them err by alike, which their scatter does not show, 1 "
-      "sigma [rad/s]");
+      "common error of all two-view rotations, as a rotation rate, 1 sigma "
+      "[rad/s]");
   add("estimate_time_shift", &estimation->estimate_time_shift,
-      "add the time shift that vision and gyroscope agree on to the "
-      "calibration's: 0, 1, or -1: when it is clear and at most 0.15 s");
+      "add the estimated time shift between vision and gyroscope to "
+      "timeshift_cam_imu: 0, 1, or -1: if significant and at most 0.15 s");
   add("undo_gyroscope_filter", &estimation->undo_gyroscope_filter,
-      "undo a low-pass filter in the gyroscope's log when vision clearly shows "
-      "one (0 or 1)");
+      "undo a low-pass filter of the gyroscope log if the comparison with "
+      "vision is significant (0 or 1)");
   add("calibrate_focal_lengths", &options->focal_lengths.enabled,
-      "two-view rotations are those under focal lengths found from the "
-      "verified pairs where the database does not mark them as known (0 or 1)");
+      "for two-view rotations, calibrate focal lengths that the database does "
+      "not mark as known from the verified pairs (0 or 1)");
   add("max_memory_gb", &options->max_memory_gb,
-      "an error, before the work, where the import may take more [GB]; -1: a "
-      "warning where it may take more than is free");
+      "memory limit; an import that may need more stops at the start [GB]; -1: "
+      "only a warning if it may need more than is free");
   add("max_visual_gap", &options->max_visual_gap,
-      "two-view rotations are taken from images at most this many apart");
+      "two-view rotations are used between images at most this many images "
+      "apart");
   AddFusionOptions(&estimation->fusion, command);
   AddOtherSources(options, command);
   AddOldNames(command);

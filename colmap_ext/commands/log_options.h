@@ -9,38 +9,37 @@ namespace adasfm {
 // command that reads logs. Paths has members of these names.
 template <typename Paths>
 void AddLogOptions(Paths* paths, CommandOptions* command) {
-  command->AddDefault("image_times_path", &paths->image_times_path,
-                      "times of the images: EuRoC data.csv, 4Seasons times.txt "
-                      "or TUM rgb.txt; when empty, the names' digits are "
-                      "nanoseconds");
+  command->AddDefault(
+      "image_times_path", &paths->image_times_path,
+      "image times: EuRoC data.csv, 4Seasons times.txt or TUM rgb.txt; when "
+      "empty, the digits of an image name are its nanoseconds");
   command->AddDefault(
       "imu_path", &paths->imu_path,
       "IMU log: EuRoC CSV, 4Seasons imu.txt, a KITTI oxts folder "
       "or a ROS bag; none when empty");
-  command->AddDefault(
-      "wheel_path", &paths->wheel_path,
-      "wheel log, told apart by its header line, a TUM odometry "
-      "trajectory or a ROS bag; none when empty");
+  command->AddDefault("wheel_path", &paths->wheel_path,
+                      "wheel log (the header line identifies the type), a TUM "
+                      "odometry trajectory or a ROS bag; none when empty");
   command->AddDefault(
       "gnss_path", &paths->gnss_path,
-      "positions: CSV whose header names the columns, NMEA, a KITTI oxts "
-      "folder, a ROS bag, or 'database' for those that COLMAP keeps there (of "
-      "EXIF, or pose_priors); none when empty");
+      "GNSS positions: CSV whose header names the columns, NMEA, a KITTI oxts "
+      "folder, a ROS bag, or 'database' for positions that COLMAP stored (EXIF "
+      "or pose_priors); none when empty");
 }
 
 // --imu_topic, --wheel_topic and --gnss_topic, for commands that read bags.
 // Names has members imu, wheel and gnss.
 template <typename Names>
 void AddBagTopicOptions(Names* names, CommandOptions* command) {
-  command->AddDefault("imu_topic", &names->imu,
-                      "topic of the IMU in the bag; when empty, the only one; "
-                      "'none' leaves it out");
+  command->AddDefault(
+      "imu_topic", &names->imu,
+      "IMU topic of the bag; when empty, the only IMU topic; 'none': no IMU");
   command->AddDefault("wheel_topic", &names->wheel,
                       "topic of odometry, twists or joint states in the bag; "
-                      "when empty, the only one; 'none' leaves it out");
+                      "when empty, the only such topic; 'none': no wheels");
   command->AddDefault("gnss_topic", &names->gnss,
-                      "topic of positions in the bag; when empty, the only "
-                      "one; 'none' leaves it out");
+                      "topic of GNSS positions in the bag; when empty, the "
+                      "only such topic; 'none': no GNSS");
 }
 
 }  // namespace adasfm

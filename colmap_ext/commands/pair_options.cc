@@ -12,34 +12,34 @@ void AddPairOptions(PairSelectionOptions* options, CommandOptions* command) {
   };
   GlobalDescriptorOptions* descriptors = &options->descriptors;
   add("num_temporal_neighbors", &options->num_temporal_neighbors,
-      "every image is matched with so many of the next ones in time");
+      "number of next images in time to match each image with");
   add("num_similar_images", &options->num_similar_images,
-      "and with so many of the most similar ones beyond them");
+      "number of further images (overlapping or similar) to match each image "
+      "with");
   add("use_odometry", &options->odometry.enabled,
-      "these are chosen by the overlap of views that the priors in the "
-      "database predict, and by similarity only where they cannot tell");
+      "select further images by the view overlap that the priors in the "
+      "database predict, by similarity only where this is uncertain");
   add("scene_depth_m", &options->odometry.scene_depth_m,
-      "how far away what the photos show typically is [m]");
+      "typical distance of the scene from the camera [m]");
   add("min_overlap", &options->odometry.min_overlap,
-      "share of the views, below which predicted pairs are left out");
+      "smallest predicted overlap of a selected pair, as a share of the view");
   add("descriptors_path", &options->descriptors_path,
-      "global descriptors from elsewhere, lines `image_name v1 v2 ... vn`; "
-      "when "
-      "empty, they are made from the database's features");
+      "file of external global descriptors, lines `image_name v1 v2 ... vn`; "
+      "when empty, computed from the features in the database");
   add("num_words", &descriptors->vocabulary.num_words,
-      "words of the vocabulary");
+      "number of visual words of the vocabulary");
   add("max_num_iterations", &descriptors->vocabulary.max_num_iterations,
-      "iterations of k-means");
+      "largest number of iterations of k-means");
   add("seed", &descriptors->vocabulary.seed,
       "equal seeds give equal vocabularies");
   add("max_num_training_descriptors",
       &descriptors->max_num_training_descriptors,
-      "features that the vocabulary is trained on");
+      "largest number of features to train the vocabulary on");
   add("num_dimensions", &descriptors->num_dimensions,
-      "principal components that a global descriptor is reduced to; 0 keeps it "
-      "whole");
+      "dimension of the global descriptors after a principal component "
+      "analysis; 0: no reduction");
   add("max_num_pca_images", &descriptors->max_num_pca_images,
-      "images that the principal components are learned from");
+      "largest number of images for the principal component analysis");
 }
 
 }  // namespace adasfm
