@@ -78,8 +78,8 @@ void SummarizeFusion(const OdometryFusionProblem& problem,
   }
   if (!fused.converged) {
     summary->warnings.push_back(
-        "the smoother did not converge: sensors contradict each other; check "
-        "T_cam_imu, T_imu_wheel and the noise figures");
+        "the odometry smoother did not converge: IMU and wheels seem to "
+        "contradict each other; check T_imu_wheel and the noise figures");
   }
 }
 

@@ -54,8 +54,8 @@ Status VisionComparison::Run() {
   }
   if (!check.is_conclusive) {
     summary_.warnings.push_back(
-        "the gyroscope cannot be checked against vision: too little turning, "
-        "or two-view rotations too few or too poor");
+        "the gyroscope cannot be checked against vision: too little rotation, "
+        "or two-view rotations that are too few or too noisy");
     return Status::Ok();
   }
   summary_.visual_timeshift_correction_s = check.time_shift_correction_s;
@@ -87,9 +87,9 @@ void VisionComparison::CorrectTimeShift(const VisionCheck& check) {
   summary_.timeshift_was_corrected = true;
   if (options_.estimate_time_shift == 1) return;
   summary_.warnings.push_back(FormatFigures(
-      "vision shows that images and IMU differ by %+.4f s more than "
-      "timeshift_cam_imu says, and the priors were made with that: write "
-      "timeshift_cam_imu: %.4f into the calibration",
+      "vision and gyroscope show a time offset that differs by %+.4f s from "
+      "timeshift_cam_imu; the priors use the corrected value: set "
+      "timeshift_cam_imu: %.4f in the calibration",
       check.time_shift_correction_s, SecondsFromNs(vision_.timeshift_ns)));
 }
 
@@ -104,9 +104,9 @@ Status VisionComparison::LeaveOutImu(const VisionCheck& check) {
   summary_.imu_was_left_out = true;
   summary_.warnings.push_back(
       check.contradiction +
-      ". The IMU is left out: a video that the camera stabilised turns "
-      "otherwise than the camera; switch the stabilisation off "
-      "(--force 1 uses the IMU all the same)");
+      ". The IMU is left out: a likely cause is video stabilisation, which "
+      "rotates the images; switch it off (--force 1 uses the IMU all the "
+      "same)");
   logs_.imu.clear();
   vision_.rotations.clear();
   return Status::Ok();

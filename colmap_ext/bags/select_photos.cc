@@ -112,7 +112,7 @@ StatusOr<std::set<timestamp_t>> SelectPhotos(
   const std::vector<Way> ways = FindWay(logs);
   if (options.image_distance_m > 0.0 && ways.empty()) {
     return Status::Error(
-        "--image_distance_m needs wheels that tell metres: in a bag a topic of "
+        "--image_distance_m needs a wheel log in metres: in a bag a topic of "
         "odometry or twists, with a video --wheel_path; use --image_step");
   }
   const Way* last = nullptr;

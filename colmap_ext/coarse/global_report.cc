@@ -64,12 +64,12 @@ Json WeakPlacesJson(const SceneData& scene, const CoarsePoses& poses) {
 std::string DescribeUnconfirmedClosure(const SceneData& scene,
                                        const UnconfirmedClosure& closure) {
   std::ostringstream text;
-  text << "a segment of " << closure.num_images
-       << " images may meet another where " << closure.num_pairs
+  text << "a trajectory segment of " << closure.num_images
+       << " images is connected to another only by " << closure.num_pairs
        << " pairs like " << scene.images.at(closure.image_id1).name << " and "
        << scene.images.at(closure.image_id2).name
-       << " agree, but neither sensors nor a second place confirm it, and "
-          "places that look alike would do the same: they become two models "
+       << "; neither sensors nor a second place confirm them, so they may be "
+          "places that look alike: the segments become two models "
           "(--AdaSfmGlobal.split_unconfirmed_closures 0 joins them)";
   return text.str();
 }
@@ -163,13 +163,13 @@ void AppendLostImages(const SceneData& scene, const GlobalStageResult& result,
     warnings->push_back(
         std::to_string(scene.images.size() - num_images) + " of " +
         std::to_string(scene.images.size()) +
-        " images are in no model: neither verified matches nor sensors tie "
-        "them to others");
+        " images are in no model: neither verified matches nor sensors "
+        "connect them to others");
   }
   if (result.models.size() > 1) {
     warnings->push_back(
         "the images fall apart into " + std::to_string(result.models.size()) +
-        " models, the largest of " +
+        " unconnected models, the largest of " +
         std::to_string(result.models[0].reconstruction.NumRegImages()) +
         " images: match more pairs, or add sensors that cover the gaps");
   }
@@ -207,7 +207,7 @@ void AppendPriorWarnings(const CoarseModel& model,
     const bool is_known =
         HasPriorFocalLength(model.reconstruction.Camera(error.camera_id));
     text << std::setprecision(2)
-         << "vision and sensors agree with a focal length that is "
+         << "vision and sensors agree on a focal length that is "
          << 100.0 * std::abs(error.ratio - 1.0) << " +- " << 100.0 * error.sigma
          << " % " << (error.ratio > 1.0 ? "longer" : "shorter")
          << " than the database says";
@@ -222,10 +222,9 @@ void AppendPriorWarnings(const CoarseModel& model,
               "--AdaSfmMapper.refine_focal_length 1)";
     }
   } else if (!model.priors_agree) {
-    text << "vision and sensors contradict each other (squared errors of the "
-            "sensors are "
-         << model.prior_chi2_per_dof
-         << " times what their noise allows, though keypoints were taken for "
+    text << "vision and sensors contradict each other (mean squared whitened "
+            "residual of the priors: "
+         << model.prior_chi2_per_dof << ", even with a keypoint sigma of "
          << model.keypoint_sigma_px
          << " px): check the intrinsics, T_cam_imu, timeshift_cam_imu and the "
             "noise figures of the sensors";
@@ -286,7 +285,7 @@ std::string FormatGlobalReportText(const GlobalStageResult& result,
     const CoarseModel& model = result.models[i];
     text << "Model " << i << ": " << model.reconstruction.NumRegImages()
          << " images, " << model.num_points << " points, "
-         << (model.inertial_scale_sigma > 0.0 ? "in metres of the accelerometer"
+         << (model.inertial_scale_sigma > 0.0 ? "in metres by the accelerometer"
              : model.metric                   ? "in metres"
                                               : "scale unknown")
          << ", " << (model.gravity_aligned ? "z up" : "gravity unknown");
@@ -298,12 +297,13 @@ std::string FormatGlobalReportText(const GlobalStageResult& result,
     if (!component.rotations_converged) text << ", rotations not converged";
     if (!model.pair_agreement.IsSound()) text << ", contradicts vision";
     if (model.num_points == 0) {
-      text << "; nothing but the sensors holds it\n";
+      text << "; no points, poses by the sensors alone\n";
       continue;
     }
-    text << "; pairs agree to " << 100.0 * model.pair_agreement.share
-         << " %, at the worst image "
-         << 100.0 * model.pair_agreement.least_image_share << " %\n";
+    text << "; " << 100.0 * model.pair_agreement.share
+         << " % of the pairs agree with the poses, "
+         << 100.0 * model.pair_agreement.least_image_share
+         << " % at the worst image\n";
   }
   text << "Total: " << total_seconds << " s\n";
   return text.str();
@@ -327,10 +327,11 @@ std::vector<std::string> ListGlobalWarnings(const SceneData& scene,
     text << std::fixed << std::setprecision(0)
          << "the coarse model contradicts vision: "
          << 100.0 * model.pair_agreement.share
-         << " % of the pairs agree with it, at the worst image "
+         << " % of the verified pairs agree with its poses, "
          << 100.0 * model.pair_agreement.least_image_share
-         << " %; wrong pairs outvote right ones, or the overlap is small: "
-            "look at the report, add sensors or match more pairs";
+         << " % at the worst image; more pairs are false than true, or the "
+            "overlap is small: see the report (adasfm_reporter), add sensors "
+            "or match more pairs";
     warnings.push_back(text.str());
   }
   const LoopClosureReport& loops = result.poses.loop_closures;
@@ -343,13 +344,13 @@ std::vector<std::string> ListGlobalWarnings(const SceneData& scene,
   for (const CoarseComponent& component : result.poses.components) {
     for (const UnconfirmedClosure& closure : component.unconfirmed_closures) {
       std::ostringstream text;
-      text << "a part of " << closure.num_images
-           << " images is joined to the rest at one place only ("
+      text << closure.num_images
+           << " images are connected to the rest at one place only ("
            << closure.num_pairs << " pairs like "
            << scene.images.at(closure.image_id1).name << " and "
            << scene.images.at(closure.image_id2).name
-           << "); if the two places merely look alike the model is folded: "
-              "sensors (adasfm_prior_importer) or more overlap would tell";
+           << "); if these are two places that look alike the model is "
+              "folded: add sensors (adasfm_prior_importer) or match more pairs";
       warnings.push_back(text.str());
     }
   }

@@ -102,7 +102,7 @@ std::string FormatMapperSummaryText(const MapperStageSummary& summary) {
   text << "separators: " << summary.aligned.num_separators << ", RMSE "
        << std::setprecision(3) << summary.aligned.separator_rmse_before << unit
        << " before, " << summary.aligned.separator_rmse_after << unit
-       << " after the parts were relaxed\n";
+       << " after the joint alignment of the parts\n";
   text << "model: " << summary.num_images << " images, " << summary.num_points
        << " points, " << std::setprecision(2) << summary.mean_reproj_error_px
        << " px; " << summary.merge.coarse_images.size()
@@ -110,15 +110,15 @@ std::string FormatMapperSummaryText(const MapperStageSummary& summary) {
        << summary.refine.num_images_reset
        << " contradicted the priors and were reset to their coarse poses, "
        << summary.refine.num_images_deregistered
-       << " without points and priors were left out\n";
+       << " with too few points and no priors were deregistered\n";
   if (summary.started_from_coarse_poses) {
-    text << "the merged parts contradicted the priors: the model was refined "
+    text << "the merged parts violated priors: the model was refined "
             "from the coarse poses\n";
   }
   if (summary.refine.min_num_shared_points > 1) {
-    text << "to save memory, adjustments took images that share fewer than "
-         << summary.refine.min_num_shared_points
-         << " points for images that share none\n";
+    text << "to save memory, bundle adjustments ignored that images share "
+            "points where they share fewer than "
+         << summary.refine.min_num_shared_points << "\n";
   }
   text << "seconds: plan " << summary.plan_seconds << ", parts "
        << summary.parts_seconds << ", merge " << summary.merge_seconds

@@ -116,8 +116,8 @@ void JudgeMatchedImages(const std::vector<AssessedModel>& models,
                kMinShareOfMatchedHeld, kGoodShareOfMatchedHeld,
                std::to_string(num_matched - num_held) + " of " +
                    std::to_string(num_matched) +
-                   " images with verified matches have no place that their "
-                   "matches agree with");
+                   " images with verified matches see too few points of "
+                   "the model: their matches contradict it");
 }
 
 void JudgeImages(const Verdict& verdict, Judge* judge) {
@@ -129,7 +129,7 @@ void JudgeImages(const Verdict& verdict, Judge* judge) {
           " of " + std::to_string(verdict.num_database_images) +
           " images are lost");
   if (verdict.num_points == 0) {
-    judge->Fail("the model has no points: nothing but the sensors holds it");
+    judge->Fail("the model has no points: its poses are the sensors' alone");
     return;
   }
   const double held =
@@ -138,7 +138,7 @@ void JudgeImages(const Verdict& verdict, Judge* judge) {
       held, kMinShareHeld, kGoodShareHeld,
       std::to_string(verdict.num_images - verdict.num_images_held_by_points) +
           " of " + std::to_string(verdict.num_images) +
-          " images see too few points for a pose of their own");
+          " images see too few points: their poses are the sensors'");
 }
 
 void CollectLensErrors(const std::vector<AssessedModel>& models,
@@ -154,11 +154,10 @@ void CollectLensErrors(const std::vector<AssessedModel>& models,
 void JudgeLenses(const Verdict& verdict, Judge* judge) {
   for (const auto& [camera_id, error] : verdict.lens_errors) {
     if (error.ratio <= kGoodLensErrorRatio) continue;
-    judge->Doubt("camera " + std::to_string(camera_id) +
-                 " does not bend images as its lens model says (" +
+    judge->Doubt("the lens model of camera " + std::to_string(camera_id) +
+                 " does not fit (systematic radial residuals of " +
                  Number(error.rms_px, 2) +
-                 " px towards the centre or from it; check camera model and "
-                 "distortion)");
+                 " px; check camera model and distortion)");
   }
 }
 
@@ -168,8 +167,8 @@ void JudgePriors(const Verdict& verdict, Judge* judge) {
     const std::string reason =
         "vision and the sensors' " + priors.kind + "s contradict each other (" +
         FormatShare(priors.share_contradicting) + " of " +
-        std::to_string(priors.num_priors) + ", typical squared error " +
-        Number(priors.chi2_ratio, 1) + " times what their noise allows)";
+        std::to_string(priors.num_priors) + ", typical squared residual " +
+        Number(priors.chi2_ratio, 1) + " times the expected one)";
     // Wrong lengths alone, as of wheels that slip all the time, do not change
     // the shape that vision gives, unless the keypoint sigma was raised for
     // them.
@@ -184,9 +183,9 @@ void JudgePriors(const Verdict& verdict, Judge* judge) {
   }
   if (!verdict.priors.empty() &&
       verdict.keypoint_sigma_factor >= kGoodSigmaFactor) {
-    judge->Doubt("keypoints had to be taken for " +
+    judge->Doubt("the keypoint sigma had to be raised to " +
                  Number(verdict.keypoint_sigma_px, 1) +
-                 " px to agree with the sensors");
+                 " px for vision to agree with the sensors");
   }
 }
 
@@ -194,7 +193,9 @@ void JudgePriors(const Verdict& verdict, Judge* judge) {
 void JudgeStage(const std::string& name, const MapperStageSummary& summary,
                 int num_images, Judge* judge) {
   if (summary.started_from_coarse_poses) {
-    judge->Doubt(name + "the parts contradicted the sensors and were rejected");
+    judge->Doubt(name +
+                 "the merged parts violated priors of the sensors; the "
+                 "model was refined from the coarse poses instead");
   }
   if (summary.refine.num_images_reset > kGoodShareReset * num_images) {
     judge->Doubt(name + std::to_string(summary.refine.num_images_reset) +
@@ -210,7 +211,7 @@ void JudgeStage(const std::string& name, const MapperStageSummary& summary,
   if (num_lost_parts > 0) {
     judge->Doubt(name + std::to_string(num_lost_parts) + " of " +
                  std::to_string(summary.parts.size()) +
-                 " parts could not be used");
+                 " parts failed or did not fit the coarse model");
   }
 }
 
@@ -329,7 +330,7 @@ Verdict AssessModels(const std::vector<AssessedModel>& models,
     judge.Doubt("lengths " +
                 FormatOfModels(verdict.num_models - verdict.num_metric_models,
                                verdict.num_models) +
-                "are in no unit, though sensors know some");
+                "are in no unit, though sensors measure some");
   }
   judge.Decide(&verdict);
   return verdict;

@@ -190,9 +190,9 @@ def describe(record):
   if record.get('joins_not_made'):
     said.append('joins not made')
   for key, word in (('contradict each other', 'sensors against vision'),
-                    ('agree with a focal', 'focal length'),
+                    ('agree on a focal', 'focal length'),
                     ('camera-IMU rotation is', 'camera-IMU rotation'),
-                    ('images and IMU differ', 'time shift'),
+                    ('time offset that differs', 'time shift'),
                     ('did not converge', 'smoother did not converge'),
                     ('gaps of more', 'hole in the log')):
     if any(key in warning for warning in record['warnings']):

@@ -27,7 +27,7 @@ from benchmarking.pair_counts import count_pairs
 from benchmarking.process import Failed, run
 from benchmarking.sets import camera_params
 
-NOT_ABOUT_A_MODEL = ('are in no model', 'fall apart', 'may meet another',
+NOT_ABOUT_A_MODEL = ('are in no model', 'fall apart', 'is connected to another only',
                      'joins not made')
 
 

@@ -256,9 +256,9 @@ TEST_F(FilesTest, WrongLensModelIsNamed) {
   ASSERT_EQ(Call(importer_ + " --force 1").ExitCode(), 0);
   ASSERT_EQ(Call(Global("g")).ExitCode(), 0);
   const Run run = Call(Mapper("m"));
-  EXPECT_THAT(run.out + run.err,
-              HasSubstr("Verdict: doubtful: camera 1 does not bend images as "
-                        "its lens model says"));
+  EXPECT_THAT(
+      run.out + run.err,
+      HasSubstr("Verdict: doubtful: the lens model of camera 1 does not fit"));
 }
 
 TEST_F(FilesTest, WorldOnAFullDisk) {

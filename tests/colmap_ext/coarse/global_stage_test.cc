@@ -297,7 +297,7 @@ TEST(RunGlobalStageTest, ReportsEveryStep) {
   }
   const std::string text = FormatGlobalReportText(result, 1.0);
   EXPECT_NE(text.find("60 images"), std::string::npos);
-  EXPECT_NE(text.find("pairs agree to"), std::string::npos);
+  EXPECT_NE(text.find("of the pairs agree"), std::string::npos);
   result.models[0].pair_agreement.least_image_share = 0.5;
   const std::vector<std::string> warnings = ListGlobalWarnings(scene, result);
   ASSERT_EQ(warnings.size(), 1);

@@ -239,7 +239,7 @@ TEST(VisionCheck, StabilizedVideoLeavesTheImuOut) {
     EXPECT_TRUE(estimate.priors.empty());
     EXPECT_TRUE(estimate.gravity_in_cam.empty());
     ASSERT_FALSE(estimate.summary.warnings.empty());
-    EXPECT_NE(estimate.summary.warnings.back().find("stabilised"),
+    EXPECT_NE(estimate.summary.warnings.back().find("stabilisation"),
               std::string::npos);
 
     // The same shaking without stabilisation.
