@@ -116,9 +116,10 @@ std::string FormatMapperSummaryText(const MapperStageSummary& summary) {
             "from the coarse poses\n";
   }
   if (summary.refine.min_num_shared_points > 1) {
-    text << "to save memory, bundle adjustments ignored that images share "
-            "points where they share fewer than "
-         << summary.refine.min_num_shared_points << "\n";
+    text << "to save memory, bundle adjustments treated images that share "
+            "fewer than "
+         << summary.refine.min_num_shared_points
+         << " points as if they shared none\n";
   }
   text << "seconds: plan " << summary.plan_seconds << ", parts "
        << summary.parts_seconds << ", merge " << summary.merge_seconds
