@@ -5,7 +5,6 @@
 #include <map>
 #include <set>
 
-#include "core/disjoint_sets.h"
 #include "core/prior_lengths.h"
 #include "core/so3.h"
 #include "global/coarse_pose_estimator.h"
@@ -24,23 +23,6 @@ std::string DescribeCameraImuRotation(
                 RadToDeg(camera_imu.rotation_rad.norm()),
                 RadToDeg(camera_imu.sigma_rad));
   return text;
-}
-
-// Whether whole motions connect all images, perhaps through others.
-bool ConnectsAll(const std::vector<RelativePosePrior>& priors,
-                 const std::vector<image_t>& images) {
-  std::map<image_t, int> numbers;
-  const auto number = [&numbers](image_t image_id) {
-    return numbers.emplace(image_id, numbers.size()).first->second;
-  };
-  DisjointSets sets(images.size() + 2 * priors.size());
-  for (const RelativePosePrior& prior : priors) {
-    if (!prior.HasMotion()) continue;
-    sets.Join(number(prior.image_id1), number(prior.image_id2));
-  }
-  return std::all_of(images.begin(), images.end(), [&](image_t image_id) {
-    return sets.Find(number(image_id)) == sets.Find(number(images[0]));
-  });
 }
 
 }  // namespace
@@ -199,7 +181,14 @@ bool CoarsePoseEstimator::IsSequence(const OdometryChain& chain) const {
 // Empty where sensors measure all motions, or without visual odometry.
 VisualOdometryEdges CoarsePoseEstimator::CompleteOdometry() const {
   if (!options_.visual_odometry.enabled) return VisualOdometryEdges();
-  if (ConnectsAll(AllPriors(), graph_.images)) return VisualOdometryEdges();
+  const image_t first = graph_.images.empty() ? 0 : graph_.images.front();
+  const bool is_complete = std::all_of(
+      graph_.images.begin(), graph_.images.end(), [&](image_t image_id) {
+        if (!chain_.IsConnected(first, image_id)) return false;
+        const ChainMotion motion = chain_.Motion(first, image_id);
+        return motion.has_rotation && motion.has_position;
+      });
+  if (is_complete) return VisualOdometryEdges();
   return AddVisualOdometry(options_.visual_odometry, options_.lengths, graph_,
                            correspondences_, KnownLengths(), priors_,
                            frame_priors_);

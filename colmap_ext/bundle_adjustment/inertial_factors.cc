@@ -279,11 +279,11 @@ InertialTerms AddInertialFactors(const PriorBundleAdjustmentOptions& options,
   if (factors.size() < kMinNumFactors) return {};
   SharedMotion shared;
   // Without lengths the model's shape would follow the rotation error.
-  const bool knows_rotation = std::any_of(
+  const bool has_lengths = std::any_of(
       factors.begin(), factors.end(),
       [](const Factor& factor) { return factor.motion1->by_wheels; });
-  double* turn = knows_rotation ? bundle->ExtrinsicRotation()
-                                : bundle->AddParameters({0.0, 0.0, 0.0});
+  double* turn = has_lengths ? bundle->ExtrinsicRotation()
+                             : bundle->AddParameters({0.0, 0.0, 0.0});
   const double noise_at_start = FitSharedMotion(factors, turn, &shared);
   const double noise = options.accelerometer_noise > 0.0
                            ? options.accelerometer_noise
@@ -309,7 +309,7 @@ InertialTerms AddInertialFactors(const PriorBundleAdjustmentOptions& options,
     bundle->AddVelocityTerm(factor.Cost(sigma_factor * noise), factor.images,
                             {gravity, bias, unit, turn});
   }
-  if (!knows_rotation) bundle->CeresProblem()->SetParameterBlockConstant(turn);
+  if (!has_lengths) bundle->CeresProblem()->SetParameterBlockConstant(turn);
   return {noise, unit};
 }
 

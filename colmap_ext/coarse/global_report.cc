@@ -329,7 +329,7 @@ std::vector<std::string> ListGlobalWarnings(const SceneData& scene,
          << 100.0 * model.pair_agreement.share
          << " % of the verified pairs agree with its poses, "
          << 100.0 * model.pair_agreement.least_image_share
-         << " % at the worst image; more pairs are false than true, or the "
+         << " % at the worst image; false pairs outweigh true ones, or the "
             "overlap is small: see the report (adasfm_reporter), add sensors "
             "or match more pairs";
     warnings.push_back(text.str());

@@ -23,6 +23,7 @@ class Hash : public Fnv1aHash {
   }
 };
 
+// The priors within frames follow from the rigs (ComputeFramePriors).
 void AddRigs(const CameraRigs& rigs, Hash* hash) {
   for (const auto& [camera_id, camera] : rigs.cameras) {
     hash->Add(camera_id);
@@ -40,15 +41,13 @@ void AddRigs(const CameraRigs& rigs, Hash* hash) {
 }
 
 void AddMotions(const SceneData& data, Hash* hash) {
-  for (const auto* priors : {&data.priors, &data.frame_priors}) {
-    for (const RelativePosePrior& prior : *priors) {
-      hash->Add(prior.image_id1);
-      hash->Add(prior.image_id2);
-      hash->Add(prior.dt_ns);
-      hash->Add(prior.cam2_from_cam1);
-      hash->AddMatrix(prior.covariance);
-      hash->Add(prior.flags);
-    }
+  for (const RelativePosePrior& prior : data.priors) {
+    hash->Add(prior.image_id1);
+    hash->Add(prior.image_id2);
+    hash->Add(prior.dt_ns);
+    hash->Add(prior.cam2_from_cam1);
+    hash->AddMatrix(prior.covariance);
+    hash->Add(prior.flags);
   }
   for (const InertialMotion& motion : data.inertial_motions) {
     hash->Add(motion.image_id1);

@@ -110,7 +110,7 @@ std::string FormatMapperSummaryText(const MapperStageSummary& summary) {
        << summary.refine.num_images_reset
        << " contradicted the priors and were reset to their coarse poses, "
        << summary.refine.num_images_deregistered
-       << " with too few points and no priors were deregistered\n";
+       << " whose pose nothing determines were deregistered\n";
   if (summary.started_from_coarse_poses) {
     text << "the merged parts violated priors: the model was refined "
             "from the coarse poses\n";

@@ -116,8 +116,8 @@ void JudgeMatchedImages(const std::vector<AssessedModel>& models,
                kMinShareOfMatchedHeld, kGoodShareOfMatchedHeld,
                std::to_string(num_matched - num_held) + " of " +
                    std::to_string(num_matched) +
-                   " images with verified matches see too few points of "
-                   "the model: their matches contradict it");
+                   " images with verified matches are lost or see too few "
+                   "points");
 }
 
 void JudgeImages(const Verdict& verdict, Judge* judge) {
