@@ -212,6 +212,8 @@ STEPS = {
                                         '--data_path', args.data_path,
                                         '--features_path', os.path.join(
                                             args.output_path, 'features')),
+    'pairs': lambda args: run_script(args, 'pairs', 'pair_tables.py',
+                                     '--data_path', args.data_path),
     # After readme and two_view, since it reads their figures.
     'paper': lambda args: run_script(
         args, 'paper', 'paper_figures.py', '--data_path', args.data_path,

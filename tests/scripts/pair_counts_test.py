@@ -44,20 +44,21 @@ class PairCountsTest(unittest.TestCase):
     self._folder.cleanup()
 
   def write(self, name, pairs):
-    """pairs: {(name, name): (qvec, tvec, matches)}; returns the path."""
+    """pairs: {(name, name): (qvec, tvec, matches[, E])}; returns the path."""
     path = os.path.join(self.folder, name)
     database = sqlite3.connect(path)
     database.execute('CREATE TABLE images (image_id INTEGER, name TEXT)')
     database.execute('CREATE TABLE two_view_geometries (pair_id INTEGER, '
-                     'rows INTEGER, data BLOB, qvec BLOB, tvec BLOB)')
+                     'rows INTEGER, data BLOB, E BLOB, qvec BLOB, tvec BLOB)')
     ids = {image: i + 1 for i, image in enumerate(CENTERS)}
     database.executemany('INSERT INTO images VALUES (?, ?)',
                          [(i, image) for image, i in ids.items()])
-    for (first, second), (qvec, tvec, matches) in pairs.items():
+    for (first, second), (qvec, tvec, matches, *essential) in pairs.items():
       database.execute(
-          'INSERT INTO two_view_geometries VALUES (?, ?, ?, ?, ?)',
+          'INSERT INTO two_view_geometries VALUES (?, ?, ?, ?, ?, ?)',
           (2147483647 * ids[first] + ids[second], len(matches),
            np.array(matches, dtype=np.uint32).tobytes(),
+           struct.pack('<9d', *essential[0].flat) if essential else None,
            qvec and struct.pack('<4d', *qvec),
            tvec and struct.pack('<3d', *tvec)))
     database.commit()
@@ -76,8 +77,8 @@ class PairCountsTest(unittest.TestCase):
              ('b', 'far'): (IDENTITY, direction(0), matches)}
     kept = {key: pairs[key] for key in [('a', 'b'), ('b', 'far')]}
     self.assertEqual(self.count(pairs, kept), {
-        'true': 1, 'true_lost': 0, 'right_lost': 0, 'false': 2,
-        'false_kept': 1})
+        'true': 1, 'true_lost': 0, 'right_lost': 0, 'wrong': 0, 'regained': 0,
+        'false': 2, 'false_kept': 1})
 
   def test_only_lost_pairs_of_right_pose_count_as_right(self):
     matches = [(0, 0)]
@@ -88,6 +89,16 @@ class PairCountsTest(unittest.TestCase):
     counts = self.count(pairs, {})
     self.assertEqual((counts['true_lost'], counts['right_lost']), (3, 1))
 
+  def test_pairs_of_wrong_pose_are_regained_by_their_matches(self):
+    matches = [(0, 0)]
+    pairs = {('a', 'b'): (IDENTITY, direction(0), matches),
+             ('a', 'c'): (turned(4.0), direction(0), matches),
+             ('b', 'c'): (IDENTITY, direction(40), matches)}
+    kept = {key: pairs[key] for key in [('a', 'b'), ('a', 'c')]}
+    counts = self.count(pairs, kept)
+    self.assertEqual((counts['wrong'], counts['regained'],
+                      counts['true_lost'], counts['right_lost']), (2, 1, 1, 0))
+
   def test_a_pair_without_a_pose_is_lost_and_not_of_right_pose(self):
     for pose in ((None, None), (IDENTITY, (0.0, 0.0, 0.0))):
       with self.subTest(pose=pose):
@@ -96,6 +107,19 @@ class PairCountsTest(unittest.TestCase):
             os.remove(os.path.join(self.folder, name))
         counts = self.count({('a', 'b'): (*pose, [(0, 0)])}, {})
         self.assertEqual((counts['true_lost'], counts['right_lost']), (1, 0))
+
+  def test_the_best_pose_of_an_essential_matrix_counts(self):
+    matches = [(0, 0)]
+    pairs = {}
+    for names, angle in ((('a', 'b'), 0.5), (('a', 'c'), 4.0)):
+      x, y, z = direction(5)
+      cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+      essential = -3 * cross @ pair_counts.rotation_matrix(
+          np.array(turned(angle)))
+      pairs[names] = (None, None, matches, essential)
+    counts = self.count(pairs, {})
+    self.assertEqual((counts['true'], counts['right_lost'], counts['wrong']),
+                     (2, 1, 1))
 
   def test_landmarks_tell_false_pairs_nearby(self):
     with open(os.path.join(self.folder, 'landmarks.txt'), 'w') as file:
@@ -106,7 +130,8 @@ class PairCountsTest(unittest.TestCase):
                         {('a', 'c'): (IDENTITY, direction(0), [(1, 1)])})
     # One of three matches of a and c is true; after refinement only it remains.
     self.assertEqual(counts, {'true': 1, 'true_lost': 1, 'right_lost': 1,
-                              'false': 1, 'false_kept': 0})
+                              'wrong': 0, 'regained': 0, 'false': 1,
+                              'false_kept': 0})
 
 
 if __name__ == '__main__':

@@ -5,9 +5,11 @@ These are true pairs that it rejects and false pairs that it keeps. A pair is
 true if more than half of its verified matches see one landmark; in a world
 without landmarks, if its images are at most FAR_M apart. The pose of a true
 pair is right if its rotation errs by at most MAX_ROTATION_DEG and, from
-MIN_BASELINE_M on, its direction by at most MAX_DIRECTION_DEG. A true pair is
-lost if the cleaned database has no matches of it, true or false. A false pair
-is kept if it has matches there and is still false by the same rule.
+MIN_BASELINE_M on, its direction by at most MAX_DIRECTION_DEG. Where only an
+essential matrix is stored, the best of its four poses counts. A true pair is
+lost if the cleaned database has no matches of it, true or false, and regained
+if it has some although its verified pose was not right. A false pair is kept if
+it has matches there and is still false by the same rule.
 """
 
 import os
@@ -52,22 +54,39 @@ def read_landmarks(path):
   return {row[0]: np.array(row[1:], dtype=int) for row in rows if row}
 
 
+def poses_of_essential_matrix(essential):
+  """[(R, t)] of the four poses, Hartley and Zisserman, result 9.19."""
+  u, _, v = np.linalg.svd(essential)
+  turn = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+  rotations = [u @ w @ v for w in (turn, turn.T)]
+  return [(rotation * np.sign(np.linalg.det(rotation)), sign * u[:, 2])
+          for rotation in rotations for sign in (1.0, -1.0)]
+
+
+def stored_poses(essential, qvec, tvec):
+  """The possible [(R, t)] of a pair by its blobs; [] without any."""
+  if qvec and tvec and any(struct.unpack('<3d', tvec)):
+    return [(rotation_matrix(np.array(struct.unpack('<4d', qvec))),
+             np.array(struct.unpack('<3d', tvec)))]
+  if essential and any(struct.unpack('<9d', essential)):
+    return poses_of_essential_matrix(
+        np.array(struct.unpack('<9d', essential)).reshape(3, 3))
+  return []
+
+
 def read_pairs(database_path):
-  """{(name, name): (matches, qvec or None, tvec or None)} of verified pairs."""
+  """{(name, name): (matches, [(R, t)])} of verified pairs."""
   database = sqlite3.connect('file:%s?mode=ro' % database_path, uri=True)
   names = dict(database.execute('SELECT image_id, name FROM images'))
   pairs = {}
-  for pair_id, data, qvec, tvec in database.execute(
-      'SELECT pair_id, data, qvec, tvec FROM two_view_geometries '
+  for pair_id, data, *pose in database.execute(
+      'SELECT pair_id, data, E, qvec, tvec FROM two_view_geometries '
       'WHERE rows > 0'):
     ids = pair_id // MAX_PAIR_IMAGES, pair_id % MAX_PAIR_IMAGES
     if not all(image_id in names for image_id in ids):
       continue
     matches = np.frombuffer(data, dtype=np.uint32).reshape(-1, 2)
-    has_pose = bool(qvec) and bool(tvec) and any(struct.unpack('<3d', tvec))
-    pairs[names[ids[0]], names[ids[1]]] = (
-        matches, np.array(struct.unpack('<4d', qvec)) if has_pose else None,
-        np.array(struct.unpack('<3d', tvec)) if has_pose else None)
+    pairs[names[ids[0]], names[ids[1]]] = matches, stored_poses(*pose)
   database.close()
   return pairs
 
@@ -91,14 +110,14 @@ def angle_deg(cosine):
   return np.degrees(np.arccos(np.clip(cosine, -1.0, 1.0)))
 
 
-def is_pose_right(names, qvec, tvec, poses):
+def is_pose_right(names, pose, poses):
   rotation, translation = relative_pose(names, poses)
-  difference = rotation_matrix(qvec) @ rotation.T
+  difference = pose[0] @ rotation.T
   if angle_deg((np.trace(difference) - 1.0) / 2.0) > MAX_ROTATION_DEG:
     return False
   baseline = np.linalg.norm(translation)
   return baseline < MIN_BASELINE_M or angle_deg(
-      tvec @ translation / (np.linalg.norm(tvec) * baseline)
+      pose[1] @ translation / (np.linalg.norm(pose[1]) * baseline)
   ) <= MAX_DIRECTION_DEG
 
 
@@ -109,20 +128,21 @@ def count_pairs(verified_path, cleaned_path, folder):
   landmarks = read_landmarks(os.path.join(folder, 'landmarks.txt'))
   verified = read_pairs(verified_path)
   cleaned = read_pairs(cleaned_path)
-  counts = dict.fromkeys(
-      ('true', 'true_lost', 'right_lost', 'false', 'false_kept'), 0)
-  for names, (matches, qvec, tvec) in verified.items():
+  counts = dict.fromkeys(('true', 'true_lost', 'right_lost', 'wrong', 'regained',
+                          'false', 'false_kept'), 0)
+  for names, (matches, possible) in verified.items():
     if not all(name in poses for name in names):
       continue
+    is_kept = names in cleaned
     if not is_true(names, matches, poses, landmarks):
       counts['false'] += 1
-      if names in cleaned and not is_true(names, cleaned[names][0], poses,
-                                          landmarks):
-        counts['false_kept'] += 1
+      counts['false_kept'] += int(is_kept and not is_true(
+          names, cleaned[names][0], poses, landmarks))
       continue
+    is_right = any(is_pose_right(names, pose, poses) for pose in possible)
     counts['true'] += 1
-    if names not in cleaned:
-      counts['true_lost'] += 1
-      if qvec is not None and is_pose_right(names, qvec, tvec, poses):
-        counts['right_lost'] += 1
+    counts['true_lost'] += int(not is_kept)
+    counts['right_lost'] += int(is_right and not is_kept)
+    counts['wrong'] += int(not is_right)
+    counts['regained'] += int(is_kept and not is_right)
   return counts
