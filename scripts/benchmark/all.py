@@ -214,6 +214,8 @@ STEPS = {
                                             args.output_path, 'features')),
     'pairs': lambda args: run_script(args, 'pairs', 'pair_tables.py',
                                      '--data_path', args.data_path),
+    'candidates': lambda args: run_script(args, 'candidates',
+                                          'candidate_tables.py'),
     # After readme and two_view, since it reads their figures.
     'paper': lambda args: run_script(
         args, 'paper', 'paper_figures.py', '--data_path', args.data_path,
