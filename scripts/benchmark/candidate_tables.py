@@ -11,12 +11,13 @@ import argparse
 import functools
 import os
 import shutil
-import statistics
 import sys
 
-from benchmarking.figures import add_arguments, measure, run_table
-from benchmarking.methods import SMALL_PARTS, log_options
+from benchmarking.figures import (add_arguments, measure, run_table,
+                                  world_folder)
+from benchmarking.methods import SMALL_PARTS, make_coarse_model
 from benchmarking.process import Failed, run
+from global_without_sensors import summarise
 
 NUM_IMAGES = 300
 SEEDS = range(1, 6)
@@ -38,56 +39,34 @@ VARIANTS = {'with': [], 'without': ['--AdaSfmMapper.use_global_candidate', '0']}
 
 def run_world(name, seed, args):
   synthesizer, has_logs = WORLDS[name]
-  key = list(WORLDS).index(name)
-  folder = os.path.join(args.output_path, '%d-%d' % (key, seed))
+  folder = world_folder(name, seed, args)
   shutil.rmtree(folder, ignore_errors=True)
   os.makedirs(folder)
   log_path = os.path.join(folder, 'run.log')
-  database = os.path.join(folder, 'database.db')
-  coarse = os.path.join(folder, 'global')
   record = {'world': name, 'seed': seed}
   try:
     run([args.colmap, 'adasfm_synthesizer', '--output_path', folder,
          '--num_images', str(NUM_IMAGES), '--seed', str(seed)] + synthesizer,
         log_path)
-    if has_logs:
-      run([args.colmap, 'adasfm_prior_importer', '--database_path', database] +
-          log_options(folder), log_path)
-    run([args.colmap, 'adasfm_global', '--database_path', database,
-         '--output_path', coarse], log_path)
-  except Failed as error:
-    record['error'] = str(error)
-    return record
-  for variant, options in VARIANTS.items():
-    output = os.path.join(folder, variant)
-    try:
-      run([args.colmap, 'adasfm_mapper', '--database_path', database,
-           '--input_path', os.path.join(coarse, '0'), '--output_path', output] +
+    make_coarse_model(folder, folder, args, has_logs, {})
+    for variant, options in VARIANTS.items():
+      output = os.path.join(folder, variant)
+      run([args.colmap, 'adasfm_mapper', '--database_path',
+           os.path.join(folder, 'database.db'), '--input_path',
+           os.path.join(folder, 'global', '0'), '--output_path', output] +
           SMALL_PARTS + options, log_path)
       record[variant] = measure(output, folder, args, log_path)
-    except Failed as error:
-      record[variant] = {'error': str(error)}
+  except Failed as error:
+    record['error'] = str(error)
   if not args.keep:
     shutil.rmtree(folder)
   return record
 
 
-def cells(outcomes):
-  """Fewest images, then median and largest error."""
-  models = [o for o in outcomes if o and 'rmse_m' in o]
-  if not models:
-    return ['-', '-']
-  errors = [m['rmse_m'] for m in models]
-  images = '%d' % min(m['images'] for m in models)
-  if len(models) < len(outcomes):
-    images += ', %d failed' % (len(outcomes) - len(models))
-  return [images, '%.3f, %.3f' % (statistics.median(errors), max(errors))]
-
-
 def count_better(records):
   """Seeds in which a variant errs by more than 2 % less than the other."""
-  pairs = [tuple(r[v]['rmse_m'] for v in VARIANTS) for r in records
-           if all('rmse_m' in (r.get(v) or {}) for v in VARIANTS)]
+  pairs = [tuple(r[variant]['rmse_m'] for variant in VARIANTS) for r in records
+           if all(r.get(variant) for variant in VARIANTS)]
   return '%d, %d' % (sum(a < 0.98 * b for a, b in pairs),
                      sum(b < 0.98 * a for a, b in pairs))
 
@@ -95,24 +74,28 @@ def count_better(records):
 def report(records, args):
   del args
   lines = ['Written by `scripts/benchmark/candidate_tables.py`: worlds of %d '
-           'images, seeds %d to %d, `%s`. Fewest images of a model; median and '
-           'largest RMSE of camera centres after a similarity; seeds in which '
-           'one errs by over 2 %% less than the other.' % (
+           'images, seeds %d to %d, `%s`. Fewest images of a model; RMSE of '
+           'camera centres after a similarity; seeds in which one errs by over '
+           '2 %% less than the other.' % (
                NUM_IMAGES, SEEDS[0], SEEDS[-1], ' '.join(SMALL_PARTS)), '',
-           '| world | candidates: images | m | none: images | m | better with, '
-           'without |', '|---|---:|---|---:|---|---|']
+           '| world | candidates: images | median m | worst m | none: images | '
+           'median m | worst m | better with, without |',
+           '|---' + '|---:' * 6 + '|---|']
   for name in WORLDS:
     mine = [r for r in records if r['world'] == name]
     row = [name]
     for variant in VARIANTS:
-      row += cells([r.get(variant) for r in mine])
+      row += summarise(mine, variant)
     lines.append('| %s |' % ' | '.join(row + [count_better(mine)]))
+  lines += ['\n%(world)s, seed %(seed)d: %(error)s' % r for r in records
+            if 'error' in r]
   return '\n'.join(lines) + '\n'
 
 
 def main():
   parser = argparse.ArgumentParser(description=__doc__.split('\n')[0])
   add_arguments(parser, __file__, 'candidates', 'adasfm-candidates')
+  parser.set_defaults(timeout=None)
   args = parser.parse_args()
   run_table({'%s %d' % (name, seed): (
       [NUM_IMAGES, *WORLDS[name], SMALL_PARTS],

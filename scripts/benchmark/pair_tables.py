@@ -1,8 +1,8 @@
 #!/usr/bin/python3
 # SPDX-License-Identifier: BSD-3-Clause
-"""Pairs that adasfm_global loses, regains or wrongly keeps, world by world.
+"""Pairs that adasfm_global loses or wrongly keeps, world by world.
 
-Imports the logs of each world of the benchmark, runs `adasfm_global`, and counts
+Imports the logs of worlds of the benchmark, runs `adasfm_global`, and counts
 against the truth (benchmarking/pair_counts.py) what it left of the verified
 pairs. Writes docs/results/pairs.md. Needs numpy.
 """
@@ -21,8 +21,8 @@ from benchmarking.process import Failed
 from benchmarking.sets import (KINDS, QUICK, REAL_SETS, is_world,
                                make_database)
 
-COLUMNS = ('true', 'true_lost', 'right_lost', 'wrong', 'regained', 'false',
-           'false_kept')
+COLUMNS = ('true', 'true_lost', 'right_lost', 'wrong', 'wrong_kept',
+           'false', 'false_kept')
 # Worlds, as nobody knows which pairs of photos are false. QUICK has not all
 # kinds.
 SETS = [name for name in REAL_SETS if name.startswith('world-')] + QUICK
@@ -56,11 +56,11 @@ def report(records, args):
            'known, its images are at most %g m apart. Lost: without matches '
            'after `adasfm_global`. Right pose: the verified rotation errs by at '
            'most %g deg, the direction by at most %g deg (the best of the '
-           "essential matrix's four poses counts). Regained: pairs of "
-           'wrong pose that have matches afterwards. Kept: false before and '
-           'after.' % (FAR_M, MAX_ROTATION_DEG, MAX_DIRECTION_DEG), '',
+           "essential matrix's four poses counts). Of wrong pose, kept: with "
+           'matches afterwards. False, kept: false before and after.' % (
+               FAR_M, MAX_ROTATION_DEG, MAX_DIRECTION_DEG), '',
            '| set | true pairs | lost | lost, of right pose | of wrong pose | '
-           'regained | false pairs | kept |', '|---' + '|---:' * 7 + '|']
+           'kept | false pairs | kept |', '|---' + '|---:' * 7 + '|']
   for record in records:
     cells = [record['set']]
     cells += ([str(record['pairs'][key]) for key in COLUMNS]
@@ -69,28 +69,16 @@ def report(records, args):
   return '\n'.join(lines) + '\n'
 
 
-def parse_arguments():
+def main():
   parser = argparse.ArgumentParser(description=__doc__.split('\n')[0])
   add_arguments(parser, __file__, 'pairs', 'adasfm-pairs')
-  parser.set_defaults(timeout=None, seed=1, features_path='')
-  parser.add_argument('sets', nargs='*', help='any of: %s; default: all that '
-                      'are there' % ', '.join(SETS))
+  parser.set_defaults(timeout=None, seed=1)
   parser.add_argument('--data_path', default='../shared/data',
                       help='folder of the worlds of another generator')
   args = parser.parse_args()
-  there = [n for n in SETS if is_world(n) or
-           os.path.isdir(os.path.join(args.data_path, n))]
-  args.sets = args.sets or there
-  for name in args.sets:
-    if name not in there:
-      parser.error('no such set: ' + name)
-  return args
-
-
-def main():
-  args = parse_arguments()
   run_table({name: (None, functools.partial(run_set, name, args))
-             for name in args.sets}, report, args)
+             for name in SETS if is_world(name) or
+             os.path.isdir(os.path.join(args.data_path, name))}, report, args)
 
 
 if __name__ == '__main__':

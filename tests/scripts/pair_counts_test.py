@@ -77,7 +77,7 @@ class PairCountsTest(unittest.TestCase):
              ('b', 'far'): (IDENTITY, direction(0), matches)}
     kept = {key: pairs[key] for key in [('a', 'b'), ('b', 'far')]}
     self.assertEqual(self.count(pairs, kept), {
-        'true': 1, 'true_lost': 0, 'right_lost': 0, 'wrong': 0, 'regained': 0,
+        'true': 1, 'true_lost': 0, 'right_lost': 0, 'wrong': 0, 'wrong_kept': 0,
         'false': 2, 'false_kept': 1})
 
   def test_only_lost_pairs_of_right_pose_count_as_right(self):
@@ -89,14 +89,14 @@ class PairCountsTest(unittest.TestCase):
     counts = self.count(pairs, {})
     self.assertEqual((counts['true_lost'], counts['right_lost']), (3, 1))
 
-  def test_pairs_of_wrong_pose_are_regained_by_their_matches(self):
+  def test_pairs_of_wrong_pose_count_as_kept_with_matches(self):
     matches = [(0, 0)]
     pairs = {('a', 'b'): (IDENTITY, direction(0), matches),
              ('a', 'c'): (turned(4.0), direction(0), matches),
              ('b', 'c'): (IDENTITY, direction(40), matches)}
     kept = {key: pairs[key] for key in [('a', 'b'), ('a', 'c')]}
     counts = self.count(pairs, kept)
-    self.assertEqual((counts['wrong'], counts['regained'],
+    self.assertEqual((counts['wrong'], counts['wrong_kept'],
                       counts['true_lost'], counts['right_lost']), (2, 1, 1, 0))
 
   def test_a_pair_without_a_pose_is_lost_and_not_of_right_pose(self):
@@ -130,7 +130,7 @@ class PairCountsTest(unittest.TestCase):
                         {('a', 'c'): (IDENTITY, direction(0), [(1, 1)])})
     # One of three matches of a and c is true; after refinement only it remains.
     self.assertEqual(counts, {'true': 1, 'true_lost': 1, 'right_lost': 1,
-                              'wrong': 0, 'regained': 0, 'false': 1,
+                              'wrong': 0, 'wrong_kept': 0, 'false': 1,
                               'false_kept': 0})
 
 

@@ -7,9 +7,8 @@ without landmarks, if its images are at most FAR_M apart. The pose of a true
 pair is right if its rotation errs by at most MAX_ROTATION_DEG and, from
 MIN_BASELINE_M on, its direction by at most MAX_DIRECTION_DEG. Where only an
 essential matrix is stored, the best of its four poses counts. A true pair is
-lost if the cleaned database has no matches of it, true or false, and regained
-if it has some although its verified pose was not right. A false pair is kept if
-it has matches there and is still false by the same rule.
+lost if the cleaned database has no matches of it, true or false. A false pair
+is kept if it has matches there and is still false by the same rule.
 """
 
 import os
@@ -128,21 +127,21 @@ def count_pairs(verified_path, cleaned_path, folder):
   landmarks = read_landmarks(os.path.join(folder, 'landmarks.txt'))
   verified = read_pairs(verified_path)
   cleaned = read_pairs(cleaned_path)
-  counts = dict.fromkeys(('true', 'true_lost', 'right_lost', 'wrong', 'regained',
-                          'false', 'false_kept'), 0)
+  counts = dict.fromkeys(('true', 'true_lost', 'right_lost', 'wrong',
+                          'wrong_kept', 'false', 'false_kept'), 0)
   for names, (matches, possible) in verified.items():
     if not all(name in poses for name in names):
       continue
     is_kept = names in cleaned
     if not is_true(names, matches, poses, landmarks):
       counts['false'] += 1
-      counts['false_kept'] += int(is_kept and not is_true(
-          names, cleaned[names][0], poses, landmarks))
+      counts['false_kept'] += is_kept and not is_true(
+          names, cleaned[names][0], poses, landmarks)
       continue
     is_right = any(is_pose_right(names, pose, poses) for pose in possible)
     counts['true'] += 1
-    counts['true_lost'] += int(not is_kept)
-    counts['right_lost'] += int(is_right and not is_kept)
-    counts['wrong'] += int(not is_right)
-    counts['regained'] += int(is_kept and not is_right)
+    counts['true_lost'] += not is_kept
+    counts['right_lost'] += is_right and not is_kept
+    counts['wrong'] += not is_right
+    counts['wrong_kept'] += is_kept and not is_right
   return counts
