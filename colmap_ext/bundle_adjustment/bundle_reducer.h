@@ -8,10 +8,10 @@
 #include <utility>
 #include <vector>
 
-#include "colmap_ext/bundle_adjustment/block_matrix.h"
 #include "colmap_ext/bundle_adjustment/bundle_problem.h"
 #include "colmap_ext/bundle_adjustment/minimize_point.h"
 #include "colmap_ext/bundle_adjustment/reduced_system.h"
+#include "core/sparse/block_matrix.h"
 
 namespace adasfm {
 

@@ -5,8 +5,8 @@
 #include <utility>
 #include <vector>
 
-#include "colmap_ext/bundle_adjustment/block_ordering.h"
 #include "core/release_memory.h"
+#include "core/sparse/block_ordering.h"
 
 namespace adasfm {
 namespace {

@@ -4,8 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "colmap_ext/bundle_adjustment/ordered_cholesky.h"
 #include "core/random.h"
+#include "core/sparse/ordered_cholesky.h"
 
 namespace adasfm {
 namespace {

@@ -7,8 +7,8 @@
 #include <optional>
 
 #include "colmap_ext/bundle_adjustment/bundle_reducer.h"
-#include "colmap_ext/bundle_adjustment/ordered_cholesky.h"
 #include "core/release_memory.h"
+#include "core/sparse/ordered_cholesky.h"
 
 namespace adasfm {
 namespace {

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "global/translation_averaging/refine_positions.h"
 
-#include <Eigen/CholmodSupport>
-#include <Eigen/SparseCore>
 #include <algorithm>
 #include <cmath>
 
 #include "core/median.h"
+#include "core/sparse/block_matrix.h"
+#include "core/sparse/ordered_cholesky.h"
 
 namespace adasfm {
 namespace {
@@ -46,70 +46,61 @@ EdgeTerm ComputeTerm(const PositionEdge& edge,
   return term;
 }
 
-// Supernodal: for 30,000 images the factor has tens of millions of entries.
-// Prints nothing: the caller reports failures.
-class QuietCholesky
-    : public Eigen::CholmodSupernodalLLT<Eigen::SparseMatrix<double>> {
- public:
-  QuietCholesky() { cholmod().print = 0; }
-};
-
+// The normal equations of all centres but the first.
 class RefinementSystem {
  public:
-  explicit RefinementSystem(int num_nodes) : size_(3 * (num_nodes - 1)) {}
+  RefinementSystem(const std::vector<PositionEdge>& edges, int num_nodes) {
+    for (int i = 1; i < num_nodes; ++i) matrix_.AddBlock(3);
+    for (const PositionEdge& edge : edges) {
+      if (edge.i > 0 && edge.j > 0) matrix_.AddPair(edge.i - 1, edge.j - 1);
+    }
+    block_of_ = matrix_.Reorder();
+    matrix_.Allocate();
+    factorization_.analyzePattern(matrix_.Matrix());
+  }
 
-  void Clear(size_t num_edges) {
-    triplets_.clear();
-    triplets_.reserve(27 * num_edges + size_);
-    right_side_ = Eigen::VectorXd::Zero(size_);
+  void Clear() {
+    matrix_.Matrix().coeffs().setZero();
+    right_side_.setZero(matrix_.NumColumns());
   }
 
   void Add(const PositionEdge& edge, const EdgeTerm& term) {
-    const int i = edge.i - 1;
-    const int j = edge.j - 1;
     const Eigen::Vector3d flow = term.information * term.target;
-    if (i >= 0) {
-      AddBlock(i, i, term.information);
-      right_side_.segment<3>(3 * i) -= flow;
-    }
-    if (j >= 0) {
-      AddBlock(j, j, term.information);
-      right_side_.segment<3>(3 * j) += flow;
-    }
-    if (i >= 0 && j >= 0) {
-      AddBlock(std::max(i, j), std::min(i, j), -term.information);
+    if (edge.i > 0) AddNode(edge.i, term.information, -flow);
+    if (edge.j > 0) AddNode(edge.j, term.information, flow);
+    if (edge.i > 0 && edge.j > 0) {
+      const auto [col, row] =
+          std::minmax(block_of_[edge.i - 1], block_of_[edge.j - 1]);
+      matrix_.Add(row, col, -term.information);
     }
   }
 
-  bool Solve(Eigen::VectorXd* solution) {
-    Eigen::SparseMatrix<double> matrix(size_, size_);
-    matrix.setFromTriplets(triplets_.begin(), triplets_.end());
-    if (!is_analyzed_) {
-      factorization_.analyzePattern(matrix);
-      is_analyzed_ = true;
-    }
-    factorization_.factorize(matrix);
+  // Sets all centres; false where the equations are singular.
+  bool Solve(Vectors* centers) {
+    factorization_.factorize(matrix_.Matrix());
     if (factorization_.info() != Eigen::Success) return false;
-    *solution = factorization_.solve(right_side_);
-    return solution->allFinite();
+    const Eigen::VectorXd solution = factorization_.solve(right_side_);
+    if (!solution.allFinite()) return false;
+    centers->resize(block_of_.size() + 1, 3);
+    centers->row(0).setZero();
+    for (size_t k = 0; k < block_of_.size(); ++k) {
+      centers->row(k + 1) = solution.segment<3>(3 * block_of_[k]).transpose();
+    }
+    return true;
   }
 
  private:
-  void AddBlock(int row, int col, const Eigen::Matrix3d& block) {
-    for (int r = 0; r < 3; ++r) {
-      for (int c = 0; c < 3; ++c) {
-        // The lower triangle only.
-        if (row == col && c > r) continue;
-        triplets_.emplace_back(3 * row + r, 3 * col + c, block(r, c));
-      }
-    }
+  void AddNode(int node, const Eigen::Matrix3d& information,
+               const Eigen::Vector3d& flow) {
+    const int block = block_of_[node - 1];
+    matrix_.Add(block, block, information);
+    right_side_.segment<3>(3 * block) += flow;
   }
 
-  int size_;
-  std::vector<Eigen::Triplet<double>> triplets_;
+  BlockMatrix matrix_;
+  std::vector<int> block_of_;  // Of node k + 1.
   Eigen::VectorXd right_side_;
-  QuietCholesky factorization_;
-  bool is_analyzed_ = false;
+  OrderedCholesky factorization_;
 };
 
 }  // namespace
@@ -126,21 +117,16 @@ bool RefinePositions(const std::vector<PositionEdge>& edges, Vectors* centers,
   if (!(unit > 0.0)) return false;
 
   constexpr int kMaxNumIterations = 100;
-  RefinementSystem system(num_nodes);
+  RefinementSystem system(edges, num_nodes);
   for (int k = 0; k < kMaxNumIterations; ++k) {
-    system.Clear(edges.size());
+    system.Clear();
     for (const PositionEdge& edge : edges) {
       const Eigen::Vector3d difference =
           (centers->row(edge.j) - centers->row(edge.i)).transpose();
       system.Add(edge, ComputeTerm(edge, difference, 0.02 * unit));
     }
-    Eigen::VectorXd solution;
-    if (!system.Solve(&solution)) return false;
-    Vectors next(num_nodes, 3);
-    next.row(0).setZero();
-    for (int i = 1; i < num_nodes; ++i) {
-      next.row(i) = solution.segment<3>(3 * (i - 1)).transpose();
-    }
+    Vectors next;
+    if (!system.Solve(&next)) return false;
     const Eigen::RowVector3d origin = centers->row(0);
     result->last_change =
         (next - (centers->rowwise() - origin)).rowwise().norm().mean() / unit;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "global/view_graph/laplacian_solver.h"
 
+#include <algorithm>
 #include <stdexcept>
 
 namespace adasfm {
@@ -8,11 +9,17 @@ namespace adasfm {
 LaplacianSolver::LaplacianSolver(int num_nodes,
                                  std::vector<std::pair<int, int>> edges)
     : num_nodes_(num_nodes), edges_(std::move(edges)) {
+  for (int node = 1; node < num_nodes; ++node) laplacian_.AddBlock(1);
   for (const auto& [i, j] : edges_) {
     if (i < 0 || j < 0 || i >= num_nodes || j >= num_nodes || i == j) {
       throw std::invalid_argument("LaplacianSolver: edge out of range");
     }
+    if (i > 0 && j > 0) laplacian_.AddPair(i - 1, j - 1);
   }
+  if (num_nodes < 2) return;
+  row_of_ = laplacian_.Reorder();
+  laplacian_.Allocate();
+  factorization_.analyzePattern(laplacian_.Matrix());
 }
 
 bool LaplacianSolver::Solve(const std::vector<double>& weights,
@@ -22,8 +29,9 @@ bool LaplacianSolver::Solve(const std::vector<double>& weights,
   double max_weight = 0.0;
   for (size_t e = 0; e < edges_.size(); ++e) {
     const auto [i, j] = edges_[e];
-    if (i > 0) right_side.row(i - 1) -= weights[e] * differences.row(e);
-    if (j > 0) right_side.row(j - 1) += weights[e] * differences.row(e);
+    const Eigen::RowVector3d flow = weights[e] * differences.row(e);
+    if (i > 0) right_side.row(RowOf(i)) -= flow;
+    if (j > 0) right_side.row(RowOf(j)) += flow;
     max_weight = std::max(max_weight, weights[e]);
   }
   Vectors solution;
@@ -33,11 +41,17 @@ bool LaplacianSolver::Solve(const std::vector<double>& weights,
     if (SolveWithRidge(weights, right_side, ridge * max_weight, &solution)) {
       nodes->resize(num_nodes_, 3);
       nodes->row(0).setZero();
-      nodes->bottomRows(num_nodes_ - 1) = solution;
+      for (int node = 1; node < num_nodes_; ++node) {
+        nodes->row(node) = solution.row(RowOf(node));
+      }
       return true;
     }
   }
   return false;
+}
+
+void LaplacianSolver::Add(int row, int col, double value) {
+  laplacian_.Add(row, col, Eigen::Matrix<double, 1, 1>(value));
 }
 
 bool LaplacianSolver::SolveWithRidge(const std::vector<double>& weights,
@@ -48,28 +62,19 @@ bool LaplacianSolver::SolveWithRidge(const std::vector<double>& weights,
     solution->resize(0, 3);
     return true;
   }
-  std::vector<Eigen::Triplet<double>> triplets;
-  triplets.reserve(3 * edges_.size() + size);
-  for (int i = 0; i < size; ++i) triplets.emplace_back(i, i, ridge);
+  laplacian_.Matrix().coeffs().setZero();
+  for (int row = 0; row < size; ++row) Add(row, row, ridge);
   for (size_t e = 0; e < edges_.size(); ++e) {
-    const int i = std::min(edges_[e].first, edges_[e].second) - 1;
-    const int j = std::max(edges_[e].first, edges_[e].second) - 1;
-    triplets.emplace_back(j, j, weights[e]);
-    if (i < 0) continue;
-    triplets.emplace_back(i, i, weights[e]);
-    // The factorisation reads the lower triangle.
-    triplets.emplace_back(j, i, -weights[e]);
+    const auto [i, j] = edges_[e];
+    if (i > 0) Add(RowOf(i), RowOf(i), weights[e]);
+    if (j > 0) Add(RowOf(j), RowOf(j), weights[e]);
+    if (i == 0 || j == 0) continue;
+    Add(std::max(RowOf(i), RowOf(j)), std::min(RowOf(i), RowOf(j)),
+        -weights[e]);
   }
-  Eigen::SparseMatrix<double> laplacian(size, size);
-  laplacian.setFromTriplets(triplets.begin(), triplets.end());
-  if (!is_analyzed_) {
-    factorization_.analyzePattern(laplacian);
-    is_analyzed_ = true;
-  }
-  factorization_.factorize(laplacian);
+  factorization_.factorize(laplacian_.Matrix());
   if (factorization_.info() != Eigen::Success) return false;
-  const Eigen::VectorXd pivots = factorization_.vectorD();
-  if (!(pivots.minCoeff() > 1e-14 * pivots.maxCoeff())) return false;
+  if (!(factorization_.ReciprocalCondition() > 1e-14)) return false;
   *solution = factorization_.solve(right_side);
   return solution->allFinite();
 }

@@ -2,10 +2,11 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <Eigen/SparseCholesky>
-#include <Eigen/SparseCore>
 #include <utility>
 #include <vector>
+
+#include "core/sparse/block_matrix.h"
+#include "core/sparse/ordered_cholesky.h"
 
 namespace adasfm {
 
@@ -26,14 +27,18 @@ class LaplacianSolver {
              Vectors* nodes);
 
  private:
+  // The row of the equations of a node other than 0.
+  int RowOf(int node) const { return row_of_[node - 1]; }
+  void Add(int row, int col, double value);
   bool SolveWithRidge(const std::vector<double>& weights,
                       const Vectors& right_side, double ridge,
                       Vectors* solution);
 
   int num_nodes_;
   std::vector<std::pair<int, int>> edges_;
-  Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>> factorization_;
-  bool is_analyzed_ = false;
+  std::vector<int> row_of_;
+  BlockMatrix laplacian_;
+  OrderedCholesky factorization_;
 };
 
 }  // namespace adasfm

@@ -12,6 +12,7 @@ cd "$(dirname "${BASH_SOURCE[0]}")/../.."
 
 rooms='
 core
+core/sparse                    core
 synthetic                      core
 partition                      core
 
@@ -23,14 +24,14 @@ sensors/smoother               core sensors/io sensors/preintegration
 sensors/calibration_check      core sensors/io sensors/preintegration
 sensors                        core sensors/...
 
-global/view_graph              core
+global/view_graph              core core/sparse
 global/two_view                core global/view_graph
 global/odometry                core global/view_graph
 global/rotation_averaging      core global/view_graph
 global/structure               core global/view_graph
 global/calibration             core global/view_graph global/two_view global/odometry
 global/loop_closures           core global/view_graph global/odometry
-global/translation_averaging   core global/view_graph global/odometry
+global/translation_averaging   core core/sparse global/view_graph global/odometry
 global                         core global/...
 
 colmap_ext/io                  core
@@ -42,7 +43,7 @@ colmap_ext/features            core colmap_ext/host
 colmap_ext/database            core colmap_ext/io colmap_ext/host global/calibration
 colmap_ext/scene               core colmap_ext/io colmap_ext/host colmap_ext/database global/view_graph global/two_view
 colmap_ext/cost_functions      core colmap_ext/host
-colmap_ext/bundle_adjustment   core colmap_ext/host colmap_ext/scene colmap_ext/cost_functions
+colmap_ext/bundle_adjustment   core core/sparse colmap_ext/host colmap_ext/scene colmap_ext/cost_functions
 colmap_ext/priors              core colmap_ext/host colmap_ext/database colmap_ext/scene sensors sensors/... global/two_view
 colmap_ext/coarse              core colmap_ext/host colmap_ext/bundle_adjustment colmap_ext/cost_functions colmap_ext/scene global global/...
 colmap_ext/mapper              core colmap_ext/host colmap_ext/bundle_adjustment colmap_ext/cost_functions colmap_ext/scene partition

@@ -7,8 +7,8 @@
 #include <random>
 #include <vector>
 
-#include "colmap_ext/bundle_adjustment/ordered_cholesky.h"
 #include "core/parallel.h"
+#include "core/sparse/ordered_cholesky.h"
 
 namespace adasfm {
 namespace {

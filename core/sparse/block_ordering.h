@@ -16,8 +16,8 @@ struct BlockOrdering {
   size_t num_factor_blocks = 0;
 };
 
-// Method: the ordering of CHOLMOD with least fill, in postorder: minimum
-// degree, nested dissection by METIS or, for many blocks, CHOLMOD's own.
+// Method: that with least fill of minimum degree, nested dissection by METIS
+// and, for many blocks, CHOLMOD's own, in postorder.
 //
 // Input: for each node the indices of its neighbours; every edge is listed at
 // one of its nodes, and repeated edges change nothing. A chain of n nodes has

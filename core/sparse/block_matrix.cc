@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "colmap_ext/bundle_adjustment/block_matrix.h"
+#include "core/sparse/block_matrix.h"
 
 #include <algorithm>
 #include <utility>
 
-#include "colmap_ext/bundle_adjustment/block_ordering.h"
+#include "core/sparse/block_ordering.h"
 
 namespace adasfm {
 

@@ -24,6 +24,11 @@ class OrderedCholesky
   // factorisation, and the entries of the factor.
   double NumOperations() { return cholmod().fl; }
   double NumEntries() { return cholmod().lnz; }
+  // After a factorisation: the least over the largest pivot, a rough estimate
+  // of the reciprocal of the condition.
+  double ReciprocalCondition() {
+    return cholmod_rcond(m_cholmodFactor, &cholmod());
+  }
 };
 
 }  // namespace adasfm

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "colmap_ext/bundle_adjustment/block_matrix.h"
+#include "core/sparse/block_matrix.h"
 
 #include <gtest/gtest.h>
 
