@@ -7,6 +7,7 @@
 #include <stdexcept>
 #include <vector>
 
+#include "colmap_ext/host/database.h"
 #include "colmap_ext/host/database_schema.h"
 #include "core/parallel.h"
 #include "core/sqlite.h"
@@ -17,29 +18,6 @@ namespace {
 
 // Images per transaction and thread; a kill loses one transaction.
 constexpr size_t kNumImagesPerThread = 4;
-
-struct ImageToExtract {
-  image_t image_id = kInvalidImageId;
-  std::string name;
-};
-
-std::vector<ImageToExtract> ImagesWithoutFeatures(SqliteConnection* database,
-                                                  size_t* num_images) {
-  SqliteStatement statement(
-      database,
-      "SELECT image_id, name, image_id IN (SELECT image_id FROM keypoints) AND "
-      "image_id IN (SELECT image_id FROM descriptors) FROM images "
-      "ORDER BY name");
-  std::vector<ImageToExtract> images;
-  *num_images = 0;
-  while (statement.Step()) {
-    ++*num_images;
-    if (statement.Int(2) != 0) continue;
-    images.push_back(
-        {static_cast<image_t>(statement.Int(0)), statement.Text(1)});
-  }
-  return images;
-}
 
 template <typename Rows>
 void BindRows(image_t image_id, const Rows& rows, SqliteStatement* statement) {
@@ -84,9 +62,8 @@ SiftFeatures ExtractFromFile(const SiftFeatureOptions& options,
 void ExtractAll(const SiftFeatureOptions& options, int num_threads,
                 const std::string& image_path, SqliteConnection* database,
                 const ProgressCallback& progress) {
-  size_t num_images = 0;
-  const std::vector<ImageToExtract> images =
-      ImagesWithoutFeatures(database, &num_images);
+  const size_t num_images = ReadImages(database).size();
+  const std::vector<DatabaseImage> images = ReadImagesWithoutFeatures(database);
   const size_t num_done = num_images - images.size();
   const size_t block_size =
       kNumImagesPerThread * EffectiveNumThreads(num_threads);

@@ -16,13 +16,14 @@ static Status MissingRows(const std::string& database_path,
 Status CheckFeatures(const std::string& database_path) {
   try {
     SqliteConnection database(database_path, SqliteConnection::Mode::kRead);
-    const std::vector<std::string> names = ImagesWithoutFeatures(&database);
-    if (names.empty()) return Status::Ok();
+    const std::vector<DatabaseImage> images =
+        ReadImagesWithoutFeatures(&database);
+    if (images.empty()) return Status::Ok();
     return MissingRows(database_path, "the features of",
-                       std::to_string(names.size()) + " of " +
+                       std::to_string(images.size()) + " of " +
                            std::to_string(ReadImages(&database).size()) +
                            " images are missing (the first one is " +
-                           names.front() + ")",
+                           images.front().name + ")",
                        "features.log");
   } catch (const SqliteError& error) {
     return Status::Error(database_path + ": " + error.what());

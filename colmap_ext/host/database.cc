@@ -108,17 +108,29 @@ Status CheckDatabase(const std::string& database_path) {
   }
 }
 
-std::vector<DatabaseImage> ReadImages(SqliteConnection* database) {
+static std::vector<DatabaseImage> ReadImagesWhere(SqliteConnection* database,
+                                                  const std::string& which) {
   std::vector<DatabaseImage> images;
   SqliteStatement statement(
-      database,
-      "SELECT image_id, name, camera_id FROM images ORDER BY image_id");
+      database, "SELECT image_id, name, camera_id FROM images " + which);
   while (statement.Step()) {
     images.push_back({static_cast<image_t>(statement.Int(0)),
                       static_cast<camera_t>(statement.Int(2)),
                       statement.Text(1)});
   }
   return images;
+}
+
+std::vector<DatabaseImage> ReadImages(SqliteConnection* database) {
+  return ReadImagesWhere(database, "ORDER BY image_id");
+}
+
+std::vector<DatabaseImage> ReadImagesWithoutFeatures(
+    SqliteConnection* database) {
+  return ReadImagesWhere(
+      database,
+      "WHERE image_id NOT IN (SELECT image_id FROM keypoints) OR image_id NOT "
+      "IN (SELECT image_id FROM descriptors) ORDER BY name");
 }
 
 std::map<image_t, std::vector<Eigen::Vector2d>> ReadKeypoints(

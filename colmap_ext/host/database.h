@@ -52,6 +52,9 @@ std::map<camera_t, colmap::Camera> ReadCameras(SqliteConnection* database);
 
 // Sorted by id.
 std::vector<DatabaseImage> ReadImages(SqliteConnection* database);
+// Those without keypoints or descriptors, sorted by name.
+std::vector<DatabaseImage> ReadImagesWithoutFeatures(
+    SqliteConnection* database);
 
 // Positions only, in pixels.
 std::map<image_t, std::vector<Eigen::Vector2d>> ReadKeypoints(

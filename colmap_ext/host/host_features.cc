@@ -110,17 +110,6 @@ StatusOr<ImageRegistration> ReadRegistration(
   }
 }
 
-std::vector<std::string> ImagesWithoutFeatures(SqliteConnection* database) {
-  SqliteStatement statement(
-      database,
-      "SELECT name FROM images WHERE image_id NOT IN (SELECT image_id FROM "
-      "keypoints) OR image_id NOT IN (SELECT image_id FROM descriptors) "
-      "ORDER BY name");
-  std::vector<std::string> names;
-  while (statement.Step()) names.push_back(statement.Text(0));
-  return names;
-}
-
 Status ExtractFeaturesByHost(const FeatureOptions& options,
                              const std::string& image_path,
                              const std::string& database_path,
@@ -130,7 +119,9 @@ Status ExtractFeaturesByHost(const FeatureOptions& options,
   int num_images = 0;
   try {
     SqliteConnection database(database_path, SqliteConnection::Mode::kRead);
-    names = ImagesWithoutFeatures(&database);
+    for (const DatabaseImage& image : ReadImagesWithoutFeatures(&database)) {
+      names.push_back(image.name);
+    }
     num_images = Count(&database, "images");
   } catch (const SqliteError& error) {
     return Status::Error(database_path + ": " + error.what());

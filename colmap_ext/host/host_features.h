@@ -23,11 +23,7 @@ bool UsesHostProgram();
 StatusOr<ImageRegistration> ReadRegistration(
     const std::vector<std::string>& names, const std::string& database_path);
 
-// Names, in order, of the images without keypoints or descriptors. Throws
-// SqliteError.
-std::vector<std::string> ImagesWithoutFeatures(SqliteConnection* database);
-
-// Extracts the features of those images.
+// Extracts the features of the images without any.
 Status ExtractFeaturesByHost(const FeatureOptions& options,
                              const std::string& image_path,
                              const std::string& database_path,

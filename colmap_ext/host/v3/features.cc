@@ -1,15 +1,14 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "colmap_ext/host/features.h"
 
-#include <base/database.h>
 #include <feature/extraction.h>
 
-#include <algorithm>
 #include <chrono>
 #include <cstdlib>
 #include <functional>
 #include <thread>
 
+#include "colmap_ext/host/database.h"
 #include "colmap_ext/host/database_schema.h"
 #include "colmap_ext/host/host_features.h"
 #include "colmap_ext/io/capture_output.h"
@@ -22,25 +21,6 @@ namespace adasfm {
 namespace {
 
 constexpr std::chrono::milliseconds kThreadPollInterval(100);
-
-// Images of the database without descriptors or keypoints, and how many have
-// both.
-std::vector<std::string> ImagesWithoutFeatures(const std::string& path,
-                                               int* num_done) {
-  const colmap::Database database(path);
-  std::vector<std::string> names;
-  *num_done = 0;
-  for (const colmap::Image& image : database.ReadAllImages()) {
-    if (database.ExistsDescriptors(image.ImageId()) &&
-        database.ExistsKeypoints(image.ImageId())) {
-      ++*num_done;
-    } else {
-      names.push_back(image.Name());
-    }
-  }
-  std::sort(names.begin(), names.end());
-  return names;
-}
 
 // Waits for a thread of the host; when the progress callback throws, the thread
 // is asked to stop and waited for.
@@ -95,13 +75,21 @@ Status ExtractFeatures(const FeatureOptions& options,
   }
   const Status opens = CheckLibraryOpens(database_path);
   if (!opens.ok()) return opens;
-  int num_done = 0;
   colmap::ImageReaderOptions reader;
   reader.database_path = database_path;
   reader.image_path = image_path;
-  reader.image_list = ImagesWithoutFeatures(database_path, &num_done);
+  int num_images = 0;
+  try {
+    SqliteConnection database(database_path, SqliteConnection::Mode::kRead);
+    num_images = static_cast<int>(ReadImages(&database).size());
+    for (const DatabaseImage& image : ReadImagesWithoutFeatures(&database)) {
+      reader.image_list.push_back(image.name);
+    }
+  } catch (const SqliteError& error) {
+    return Status::Error(database_path + ": " + error.what());
+  }
   if (reader.image_list.empty()) return Status::Ok();
-  const int num_images = num_done + reader.image_list.size();
+  const int num_done = num_images - static_cast<int>(reader.image_list.size());
   colmap::SiftExtractionOptions sift;
   sift.max_image_size = options.max_image_size;
   sift.max_num_features = options.max_num_features;
