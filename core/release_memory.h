@@ -12,21 +12,24 @@
 
 namespace adasfm {
 
-// Returns free memory to the system, at the end of a stage. The allocator keeps
-// freed memory for the thread that freed it, and the next stage, on another
-// thread, cannot use it. Does nothing without glibc.
-inline void ReleaseFreedMemory() {
-#if defined(__GLIBC__)
-  malloc_trim(0);
-#endif
-}
-
 // Resident memory of the process; 0 where the system does not report it.
 inline double ResidentMemoryBytes() {
   double num_pages = 0.0;
   double num_resident_pages = 0.0;
   std::ifstream("/proc/self/statm") >> num_pages >> num_resident_pages;
   return num_resident_pages * sysconf(_SC_PAGESIZE);
+}
+
+// Returns free memory to the system, at the end of a stage, if the process has
+// so much resident memory. The allocator keeps freed memory for the thread that
+// freed it, and the next stage, on another thread, cannot use it. A smaller
+// process gains little: with 1,000 images, 40 MB of 270 for a tenth of the
+// mapper's CPU time, as pages that are used again must be mapped again. Does
+// nothing without glibc.
+inline void ReleaseFreedMemory(double min_resident_bytes = 5e8) {
+#if defined(__GLIBC__)
+  if (ResidentMemoryBytes() >= min_resident_bytes) malloc_trim(0);
+#endif
 }
 
 }  // namespace adasfm
