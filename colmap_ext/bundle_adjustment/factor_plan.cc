@@ -12,12 +12,13 @@ namespace adasfm {
 namespace {
 
 // If the factor has more blocks (1.2 GB), a point becomes one for each group of
-// its images of which any two share three points. Of 30,000 images 12 to 37 %
-// of the pairs that see points together share fewer; such pairs constrain each
-// other little, but take much of the memory (docs/reference/math.md). Where
-// memory is bounded, the required number doubles, up to the last one.
+// its images of which any two share three points and, where a third image
+// connects them, 24. The other pairs that see points together constrain each
+// other little, but take much of the memory and time (docs/reference/math.md).
+// Where memory is bounded, the first number doubles, up to the last one.
 constexpr size_t kMaxNumBlocksWhole = 4000000;
 constexpr int kMinNumSharedPoints = 3;
+constexpr int kMinNumSharedIfRedundant = 24;
 constexpr int kMaxMinNumSharedPoints = 48;
 // Measured on 30,000 images: a block of the equations with its row indices, a
 // block of the factor, and an observation with its share of its point.
@@ -49,7 +50,7 @@ struct SystemSize {
 double MaxSystemBytes(double max_memory_gb, const std::set<image_t>& images,
                       const colmap::Reconstruction& reconstruction) {
   if (max_memory_gb < 0.0) return std::numeric_limits<double>::infinity();
-  ReleaseFreedMemory();
+  ReleaseFreedMemory(0.0);
   double num_observations = 0.0;
   for (const image_t image_id : images) {
     num_observations += reconstruction.Image(image_id).NumPoints3D();
@@ -71,6 +72,7 @@ FactorPlan PlanFactor(const std::set<image_t>& images,
   Covisibility covisibility(images, reconstruction);
   SystemSize size(covisibility);
   if (size.num_factor_blocks > kMaxNumBlocksWhole || size.Bytes() > max_bytes) {
+    covisibility.CutRedundant(kMinNumSharedIfRedundant);
     for (int min_num_shared = kMinNumSharedPoints;; min_num_shared *= 2) {
       plan.min_num_shared_points = min_num_shared;
       covisibility.Cut(min_num_shared);

@@ -19,8 +19,8 @@ struct FactorPlan {
   // Images that share fewer points count as sharing none: 1, or more where the
   // factor is large or memory short (docs/reference/math.md).
   int min_num_shared_points = 1;
-  // The pairs that share enough points, by which tracks are cut; only where
-  // min_num_shared_points is above 1.
+  // The pairs that share enough points and are not redundant, by which tracks
+  // are cut; only where min_num_shared_points is above 1.
   std::optional<Covisibility> cut;
 };
 

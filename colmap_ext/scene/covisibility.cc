@@ -6,6 +6,19 @@
 #include "colmap_ext/host/pose_conversion.h"
 
 namespace adasfm {
+namespace {
+
+// Whether two sorted lists have a common entry.
+bool Intersect(const std::vector<int>& list1, const std::vector<int>& list2) {
+  auto entry = list1.begin();
+  return std::any_of(list2.begin(), list2.end(), [&](int wanted) {
+    entry = std::lower_bound(entry, list1.end(), wanted);
+    return entry != list1.end() && *entry == wanted;
+  });
+}
+
+}  // namespace
+
 Covisibility::Covisibility(const std::set<image_t>& images,
                            const colmap::Reconstruction& reconstruction,
                            int min_num_shared_points) {
@@ -37,17 +50,42 @@ Covisibility::Covisibility(const std::set<image_t>& images,
   Cut(min_num_shared_points);
 }
 
-void Covisibility::Cut(int min_num_shared_points) {
+template <typename Function>
+void Covisibility::Filter(const Function& keep) {
   for (size_t index = 0; index < neighbors_.size(); ++index) {
+    std::vector<int>& neighbors = neighbors_[index];
+    std::vector<int>& num_shared = num_shared_[index];
     size_t num_kept = 0;
+    for (size_t k = 0; k < neighbors.size(); ++k) {
+      if (!keep(index, neighbors[k], num_shared[k])) continue;
+      neighbors[num_kept] = neighbors[k];
+      num_shared[num_kept++] = num_shared[k];
+    }
+    neighbors.resize(num_kept);
+    num_shared.resize(num_kept);
+  }
+}
+
+void Covisibility::Cut(int min_num_shared_points) {
+  Filter([&](size_t, int, int num_shared) {
+    return num_shared >= min_num_shared_points;
+  });
+}
+
+void Covisibility::CutRedundant(int min_num_shared_points) {
+  // Earlier images first, then later ones: sorted.
+  std::vector<std::vector<int>> strong(neighbors_.size());
+  for (size_t index = 0; index < neighbors_.size(); ++index) {
     for (size_t k = 0; k < neighbors_[index].size(); ++k) {
       if (num_shared_[index][k] < min_num_shared_points) continue;
-      neighbors_[index][num_kept] = neighbors_[index][k];
-      num_shared_[index][num_kept++] = num_shared_[index][k];
+      strong[index].push_back(neighbors_[index][k]);
+      strong[neighbors_[index][k]].push_back(index);
     }
-    neighbors_[index].resize(num_kept);
-    num_shared_[index].resize(num_kept);
   }
+  Filter([&](size_t index, int other, int num_shared) {
+    return num_shared >= min_num_shared_points ||
+           !Intersect(strong[index], strong[other]);
+  });
 }
 
 int Covisibility::IndexOf(image_t image_id) const {

@@ -19,6 +19,9 @@ class Covisibility {
                int min_num_shared_points = 1);
   // Raises min_num_shared_points.
   void Cut(int min_num_shared_points);
+  // Images that share fewer points than this count as sharing none, too, where
+  // a third image shares so many with both and thus connects them.
+  void CutRedundant(int min_num_shared_points);
 
   // For each image, in order of ids: the sorted indices of the later images
   // that share points with it.
@@ -33,6 +36,9 @@ class Covisibility {
   // -1: not among the images of the constructor.
   int IndexOf(image_t image_id) const;
   bool SharePoints(int index1, int index2) const;
+  // Keeps the pairs for which keep(index1, index2, num_shared) is true.
+  template <typename Function>
+  void Filter(const Function& keep);
 
   std::unordered_map<image_t, int> index_of_;
   std::vector<std::vector<int>> neighbors_;

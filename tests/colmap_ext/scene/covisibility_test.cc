@@ -70,6 +70,39 @@ TEST_P(CovisibilityTest, TellsWhoSharesSoManyPoints) {
   }
 }
 
+TEST_P(CovisibilityTest, CutsPairsThatAThirdImageConnects) {
+  constexpr int kMinNum = 12;
+  const std::vector<image_t> ids(images_.begin(), images_.end());
+  const auto count = [&](size_t i, size_t j) {
+    const auto found = counts_.find(std::minmax(ids[i], ids[j]));
+    return found == counts_.end() ? 0 : found->second;
+  };
+  const auto is_connected_by_third = [&](size_t i, size_t j) {
+    for (size_t k = 0; k < ids.size(); ++k) {
+      if (count(i, k) >= kMinNum && count(k, j) >= kMinNum) return true;
+    }
+    return false;
+  };
+  Covisibility covisibility(images_, world_);
+  covisibility.CutRedundant(kMinNum);
+  int num_cut = 0, num_weak = 0;
+  for (size_t i = 0; i < ids.size(); ++i) {
+    std::vector<int> expected;
+    for (size_t j = i + 1; j < ids.size(); ++j) {
+      if (count(i, j) == 0) continue;
+      const bool is_weak = count(i, j) < kMinNum;
+      const bool is_cut = is_weak && is_connected_by_third(i, j);
+      if (!is_cut) expected.push_back(static_cast<int>(j));
+      num_cut += is_cut;
+      num_weak += is_weak;
+    }
+    EXPECT_EQ(covisibility.Neighbors()[i], expected);
+  }
+  // Some are cut, but not all weak ones.
+  EXPECT_GT(num_cut, 0);
+  EXPECT_LT(num_cut, num_weak);
+}
+
 TEST_P(CovisibilityTest, CutsTracksWhereImagesShareFewPoints) {
   constexpr int kMinNum = 5;
   const Covisibility covisibility(images_, world_, kMinNum);
