@@ -136,6 +136,11 @@ set(CPACK_DEBIAN_FILE_NAME DEB-DEFAULT)
 set(CPACK_DEBIAN_PACKAGE_SECTION science)
 set(CPACK_DEBIAN_RUNTIME_PACKAGE_NAME colmap-adasfm)
 set(CPACK_DEBIAN_RUNTIME_PACKAGE_SHLIBDEPS ON)
+# What the program loads itself: libopencv_imgcodecs.so.406 is in the package
+# libopencv-imgcodecs406.
+string(REPLACE ".so." "" imgcodecs_package "${ADASFM_IMGCODECS}")
+string(REPLACE "_" "-" imgcodecs_package "${imgcodecs_package}")
+set(CPACK_DEBIAN_RUNTIME_PACKAGE_DEPENDS ${imgcodecs_package})
 set(CPACK_DEBIAN_RUNTIME_PACKAGE_RECOMMENDS colmap)
 set(CPACK_COMPONENT_RUNTIME_DESCRIPTION
   "The adasfm_* commands: photos, and the logs of an IMU and wheels, to one

@@ -6,6 +6,8 @@
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
+#include "colmap_ext/io/image_codecs.h"
+
 namespace adasfm {
 namespace {
 
@@ -110,7 +112,7 @@ std::string ImageDecoder::DecodeRaw(const RosImage& image, ImageFile* file) {
   }
   file->extension = ".png";
   // Fast rather than small: the file is read again within minutes.
-  cv::imencode(".png", picture, file->bytes, {cv::IMWRITE_PNG_COMPRESSION, 1});
+  file->bytes = EncodeImage(".png", picture, {cv::IMWRITE_PNG_COMPRESSION, 1});
   return "";
 }
 

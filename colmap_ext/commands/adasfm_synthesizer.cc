@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <filesystem>
+#include <fstream>
 #include <iostream>
 #include <map>
-#include <opencv2/imgcodecs.hpp>
+#include <opencv2/core.hpp>
 #include <set>
 #include <sstream>
 #include <stdexcept>
@@ -14,6 +15,7 @@
 #include "colmap_ext/commands/registry.h"
 #include "colmap_ext/datasets/write_synthetic_world.h"
 #include "colmap_ext/io/folder_lock.h"
+#include "colmap_ext/io/image_codecs.h"
 #include "colmap_ext/io/output_files.h"
 #include "core/check_options.h"
 #include "synthetic/render_world.h"
@@ -244,13 +246,11 @@ Status WritePhotos(const SyntheticWorld& world, const fs::path& folder) {
   for (size_t i = 0; i < world.images.size(); ++i) {
     const fs::path path = folder / world.images[i].name;
     fs::create_directories(path.parent_path());
-    bool written = false;
-    try {
-      written = cv::imwrite(path.string(), renderer.Render(i));
-    } catch (const cv::Exception&) {
-      // OpenCV reports a full disk by an exception or by its result.
-    }
-    if (!written) {
+    const std::vector<unsigned char> bytes =
+        EncodeImage(path.extension().string(), renderer.Render(i));
+    std::ofstream file(path, std::ios::binary);
+    file.write(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+    if (!file.flush()) {
       return Status::Error("cannot write " + path.string() +
                            "; check the free space");
     }

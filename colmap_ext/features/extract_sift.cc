@@ -9,6 +9,7 @@
 
 #include "colmap_ext/host/database.h"
 #include "colmap_ext/host/database_schema.h"
+#include "colmap_ext/io/image_codecs.h"
 #include "core/parallel.h"
 #include "core/sqlite.h"
 #include "core/types.h"
@@ -51,7 +52,7 @@ SiftFeatures ExtractFromFile(const SiftFeatureOptions& options,
                              const std::string& path) {
   // Ignores the orientation of EXIF, as COLMAP does.
   const cv::Mat image =
-      cv::imread(path, cv::IMREAD_GRAYSCALE | cv::IMREAD_IGNORE_ORIENTATION);
+      ReadImageFile(path, cv::IMREAD_GRAYSCALE | cv::IMREAD_IGNORE_ORIENTATION);
   if (image.empty()) {
     throw std::runtime_error("OpenCV cannot read the image " + path +
                              "; use --extractor colmap");

@@ -11,6 +11,7 @@
 
 #include "colmap_ext/database/two_view_geometry_backup.h"
 #include "colmap_ext/host/database.h"
+#include "colmap_ext/io/image_codecs.h"
 #include "colmap_ext/report/report_examples.h"
 #include "colmap_ext/report/report_html.h"
 
@@ -73,7 +74,7 @@ std::optional<Photo> ReadPhoto(const std::string& path,
   Photo photo;
   try {
     const cv::Mat pixels =
-        cv::imread(path, ReadFlags(WidthOf(camera) / width_px));
+        ReadImageFile(path, ReadFlags(WidthOf(camera) / width_px));
     if (pixels.empty()) return std::nullopt;
     const double height_px =
         static_cast<double>(width_px) * pixels.rows / pixels.cols;
@@ -150,8 +151,8 @@ std::vector<Lines> ReadLines(const ReportPair& pair, const ImagePair& ids,
 
 std::string FormatFigure(const cv::Mat& picture, const std::string& title,
                          const std::string& caption, const std::string& lines) {
-  std::vector<unsigned char> jpeg;
-  cv::imencode(".jpg", picture, jpeg, {cv::IMWRITE_JPEG_QUALITY, kJpegQuality});
+  const std::vector<unsigned char> jpeg =
+      EncodeImage(".jpg", picture, {cv::IMWRITE_JPEG_QUALITY, kJpegQuality});
   const std::string width = std::to_string(picture.cols);
   const std::string height = std::to_string(picture.rows);
   return "<figure class=\"example\"><figcaption><b>" + EscapeHtml(title) +

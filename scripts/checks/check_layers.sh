@@ -39,7 +39,7 @@ colmap_ext/matching            core
 colmap_ext/host/v3             core global/view_graph global/two_view colmap_ext/io colmap_ext/matching
 colmap_ext/host/v4             core colmap_ext/io colmap_ext/matching
 colmap_ext/host                colmap_ext/host/v3 colmap_ext/host/v4 core global/view_graph global/two_view colmap_ext/io colmap_ext/matching
-colmap_ext/features            core colmap_ext/host
+colmap_ext/features            core colmap_ext/io colmap_ext/host
 colmap_ext/database            core colmap_ext/io colmap_ext/host global/calibration
 colmap_ext/scene               core colmap_ext/io colmap_ext/host colmap_ext/database global/view_graph global/two_view
 colmap_ext/cost_functions      core colmap_ext/host
