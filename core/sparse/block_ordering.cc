@@ -69,6 +69,10 @@ class BlockAnalysis
         Eigen::viewAsCholmod(pattern.selfadjointView<Eigen::Lower>());
     m_cholmodFactor =
         cholmod_analyze_p(&lower, dissected.data(), nullptr, 0, &cholmod());
+    // CHOLMOD would go on without an order that it has no memory for.
+    for (int k = 0; k < cholmod().nmethods; ++k) {
+      if (!(cholmod().method[k].lnz >= 0.0)) throw std::bad_alloc();
+    }
     if (m_cholmodFactor == nullptr) throw std::bad_alloc();
   }
   const int* Order() const {
