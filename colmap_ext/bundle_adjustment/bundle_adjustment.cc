@@ -145,7 +145,7 @@ PriorBundleAdjustmentSummary AdjustBundle(
   PriorBundleAdjustmentProblem with_windows = problem;
   AssignSharedErrorWindows(options.shared_errors, &with_windows.priors);
   FactorPlan plan =
-      PlanFactor(problem.images, *reconstruction, options.max_num_images_sparse,
+      PlanFactor(problem, *reconstruction, options.max_num_images_sparse,
                  options.max_memory_gb);
   BundleProblem bundle(options, with_windows, *reconstruction,
                        /*may_keep_points_apart=*/plan.is_small,

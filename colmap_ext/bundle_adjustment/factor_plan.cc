@@ -1,7 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "colmap_ext/bundle_adjustment/factor_plan.h"
 
+#include <algorithm>
+#include <cmath>
 #include <limits>
+#include <set>
+#include <unordered_set>
 #include <utility>
 #include <vector>
 
@@ -12,10 +16,12 @@ namespace adasfm {
 namespace {
 
 // If the factor has more blocks (1.2 GB), a point becomes one for each group of
-// its images of which any two share three points and, where a third image
-// connects them, 24. The other pairs that see points together constrain each
-// other little, but take much of the memory and time (docs/reference/math.md).
-// Where memory is bounded, the first number doubles, up to the last one.
+// its images of which any two share three points. Where sensors measured the
+// motions, any two share 24 unless no third image connects them. The other
+// pairs that see points together constrain each other little, but take much of
+// the memory and time (docs/reference/math.md). Without the motions a long
+// drive bends and changes its scale less, the longer its tracks are. Where
+// memory is bounded, the first number doubles, up to the last one.
 constexpr size_t kMaxNumBlocksWhole = 4000000;
 constexpr int kMinNumSharedPoints = 3;
 constexpr int kMinNumSharedIfRedundant = 24;
@@ -59,11 +65,35 @@ double MaxSystemBytes(double max_memory_gb, const std::set<image_t>& images,
          kBytesPerObservation * num_observations;
 }
 
+// Whether the motions that sensors measured, with their lengths, tie all images
+// but a few.
+bool TieMostImages(const std::vector<PosePriorEdge>& priors,
+                   const std::set<image_t>& images) {
+  std::unordered_set<image_t> tied;
+  for (const PosePriorEdge& prior : priors) {
+    const bool has_length =
+        prior.is_length_measured &&
+        std::min(prior.length_sigma_m, prior.translation_sigma_m) <
+            std::numeric_limits<double>::infinity();
+    if (prior.dt_s < 0.0 || !has_length ||
+        !std::isfinite(prior.rotation_sigma_rad)) {
+      continue;
+    }
+    tied.insert({prior.image_id1, prior.image_id2});
+  }
+  constexpr double kMaxShareUntied = 0.01;
+  const auto num_untied = std::count_if(
+      images.begin(), images.end(),
+      [&](image_t image_id) { return tied.count(image_id) == 0; });
+  return num_untied <= kMaxShareUntied * images.size();
+}
+
 }  // namespace
 
-FactorPlan PlanFactor(const std::set<image_t>& images,
+FactorPlan PlanFactor(const PriorBundleAdjustmentProblem& problem,
                       const colmap::Reconstruction& reconstruction,
                       int max_num_images_sparse, double max_memory_gb) {
+  const std::set<image_t>& images = problem.images;
   FactorPlan plan;
   const size_t max_num_images = max_num_images_sparse;
   if (images.size() <= max_num_images && max_memory_gb < 0.0) return plan;
@@ -72,7 +102,9 @@ FactorPlan PlanFactor(const std::set<image_t>& images,
   Covisibility covisibility(images, reconstruction);
   SystemSize size(covisibility);
   if (size.num_factor_blocks > kMaxNumBlocksWhole || size.Bytes() > max_bytes) {
-    covisibility.CutRedundant(kMinNumSharedIfRedundant);
+    if (TieMostImages(problem.priors, images)) {
+      covisibility.CutRedundant(kMinNumSharedIfRedundant);
+    }
     for (int min_num_shared = kMinNumSharedPoints;; min_num_shared *= 2) {
       plan.min_num_shared_points = min_num_shared;
       covisibility.Cut(min_num_shared);

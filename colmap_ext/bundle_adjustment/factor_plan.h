@@ -2,11 +2,10 @@
 #pragma once
 
 #include <optional>
-#include <set>
 
+#include "colmap_ext/bundle_adjustment/bundle_adjustment.h"
 #include "colmap_ext/host/colmap.h"
 #include "colmap_ext/scene/covisibility.h"
-#include "core/types.h"
 
 namespace adasfm {
 
@@ -25,7 +24,7 @@ struct FactorPlan {
 };
 
 // max_memory_gb: of the process, in GB (1e9 bytes); negative: no limit.
-FactorPlan PlanFactor(const std::set<image_t>& images,
+FactorPlan PlanFactor(const PriorBundleAdjustmentProblem& problem,
                       const colmap::Reconstruction& reconstruction,
                       int max_num_images_sparse, double max_memory_gb);
 
