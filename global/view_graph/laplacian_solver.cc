@@ -4,11 +4,15 @@
 #include <algorithm>
 #include <stdexcept>
 
+#include "core/sparse/ordered_cholesky.h"
+
 namespace adasfm {
 
 LaplacianSolver::LaplacianSolver(int num_nodes,
                                  std::vector<std::pair<int, int>> edges)
-    : num_nodes_(num_nodes), edges_(std::move(edges)) {
+    : num_nodes_(num_nodes),
+      edges_(std::move(edges)),
+      factorization_(std::make_unique<OrderedCholesky>()) {
   for (int node = 1; node < num_nodes; ++node) laplacian_.AddBlock(1);
   for (const auto& [i, j] : edges_) {
     if (i < 0 || j < 0 || i >= num_nodes || j >= num_nodes || i == j) {
@@ -19,8 +23,10 @@ LaplacianSolver::LaplacianSolver(int num_nodes,
   if (num_nodes < 2) return;
   row_of_ = laplacian_.Reorder();
   laplacian_.Allocate();
-  factorization_.analyzePattern(laplacian_.Matrix());
+  factorization_->analyzePattern(laplacian_.Matrix());
 }
+
+LaplacianSolver::~LaplacianSolver() = default;
 
 bool LaplacianSolver::Solve(const std::vector<double>& weights,
                             const Vectors& differences, Vectors* nodes) {
@@ -72,10 +78,10 @@ bool LaplacianSolver::SolveWithRidge(const std::vector<double>& weights,
     Add(std::max(RowOf(i), RowOf(j)), std::min(RowOf(i), RowOf(j)),
         -weights[e]);
   }
-  factorization_.factorize(laplacian_.Matrix());
-  if (factorization_.info() != Eigen::Success) return false;
-  if (!(factorization_.ReciprocalCondition() > 1e-14)) return false;
-  *solution = factorization_.solve(right_side);
+  factorization_->factorize(laplacian_.Matrix());
+  if (factorization_->info() != Eigen::Success) return false;
+  if (!(factorization_->ReciprocalCondition() > 1e-14)) return false;
+  *solution = factorization_->solve(right_side);
   return solution->allFinite();
 }
 

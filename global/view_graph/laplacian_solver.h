@@ -2,13 +2,15 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <memory>
 #include <utility>
 #include <vector>
 
 #include "core/sparse/block_matrix.h"
-#include "core/sparse/ordered_cholesky.h"
 
 namespace adasfm {
+
+class OrderedCholesky;
 
 // min over x of sum_e w_e |x_j - x_i - b_e|^2 for vectors x of three, x_0 = 0:
 // one scalar graph Laplacian with three right-hand sides. The elimination order
@@ -19,6 +21,7 @@ class LaplacianSolver {
 
   // Edges (i, j) of nodes 0 ... num_nodes - 1.
   LaplacianSolver(int num_nodes, std::vector<std::pair<int, int>> edges);
+  ~LaplacianSolver();
 
   // Weights >= 0. False when the system is singular even with a small ridge
   // (the edges of positive weight do not connect the nodes); *nodes is then
@@ -38,7 +41,7 @@ class LaplacianSolver {
   std::vector<std::pair<int, int>> edges_;
   std::vector<int> row_of_;
   BlockMatrix laplacian_;
-  OrderedCholesky factorization_;
+  std::unique_ptr<OrderedCholesky> factorization_;
 };
 
 }  // namespace adasfm
