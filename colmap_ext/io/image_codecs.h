@@ -8,7 +8,7 @@
 namespace adasfm {
 
 // Functions of opencv2/imgcodecs.hpp, whose library is loaded at the first
-// call: with it come some 150 others (GDAL, DICOM, HDF5, ...), which would take
+// call: with it come some 100 others (GDAL, DICOM, HDF5, ...), which would take
 // 0.18 of the 0.23 CPU seconds and 42 of the 65 MB of each command that needs
 // no photo. Throw std::runtime_error where it cannot be loaded.
 
