@@ -65,10 +65,10 @@ double MaxSystemBytes(double max_memory_gb, const std::set<image_t>& images,
          kBytesPerObservation * num_observations;
 }
 
-// Whether the motions that sensors measured, with their lengths, tie all images
-// but a few.
-bool TieMostImages(const std::vector<PosePriorEdge>& priors,
-                   const std::set<image_t>& images) {
+}  // namespace
+
+bool DoSensorsTieImages(const std::vector<PosePriorEdge>& priors,
+                        const std::set<image_t>& images) {
   std::unordered_set<image_t> tied;
   for (const PosePriorEdge& prior : priors) {
     const bool has_length =
@@ -88,8 +88,6 @@ bool TieMostImages(const std::vector<PosePriorEdge>& priors,
   return num_untied <= kMaxShareUntied * images.size();
 }
 
-}  // namespace
-
 FactorPlan PlanFactor(const PriorBundleAdjustmentProblem& problem,
                       const colmap::Reconstruction& reconstruction,
                       int max_num_images_sparse, double max_memory_gb) {
@@ -102,7 +100,7 @@ FactorPlan PlanFactor(const PriorBundleAdjustmentProblem& problem,
   Covisibility covisibility(images, reconstruction);
   SystemSize size(covisibility);
   if (size.num_factor_blocks > kMaxNumBlocksWhole || size.Bytes() > max_bytes) {
-    if (TieMostImages(problem.priors, images)) {
+    if (DoSensorsTieImages(problem.priors, images)) {
       covisibility.CutRedundant(kMinNumSharedIfRedundant);
     }
     for (int min_num_shared = kMinNumSharedPoints;; min_num_shared *= 2) {

@@ -2,6 +2,8 @@
 #pragma once
 
 #include <optional>
+#include <set>
+#include <vector>
 
 #include "colmap_ext/bundle_adjustment/bundle_adjustment.h"
 #include "colmap_ext/host/colmap.h"
@@ -22,6 +24,11 @@ struct FactorPlan {
   // are cut; only where min_num_shared_points is above 1.
   std::optional<Covisibility> cut;
 };
+
+// Whether motions that sensors measured, with their lengths, tie all images but
+// one in a hundred.
+bool DoSensorsTieImages(const std::vector<PosePriorEdge>& priors,
+                        const std::set<image_t>& images);
 
 // max_memory_gb: of the process, in GB (1e9 bytes); negative: no limit.
 FactorPlan PlanFactor(const PriorBundleAdjustmentProblem& problem,
