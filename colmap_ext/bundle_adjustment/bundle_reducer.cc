@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <utility>
 
+#include "colmap_ext/bundle_adjustment/damping.h"
+
 namespace adasfm {
 
 BundleReducer::BundleReducer(BundleProblem* bundle, int num_threads)

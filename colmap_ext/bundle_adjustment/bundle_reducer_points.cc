@@ -6,6 +6,7 @@
 #include <numeric>
 
 #include "colmap_ext/bundle_adjustment/bundle_reducer.h"
+#include "colmap_ext/bundle_adjustment/damping.h"
 #include "core/parallel.h"
 
 namespace adasfm {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include "sensors/smoother/odometry_fusion_options.h"
+
 #include "core/option_checker.h"
-#include "sensors/smoother/odometry_fusion.h"
 
 namespace adasfm {
 

@@ -4,51 +4,16 @@
 
 #include <clocale>
 #include <cstdlib>
-#include <filesystem>
-#include <fstream>
 
 #include "core/random.h"
 #include "sensors/io/calibration.h"
 #include "sensors/io/read_image_times.h"
 #include "sensors/io/read_imu.h"
 #include "sensors/io/read_wheel.h"
+#include "tests/testing/sensors/readers_fixture.h"
 
 namespace adasfm {
 namespace {
-
-class Readers : public testing::Test {
- protected:
-  void SetUp() override {
-    const auto* info = testing::UnitTest::GetInstance()->current_test_info();
-    folder_ = testing::TempDir() + "adasfm_" + info->name();
-    std::filesystem::remove_all(folder_);
-    std::filesystem::create_directories(folder_);
-  }
-  void TearDown() override { std::filesystem::remove_all(folder_); }
-
-  std::string Write(const std::string& name, const std::string& text) {
-    const std::string path = folder_ + "/" + name;
-    std::filesystem::create_directories(
-        std::filesystem::path(path).parent_path());
-    std::ofstream(path) << text;
-    return path;
-  }
-
-  std::string folder_;
-};
-
-// The message must contain all words and the file's name, and have one line.
-void ExpectError(const Status& status, const std::string& path,
-                 const std::vector<std::string>& words) {
-  ASSERT_FALSE(status.ok());
-  const std::string message = status.message();
-  EXPECT_NE(message.find(path), std::string::npos) << message;
-  EXPECT_EQ(message.find('\n'), std::string::npos) << message;
-  for (const std::string& word : words) {
-    EXPECT_NE(message.find(word), std::string::npos)
-        << "no '" << word << "' in: " << message;
-  }
-}
 
 const char kImuHeader[] =
     "#timestamp [ns],w_RS_S_x [rad s^-1],w_RS_S_y [rad s^-1],w_RS_S_z [rad "
@@ -290,139 +255,6 @@ TEST_F(Readers, OdometryInSecondsAndNanoseconds) {
   EXPECT_EQ((*seasons)[0].timestamp_ns, 1600000000000000000);
   const std::string path = Write("bad.txt", "1.5 1 2 3 0 0 0 2\n");
   ExpectError(ReadOdometry(path).status(), path, {"line 1", "quaternion"});
-}
-
-const char kCalibration[] = R"(cam0:
-  T_cam_imu:
-    - [0, -1, 0, 0.1]
-    - [0, 0, -1, 0.2]
-    - [1, 0, 0, 0.3]
-    - [0, 0, 0, 1]
-  timeshift_cam_imu: 0.0623
-imu0:
-  update_rate: 200.0
-  gyroscope_noise_density: 5.0e-4
-  gyroscope_random_walk: 2.0e-5
-  accelerometer_noise_density: 5.0e-3
-  accelerometer_random_walk: 2.0e-4
-wheel0:
-  type: differential
-  track_width: 1.2
-  speed_noise: 0.05
-  T_imu_wheel: [[1, 0, 0, 0], [0, 1, 0, 0.5], [0, 0, 1, 0], [0, 0, 0, 1]]
-)";
-
-std::string Replaced(std::string text, const std::string& from,
-                     const std::string& to) {
-  return text.replace(text.find(from), from.size(), to);
-}
-
-TEST_F(Readers, CalibrationOfARig) {
-  const std::string second =
-      "cam1:\n  T_cam_imu: [[0, -1, 0, -0.4], [0, 0, -1, 0.2], "
-      "[1, 0, 0, 0.3], [0, 0, 0, 1]]\n";
-  const auto rig = ReadSensorCalibration(
-      Write("rig.yaml", kCalibration + second +
-                            "  timeshift_cam_imu: 0.0625\n"
-                            "cam2:\n  resolution: [800, 500]\n"));
-  ASSERT_TRUE(rig.ok()) << rig.status().message();
-  // cam2 has no extrinsics.
-  ASSERT_EQ(rig->other_cams_from_imu.size(), 1u);
-  EXPECT_EQ(rig->other_cams_from_imu[0].translation.x(), -0.4);
-  EXPECT_TRUE(ReadSensorCalibration(Write("one.yaml", kCalibration))
-                  ->other_cams_from_imu.empty());
-  const std::string path =
-      Write("apart.yaml", kCalibration + second + "  timeshift_cam_imu: 0.1\n");
-  ExpectError(ReadSensorCalibration(path).status(), path,
-              {"cam1/timeshift_cam_imu", "millisecond"});
-}
-
-TEST_F(Readers, Calibration) {
-  const auto calibration =
-      ReadSensorCalibration(Write("sensors.yaml", kCalibration));
-  ASSERT_TRUE(calibration.ok()) << calibration.status().message();
-  EXPECT_EQ(calibration->timeshift_cam_imu_s, 0.0623);
-  EXPECT_TRUE(calibration->has_imu && calibration->has_wheel);
-  EXPECT_EQ(calibration->imu_noise.gyroscope_noise_density, 5e-4);
-  EXPECT_EQ(calibration->imu_from_wheel.translation.y(), 0.5);
-  EXPECT_LT((calibration->cam_from_imu * Eigen::Vector3d(1, 0, 0) -
-             Eigen::Vector3d(0.1, 0.2, 1.3))
-                .norm(),
-            1e-12);
-}
-
-TEST_F(Readers, CalibrationErrors) {
-  const std::string good = kCalibration;
-  struct Case {
-    std::string text;
-    std::vector<std::string> words;
-  };
-  const Case cases[] = {
-      {"cam0: [1, 2\n", {"line", "YAML"}},
-      {"", {"no YAML keys"}},
-      {Replaced(good, "T_cam_imu", "T_imu_cam"), {"T_cam_imu", "missing"}},
-      {Replaced(good, "[1, 0, 0, 0.3]", "[2, 0, 0, 0.3]"),
-       {"T_cam_imu", "not a rotation"}},
-      {Replaced(good, "[1, 0, 0, 0.3]", "[-1, 0, 0, 0.3]"),
-       {"T_cam_imu", "mirrors"}},
-      {Replaced(good, "[1, 0, 0, 0.3]", "[1, 0, 0]"), {"T_cam_imu", "row 3"}},
-      {Replaced(good, "update_rate: 200.0", "update_rate: fast"),
-       {"update_rate", "not a number"}},
-      {Replaced(good, "5.0e-4", "-5.0e-4"),
-       {"gyroscope_noise_density", "positive"}},
-      {Replaced(good, "5.0e-4", "1e-40"),
-       {"gyroscope_noise_density is 1e-40", "between 1e-08 and 1 "}},
-      {Replaced(good, "speed_noise: 0.05", "speed_noise: 1e200"),
-       {"speed_noise is 1e+200 m/s", "possible"}},
-      {Replaced(good, "2.0e-5", "1e-20"), {"gyroscope_random_walk is 1e-20"}},
-      {Replaced(good, "  track_width: 1.2\n", ""), {"track_width", "missing"}},
-      {Replaced(good, "type: differential", "type: tracked"),
-       {"wheel0/type", "tracked"}}};
-  int number = 0;
-  for (const Case& c : cases) {
-    const std::string path =
-        Write("s" + std::to_string(number++) + ".yaml", c.text);
-    ExpectError(ReadSensorCalibration(path).status(), path, c.words);
-  }
-  ExpectError(ReadSensorCalibration(folder_ + "/none.yaml").status(),
-              "none.yaml", {"no such file"});
-}
-
-TEST_F(Readers, CalibrationOfAReceiver) {
-  const std::string camera =
-      "cam0:\n  T_cam_imu: [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, "
-      "0, 1]]\n";
-  auto read = ReadSensorCalibration(Write("none.yaml", camera));
-  ASSERT_TRUE(read.ok()) << read.status().message();
-  EXPECT_FALSE(read->has_gnss);
-  read = ReadSensorCalibration(
-      Write("point.yaml", camera + "gnss0:\n  p_imu_antenna: [0.1, -0.2, 1.5]\n"
-                                   "  timeshift_gnss_imu: 0.25\n"
-                                   "  horizontal_noise: 0.5\n"));
-  ASSERT_TRUE(read.ok()) << read.status().message();
-  EXPECT_TRUE(read->has_gnss);
-  EXPECT_EQ(read->antenna_in_imu, Eigen::Vector3d(0.1, -0.2, 1.5));
-  EXPECT_EQ(read->timeshift_gnss_imu_s, 0.25);
-  EXPECT_EQ(read->gnss_noise.horizontal_m, 0.5);
-  EXPECT_EQ(read->gnss_noise.vertical_m, 1.0);
-  read = ReadSensorCalibration(Write(
-      "transform.yaml",
-      camera + "gnss0:\n  T_imu_gnss: [[1, 0, 0, 1], [0, 1, 0, 2], [0, 0, 1, "
-               "3], [0, 0, 0, 1]]\n"));
-  ASSERT_TRUE(read.ok()) << read.status().message();
-  EXPECT_EQ(read->antenna_in_imu, Eigen::Vector3d(1.0, 2.0, 3.0));
-  const struct {
-    std::string text;
-    std::string word;
-  } cases[] = {{"gnss0:\n  horizontal_noise: 1\n", "p_imu_antenna"},
-               {"gnss0:\n  p_imu_antenna: [1, 2]\n", "3 numbers"},
-               {"gnss0:\n  p_imu_antenna: [1, 2, up]\n", "not a number"},
-               {"gnss0:\n  p_imu_antenna: [0, 0, 0]\n  horizontal_noise: 0\n",
-                "horizontal_noise"}};
-  for (const auto& c : cases) {
-    const std::string path = Write("bad.yaml", camera + c.text);
-    ExpectError(ReadSensorCalibration(path).status(), path, {c.word});
-  }
 }
 
 // Whatever the bytes: a value or an error, never a crash.
