@@ -27,6 +27,7 @@ Covisibility::Covisibility(const std::set<image_t>& images,
   }
   neighbors_.resize(images.size());
   num_shared_.resize(images.size());
+  end_of_run_.resize(images.size());
   std::vector<int> num_shared(images.size(), 0);
   for (const image_t image_id : images) {
     if (!reconstruction.ExistsImage(image_id)) continue;
@@ -63,6 +64,12 @@ void Covisibility::Filter(const Function& keep) {
     }
     neighbors.resize(num_kept);
     num_shared.resize(num_kept);
+    int end = static_cast<int>(index) + 1;
+    for (const int other : neighbors) {
+      if (other != end) break;
+      ++end;
+    }
+    end_of_run_[index] = end;
   }
 }
 
@@ -95,9 +102,10 @@ int Covisibility::IndexOf(image_t image_id) const {
 
 bool Covisibility::SharePoints(int index1, int index2) const {
   if (index1 == index2 || index1 < 0 || index2 < 0) return true;
-  const std::vector<int>& neighbors = neighbors_[std::min(index1, index2)];
-  return std::binary_search(neighbors.begin(), neighbors.end(),
-                            std::max(index1, index2));
+  const auto [first, last] = std::minmax(index1, index2);
+  if (last < end_of_run_[first]) return true;
+  const std::vector<int>& neighbors = neighbors_[first];
+  return std::binary_search(neighbors.begin(), neighbors.end(), last);
 }
 
 std::vector<int> Covisibility::CutTrack(

@@ -36,7 +36,8 @@ class Covisibility {
   // -1: not among the images of the constructor.
   int IndexOf(image_t image_id) const;
   bool SharePoints(int index1, int index2) const;
-  // Keeps the pairs for which keep(index1, index2, num_shared) is true.
+  // Keeps the pairs for which keep(index1, index2, num_shared) is true, and
+  // finds the runs.
   template <typename Function>
   void Filter(const Function& keep);
 
@@ -44,6 +45,9 @@ class Covisibility {
   std::vector<std::vector<int>> neighbors_;
   // Numbers of shared points, parallel to neighbors_.
   std::vector<std::vector<int>> num_shared_;
+  // All images from the next one up to this index share points with an image,
+  // as most of those in a track do: no search is needed.
+  std::vector<int> end_of_run_;
 };
 
 }  // namespace adasfm

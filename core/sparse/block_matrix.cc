@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "core/huge_pages.h"
 #include "core/sparse/block_ordering.h"
 
 namespace adasfm {
@@ -73,6 +74,7 @@ void BlockMatrix::Allocate() {
   }
   matrix_.resize(num_columns_, num_columns_);
   matrix_.resizeNonZeros(num_rows.sum());
+  AdviseHugePages(matrix_.valuePtr(), matrix_.nonZeros() * sizeof(double));
   int next = 0;
   for (int block = 0; block < NumBlocks(); ++block) {
     for (int col = first_[block]; col < first_[block] + size_[block]; ++col) {

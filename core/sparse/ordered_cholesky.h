@@ -3,6 +3,9 @@
 
 #include <Eigen/CholmodSupport>
 #include <Eigen/SparseCore>
+#include <new>
+
+#include "core/huge_pages.h"
 
 namespace adasfm {
 
@@ -12,12 +15,31 @@ namespace adasfm {
 // and no graph of its rows. It prints nothing: the caller reports failures.
 class OrderedCholesky
     : public Eigen::CholmodSupernodalLLT<Eigen::SparseMatrix<double>> {
+  using Base = Eigen::CholmodSupernodalLLT<Eigen::SparseMatrix<double>>;
+
  public:
   OrderedCholesky() {
     cholmod().print = 0;
     cholmod().nmethods = 1;
     cholmod().method[0].ordering = CHOLMOD_NATURAL;
     cholmod().postorder = false;
+  }
+
+  // Allocates the factor, too. Throws where memory is short, which Eigen takes
+  // for success, as does factorize().
+  void analyzePattern(const Eigen::SparseMatrix<double>& matrix) {
+    Base::analyzePattern(matrix);
+    CheckMemory();
+    cholmod_change_factor(CHOLMOD_REAL, true, true, true, true, m_cholmodFactor,
+                          &cholmod());
+    CheckMemory();
+    AdviseHugePages(m_cholmodFactor->x,
+                    m_cholmodFactor->xsize * sizeof(double));
+  }
+
+  void factorize(const Eigen::SparseMatrix<double>& matrix) {
+    Base::factorize(matrix);
+    CheckMemory();
   }
 
   // After analyzePattern, by its count: the floating-point operations of a
@@ -28,6 +50,14 @@ class OrderedCholesky
   // of the reciprocal of the condition.
   double ReciprocalCondition() {
     return cholmod_rcond(m_cholmodFactor, &cholmod());
+  }
+
+ private:
+  void CheckMemory() {
+    if (m_cholmodFactor == nullptr ||
+        cholmod().status == CHOLMOD_OUT_OF_MEMORY) {
+      throw std::bad_alloc();
+    }
   }
 };
 

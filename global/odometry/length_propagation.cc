@@ -57,7 +57,6 @@ LengthPropagation::LengthPropagation(
     const size_t count = std::min(kNumEdgesAtATime, num_edges - begin);
     ParallelFor(options.num_threads, count, [&](size_t i) {
       by_edge[i] = ObserveEdge(graph.edges[begin + i], correspondences);
-      for (Observation& observation : by_edge[i]) observation.edge = begin + i;
     });
     for (size_t i = 0; i < count; ++i) {
       observations_.insert(observations_.end(), by_edge[i].begin(),
@@ -109,9 +108,8 @@ std::vector<LengthPropagation::Observation> LengthPropagation::ObserveEdge(
     const double squared = sin_parallax * sin_parallax;
     const float weight = squared / (squared + kSaturation * kSaturation);
     candidates.push_back(
-        {{begin1 + int(match.point2D_idx1), 0, float(std::log(depth1)), weight},
-         {begin2 + int(match.point2D_idx2), 0, float(std::log(depth2)),
-          weight}});
+        {{begin1 + int(match.point2D_idx1), float(std::log(depth1)), weight},
+         {begin2 + int(match.point2D_idx2), float(std::log(depth2)), weight}});
   }
   std::stable_sort(candidates.begin(), candidates.end(),
                    [](const Candidate& a, const Candidate& b) {
@@ -137,8 +135,10 @@ void LengthPropagation::LinkKeypoints(int num_keypoints) {
   for (int k = 0; k < num_keypoints; ++k) link_begin_[k + 1] += link_begin_[k];
   links_.resize(observations_.size());
   std::vector<size_t> next(link_begin_.begin(), link_begin_.end() - 1);
-  for (size_t o = 0; o < observations_.size(); ++o) {
-    links_[next[observations_[o].keypoint]++] = o;
+  for (int e = 0; e + 1 < static_cast<int>(edge_begin_.size()); ++e) {
+    for (size_t o = edge_begin_[e]; o < edge_begin_[e + 1]; ++o) {
+      links_[next[observations_[o].keypoint]++] = {static_cast<int>(o), e};
+    }
   }
   num_known_.assign(num_keypoints, 0);
   num_known_at_depth_.assign(num_keypoints, 0);
@@ -181,10 +181,11 @@ void LengthPropagation::Seed(int edge) {
 double LengthPropagation::SeedDepth() {
   if (!seed_log_depth_.has_value()) {
     std::vector<WeightedValue> log_depths;
-    for (const Observation& observation : observations_) {
-      if (!is_known_[observation.edge]) continue;
-      log_depths.push_back(
-          {log_lengths_[observation.edge] + observation.offset, 1.0});
+    for (size_t e = 0; e < graph_.edges.size(); ++e) {
+      if (!is_known_[e]) continue;
+      for (size_t o = edge_begin_[e]; o < edge_begin_[e + 1]; ++o) {
+        log_depths.push_back({log_lengths_[e] + observations_[o].offset, 1.0});
+      }
     }
     seed_log_depth_ = log_depths.empty() ? 0.0 : WeightedMedian(&log_depths);
   }
@@ -228,12 +229,13 @@ void LengthPropagation::PredictDepths(int keypoint) {
   std::vector<Entry> entries;
   double sum = 0.0;
   for (size_t k = link_begin_[keypoint]; k < link_begin_[keypoint + 1]; ++k) {
-    const Observation& link = observations_[links_[k]];
-    predicted_[links_[k]] = kInfinity;
+    const Link& link = links_[k];
+    predicted_[link.observation] = kInfinity;
     if (!is_known_[link.edge]) continue;
-    entries.push_back(
-        {log_lengths_[link.edge] + link.offset, link.weight, links_[k]});
-    sum += link.weight;
+    const Observation& observation = observations_[link.observation];
+    entries.push_back({log_lengths_[link.edge] + observation.offset,
+                       observation.weight, link.observation});
+    sum += observation.weight;
   }
   if (entries.size() < 2) return;
   std::sort(entries.begin(), entries.end(),

@@ -54,9 +54,14 @@ class LengthPropagation {
   // Small, since each edge has hundreds.
   struct Observation {
     int keypoint = 0;
-    int edge = 0;
     float offset = 0.0f;
     float weight = 0.0f;
+  };
+  // An observation of a keypoint. Its edge stands here since what is asked of
+  // most is only whether that is known.
+  struct Link {
+    int observation = 0;
+    int edge = 0;
   };
   // The units whose scale relative to the edge's own is determined by the
   // keypoints that they share with the edge.
@@ -79,8 +84,8 @@ class LengthPropagation {
   // By edge; those of one edge follow each other.
   std::vector<Observation> observations_;
   std::vector<size_t> edge_begin_;
-  // Observations by keypoint.
-  std::vector<int> links_;
+  // By keypoint.
+  std::vector<Link> links_;
   std::vector<size_t> link_begin_;
 
   std::vector<double> log_lengths_;

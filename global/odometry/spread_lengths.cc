@@ -23,7 +23,7 @@ void LengthPropagation::Spread(int min_num_shared) {
       has_depth[keypoint] = true;
       for (size_t k = link_begin_[keypoint]; k < link_begin_[keypoint + 1];
            ++k) {
-        const int other = observations_[links_[k]].edge;
+        const int other = links_[k].edge;
         if (is_known_[other]) continue;
         if (++num_shared[other] < min_num_shared || has_grown[other]) continue;
         has_grown[other] = true;
@@ -67,9 +67,11 @@ double LengthPropagation::StartingDepth(int keypoint) {
   }
   std::vector<WeightedValue> values;
   for (size_t k = link_begin_[keypoint]; k < link_begin_[keypoint + 1]; ++k) {
-    const Observation& link = observations_[links_[k]];
+    const Link& link = links_[k];
     if (!is_known_[link.edge]) continue;
-    values.push_back({log_lengths_[link.edge] + link.offset, link.weight});
+    const Observation& observation = observations_[link.observation];
+    values.push_back(
+        {log_lengths_[link.edge] + observation.offset, observation.weight});
   }
   num_known_at_depth_[keypoint] = num_known_[keypoint];
   log_depths_[keypoint] = WeightedMedian(&values);
@@ -106,12 +108,13 @@ std::vector<int> LengthPropagation::FindUnitsOfKnownSize(
     std::map<int, std::vector<WeightedValue>> of_keypoint;
     for (size_t k = link_begin_[own.keypoint];
          k < link_begin_[own.keypoint + 1]; ++k) {
-      const Observation& link = observations_[links_[k]];
+      const Link& link = links_[k];
       if (!is_known_[link.edge] || sets->Find(link.edge) == sets->Find(edge)) {
         continue;
       }
+      const Observation& observation = observations_[link.observation];
       of_keypoint[sets->Find(link.edge)].push_back(
-          {log_lengths_[link.edge] + link.offset, link.weight});
+          {log_lengths_[link.edge] + observation.offset, observation.weight});
     }
     for (auto& [unit, values] : of_keypoint) {
       depths[unit].push_back(

@@ -100,14 +100,10 @@ double Iterate(const RotationAveragingOptions& options, const Loss& loss,
   return changes.rowwise().norm().mean();
 }
 
-void StartFromSdp(const RotationAveragingOptions& options,
-                  const std::vector<RotationEdge>& edges, Rotations* rotations,
+void StartFromSdp(const std::vector<RotationEdge>& edges, Rotations* rotations,
                   GlobalRotations* result) {
-  RotationSdpOptions sdp_options;
-  sdp_options.min_rank = options.min_rank;
-  sdp_options.max_rank = options.max_rank;
   const RotationSdpSolution solution =
-      SolveRotationSdp(sdp_options, edges, *rotations);
+      SolveRotationSdp(RotationSdpOptions(), edges, *rotations);
   result->sdp_rank = solution.rank;
   // The relaxation uses plain squares: wrong edges may have distorted the
   // solution.
@@ -213,9 +209,6 @@ void RunIterations(const RotationAveragingOptions& options,
 
 bool RotationAveragingOptions::IsValid(std::string* error) const {
   return OptionChecker(error)
-      .AtLeast(3, "min_rank", min_rank)
-      .Require(max_rank >= min_rank && max_rank <= 12, "max_rank", max_rank,
-               "must be from min_rank to 12")
       .Positive({{"loss_scale_deg", loss_scale_deg}})
       .AllHold();
 }
@@ -230,7 +223,7 @@ GlobalRotations EstimateGlobalRotations(const RotationAveragingOptions& options,
       !PropagateRotationsOverTree(edges, num_nodes, &rotations)) {
     return result;
   }
-  if (options.use_sdp_start) StartFromSdp(options, edges, &rotations, &result);
+  if (options.use_sdp_start) StartFromSdp(edges, &rotations, &result);
 
   std::vector<std::pair<int, int>> node_pairs;
   for (const RotationEdge& edge : edges) {

@@ -15,10 +15,6 @@ struct RotationAveragingOptions {
   // instead of the maximum spanning tree alone. Off: on 28 sets, up to 60 % of
   // wrong rotations without sensors among them, it changed no model.
   bool use_sdp_start = false;
-  // Rank at which the block coordinate descent starts; the staircase adds one
-  // until the certificate holds or max_rank is reached.
-  int min_rank = 3;
-  int max_rank = 6;
   // Where the robust loss takes over, degrees; never below three sigmas.
   double loss_scale_deg = 2.0;
 

@@ -13,6 +13,9 @@
 namespace adasfm {
 namespace {
 
+// Of matrices that are rotations.
+constexpr int kMinRank = 3;
+
 // The nearest matrix with orthonormal rows.
 RotationBlock PolarFactor(const RotationBlock& matrix) {
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(
@@ -151,7 +154,7 @@ RotationSdpSolution SolveRotationSdp(
   const RotationSdpProblem problem(edges, start.size());
   std::vector<RotationBlock> blocks;
   for (const Eigen::Matrix3d& rotation : start) {
-    RotationBlock block = RotationBlock::Zero(3, options.min_rank);
+    RotationBlock block = RotationBlock::Zero(3, kMinRank);
     block.leftCols<3>() = rotation;
     blocks.push_back(block);
   }

@@ -15,7 +15,7 @@ struct RotationEdge {
 };
 
 struct RotationSdpOptions {
-  int min_rank = 3;
+  // Where the staircase ends without a certificate. It begins at 3.
   int max_rank = 6;
   int max_num_sweeps = 100;
   double tolerance = 1e-6;

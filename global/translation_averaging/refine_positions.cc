@@ -5,8 +5,7 @@
 #include <cmath>
 
 #include "core/median.h"
-#include "core/sparse/block_matrix.h"
-#include "core/sparse/ordered_cholesky.h"
+#include "global/view_graph/node_equations.h"
 
 namespace adasfm {
 namespace {
@@ -46,64 +45,25 @@ EdgeTerm ComputeTerm(const PositionEdge& edge,
   return term;
 }
 
-// The normal equations of all centres but the first.
-class RefinementSystem {
- public:
-  RefinementSystem(const std::vector<PositionEdge>& edges, int num_nodes) {
-    for (int i = 1; i < num_nodes; ++i) matrix_.AddBlock(3);
-    for (const PositionEdge& edge : edges) {
-      if (edge.i > 0 && edge.j > 0) matrix_.AddPair(edge.i - 1, edge.j - 1);
-    }
-    block_of_ = matrix_.Reorder();
-    matrix_.Allocate();
-    factorization_.analyzePattern(matrix_.Matrix());
-  }
-
-  void Clear() {
-    matrix_.Matrix().coeffs().setZero();
-    right_side_.setZero(matrix_.NumColumns());
-  }
-
-  void Add(const PositionEdge& edge, const EdgeTerm& term) {
-    const Eigen::Vector3d flow = term.information * term.target;
-    if (edge.i > 0) AddNode(edge.i, term.information, -flow);
-    if (edge.j > 0) AddNode(edge.j, term.information, flow);
-    if (edge.i > 0 && edge.j > 0) {
-      const auto [col, row] =
-          std::minmax(block_of_[edge.i - 1], block_of_[edge.j - 1]);
-      matrix_.Add(row, col, -term.information);
-    }
-  }
-
-  // Sets all centres; false where the equations are singular.
-  bool Solve(Vectors* centers) {
-    factorization_.factorize(matrix_.Matrix());
-    if (factorization_.info() != Eigen::Success) return false;
-    const Eigen::VectorXd solution = factorization_.solve(right_side_);
-    if (!solution.allFinite()) return false;
-    centers->resize(block_of_.size() + 1, 3);
-    centers->row(0).setZero();
-    for (size_t k = 0; k < block_of_.size(); ++k) {
-      centers->row(k + 1) = solution.segment<3>(3 * block_of_[k]).transpose();
-    }
-    return true;
-  }
-
- private:
-  void AddNode(int node, const Eigen::Matrix3d& information,
-               const Eigen::Vector3d& flow) {
-    const int block = block_of_[node - 1];
-    matrix_.Add(block, block, information);
-    right_side_.segment<3>(3 * block) += flow;
-  }
-
-  BlockMatrix matrix_;
-  std::vector<int> block_of_;  // Of node k + 1.
-  Eigen::VectorXd right_side_;
-  OrderedCholesky factorization_;
-};
-
 }  // namespace
+
+std::vector<std::pair<int, int>> NodePairs(
+    const std::vector<PositionEdge>& edges) {
+  std::vector<std::pair<int, int>> pairs;
+  for (const PositionEdge& edge : edges) pairs.emplace_back(edge.i, edge.j);
+  return pairs;
+}
+
+double MeanRelativeMovement(const std::vector<PositionEdge>& edges,
+                            const Vectors& before, const Vectors& after) {
+  double sum = 0.0;
+  for (const PositionEdge& edge : edges) {
+    sum += (after.row(edge.j) - after.row(edge.i) - before.row(edge.j) +
+            before.row(edge.i))
+               .norm();
+  }
+  return sum / edges.size();
+}
 
 bool RefinePositions(const std::vector<PositionEdge>& edges, Vectors* centers,
                      GlobalPositions* result) {
@@ -117,22 +77,23 @@ bool RefinePositions(const std::vector<PositionEdge>& edges, Vectors* centers,
   if (!(unit > 0.0)) return false;
 
   constexpr int kMaxNumIterations = 100;
-  RefinementSystem system(edges, num_nodes);
+  // Mean relative movement of the ends of an edge, in median edge lengths.
+  constexpr double kMaxChange = 2e-5;
+  NodeEquations<3> equations(num_nodes, NodePairs(edges));
   for (int k = 0; k < kMaxNumIterations; ++k) {
-    system.Clear();
+    equations.Clear();
     for (const PositionEdge& edge : edges) {
       const Eigen::Vector3d difference =
           (centers->row(edge.j) - centers->row(edge.i)).transpose();
-      system.Add(edge, ComputeTerm(edge, difference, 0.02 * unit));
+      const EdgeTerm term = ComputeTerm(edge, difference, 0.02 * unit);
+      equations.Add(edge.i, edge.j, term.information, term.target);
     }
     Vectors next;
-    if (!system.Solve(&next)) return false;
-    const Eigen::RowVector3d origin = centers->row(0);
-    result->last_change =
-        (next - (centers->rowwise() - origin)).rowwise().norm().mean() / unit;
+    if (!equations.Solve(0.0, &next)) return false;
+    result->last_change = MeanRelativeMovement(edges, *centers, next) / unit;
     *centers = next;
     ++result->num_iterations;
-    if (result->last_change < kPositionConvergenceRatio) return true;
+    if (result->last_change < kMaxChange) return true;
   }
   return false;
 }

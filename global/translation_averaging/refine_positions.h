@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <utility>
 #include <vector>
 
 #include "global/translation_averaging/translation_averaging.h"
@@ -9,9 +10,6 @@
 
 namespace adasfm {
 
-// Iterations stop when the mean movement of the centres falls below this share
-// of the median edge length.
-inline constexpr double kPositionConvergenceRatio = 1e-4;
 // Sigmas of directions and of relative lengths below this are taken as this.
 inline constexpr double kMinPositionSigmaRatio = 2e-3;
 
@@ -32,6 +30,16 @@ struct PositionEdge {
   // The length serves the start only; the refinement treats it as free.
   bool is_redundant = false;
 };
+
+std::vector<std::pair<int, int>> NodePairs(
+    const std::vector<PositionEdge>& edges);
+
+// How far the ends of an edge move against each other, on the average. The
+// centres themselves tell no convergence: a long drive bends as a whole long
+// after neighbours stand still.
+double MeanRelativeMovement(const std::vector<PositionEdge>& edges,
+                            const LaplacianSolver::Vectors& before,
+                            const LaplacianSolver::Vectors& after);
 
 // Moves centres to the robust optimum of
 //   | across(C_j - C_i) |^2 / (length direction_sigma)^2

@@ -22,6 +22,12 @@ constexpr double kMinResidual = 1e-3;
 // neighbouring edges share points, so their errors are not independent.
 constexpr double kMinSoftLengthSigma = 0.05;
 
+// The reweighted iterations end at this mean relative movement of the ends of
+// an edge, in median edge lengths; with the second number where the refinement,
+// which moves the centres further, follows.
+constexpr double kMaxChange = 3e-5;
+constexpr double kMaxChangeBeforeRefinement = 3e-4;
+
 using Vectors = LaplacianSolver::Vectors;
 
 // Where sensors connect both ends of an edge, its length from shared points
@@ -104,7 +110,7 @@ class PositionSolver {
  public:
   PositionSolver(const TranslationAveragingOptions& options,
                  const std::vector<PositionEdge>& edges, int num_nodes)
-      : options_(options), edges_(edges), solver_(num_nodes, Pairs(edges)) {
+      : options_(options), edges_(edges), solver_(num_nodes, NodePairs(edges)) {
     std::vector<double> lengths;
     for (const PositionEdge& edge : edges) {
       if (edge.kind != PositionEdge::kFree) lengths.push_back(edge.length);
@@ -113,23 +119,22 @@ class PositionSolver {
     if (!(unit_ > 0.0)) unit_ = 1.0;
   }
 
-  // IRLS until the centres converge, with a tenfold bound where the refinement,
-  // which moves the centres further, follows. hold_soft: lengths of soft edges
-  // are fixed too. Adds the number of iterations to the result.
+  // IRLS until the centres converge. hold_soft: lengths of soft edges are fixed
+  // too. Adds the number of iterations to the result.
   bool Run(bool hold_soft, Vectors* centers, GlobalPositions* result) {
-    const double convergence_ratio =
-        kPositionConvergenceRatio * (options_.refine ? 10.0 : 1.0);
+    const double max_change =
+        options_.refine ? kMaxChangeBeforeRefinement : kMaxChange;
     result->converged = false;
     for (int k = 0; k < options_.max_num_iterations; ++k) {
       Vectors next;
       if (!Iterate(hold_soft, *centers, &next)) return false;
       result->last_change =
           centers->rows() == next.rows()
-              ? (next - *centers).rowwise().norm().mean() / unit_
+              ? MeanRelativeMovement(edges_, *centers, next) / unit_
               : std::numeric_limits<double>::infinity();
       *centers = next;
       ++result->num_iterations;
-      if (result->last_change < convergence_ratio) {
+      if (result->last_change < max_change) {
         result->converged = true;
         break;
       }
@@ -138,13 +143,6 @@ class PositionSolver {
   }
 
  private:
-  static std::vector<std::pair<int, int>> Pairs(
-      const std::vector<PositionEdge>& edges) {
-    std::vector<std::pair<int, int>> pairs;
-    for (const PositionEdge& edge : edges) pairs.emplace_back(edge.i, edge.j);
-    return pairs;
-  }
-
   // One reweighted solve from centers (none yet: the lengths alone).
   bool Iterate(bool hold_soft, const Vectors& centers, Vectors* next) {
     std::vector<double> weights(edges_.size());

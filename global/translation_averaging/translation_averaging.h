@@ -30,7 +30,8 @@ struct GlobalPositions {
   bool metric = false;
   std::map<image_t, Eigen::Vector3d> centers;
   int num_iterations = 0;
-  // Mean movement in the last iteration over the median edge length.
+  // Mean movement of the ends of an edge against each other in the last
+  // iteration, over the median edge length.
   double last_change = 0.0;
 };
 
