@@ -1,9 +1,10 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSD-3-Clause
-"""What coarse poses as candidates beside P3P buy where matches are poor.
+"""What coarse poses as candidates beside P3P buy: time, and where matches are
+poor.
 
-Maps worlds with few or wrong matches in small parts, with and without
-`--AdaSfmMapper.use_global_candidate`, on the same coarse model. Writes
+Maps a clean world and worlds with few or wrong matches in small parts, with and
+without `--AdaSfmMapper.use_global_candidate`, on the same coarse model. Writes
 docs/results/candidates.md.
 """
 
@@ -11,6 +12,7 @@ import argparse
 import functools
 import os
 import shutil
+import statistics
 import sys
 
 from benchmarking.figures import (add_arguments, measure, run_table,
@@ -23,6 +25,7 @@ NUM_IMAGES = 300
 SEEDS = range(1, 6)
 # Name: (arguments of adasfm_synthesizer, whether its logs are imported).
 WORLDS = {
+    'clean': ([], True),
     '`--outlier_ratio 0.8 --num_keypoints 400`, no logs': (
         ['--outlier_ratio', '0.8', '--num_keypoints', '400'], False),
     '`--num_keypoints 60 --num_neighbors 3 --spacing 2`, no logs': (
@@ -51,11 +54,12 @@ def run_world(name, seed, args):
     make_coarse_model(folder, folder, args, has_logs, {})
     for variant, options in VARIANTS.items():
       output = os.path.join(folder, variant)
-      run([args.colmap, 'adasfm_mapper', '--database_path',
-           os.path.join(folder, 'database.db'), '--input_path',
-           os.path.join(folder, 'global', '0'), '--output_path', output] +
-          SMALL_PARTS + options, log_path)
+      usage = run([args.colmap, 'adasfm_mapper', '--database_path',
+                   os.path.join(folder, 'database.db'), '--input_path',
+                   os.path.join(folder, 'global', '0'), '--output_path',
+                   output] + SMALL_PARTS + options, log_path)
       record[variant] = measure(output, folder, args, log_path)
+      record[variant + '_cpu_s'] = usage.cpu_seconds
   except Failed as error:
     record['error'] = str(error)
   if not args.keep:
@@ -71,22 +75,31 @@ def count_better(records):
                      sum(b < 0.98 * a for a, b in pairs))
 
 
+def cpu_times(records):
+  """Median CPU seconds of the mapper with and without candidates."""
+  return ', '.join(
+      '%.1f' % statistics.median(times) if times else '-'
+      for times in ([r[variant + '_cpu_s'] for r in records
+                     if variant + '_cpu_s' in r] for variant in VARIANTS))
+
+
 def report(records, args):
   del args
   lines = ['Written by `scripts/benchmark/candidate_tables.py`: worlds of %d '
            'images, seeds %d to %d, `%s`. Fewest images of a model; RMSE of '
            'camera centres after a similarity; seeds in which one errs by over '
-           '2 %% less than the other.' % (
+           '2 %% less than the other; median CPU seconds of the mapper.' % (
                NUM_IMAGES, SEEDS[0], SEEDS[-1], ' '.join(SMALL_PARTS)), '',
            '| world | candidates: images | median m | worst m | none: images | '
-           'median m | worst m | better with, without |',
-           '|---' + '|---:' * 6 + '|---|']
+           'median m | worst m | better with, without | CPU s with, without |',
+           '|---' + '|---:' * 6 + '|---|---|']
   for name in WORLDS:
     mine = [r for r in records if r['world'] == name]
     row = [name]
     for variant in VARIANTS:
       row += summarise(mine, variant)
-    lines.append('| %s |' % ' | '.join(row + [count_better(mine)]))
+    lines.append('| %s |' % ' | '.join(row + [count_better(mine),
+                                              cpu_times(mine)]))
   lines += ['\n%(world)s, seed %(seed)d: %(error)s' % r for r in records
             if 'error' in r]
   return '\n'.join(lines) + '\n'

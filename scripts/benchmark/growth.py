@@ -6,7 +6,8 @@ Makes a clean world of `adasfm_synthesizer` for each size, runs the three
 commands on its database, compares both models with the truth, and writes the
 table of docs/results/growth.md and docs/images/growth.svg. With --limits the
 table has the limit of those sizes, too: triangulation from the true poses and
-one adjustment to convergence. Needs matplotlib.
+one adjustment to convergence. A machine may be slower for minutes: small sizes
+run before and after each large one. Needs matplotlib.
 """
 
 import argparse
@@ -15,6 +16,7 @@ import json
 import math
 import os
 import shutil
+import statistics
 import sys
 
 import matplotlib
@@ -27,6 +29,8 @@ from benchmarking.process import run
 
 STEPS = {'import': 'import', 'global': '`adasfm_global`',
          'mapper': '`adasfm_mapper`'}
+# Sizes up to this run several times.
+MAX_SMALL_SIZE = 1000
 # Exponents are computed from this size on to the largest size.
 FIRST_OF_EXPONENTS = 1000
 
@@ -64,6 +68,16 @@ def run_size(num_images, with_limit, args):
   if not args.keep:
     shutil.rmtree(folder)
   return record
+
+
+def merge_runs(runs):
+  """One record of the runs of a size: mean CPU times, largest memory."""
+  merged = dict(runs[0], all_cpu_s=[cpu_seconds(run) for run in runs])
+  for step in STEPS:
+    merged[step] = {
+        'cpu_s': statistics.mean(run[step]['cpu_s'] for run in runs),
+        'peak_mb': max(run[step]['peak_mb'] for run in runs)}
+  return merged
 
 
 def cpu_seconds(record):
@@ -128,7 +142,9 @@ def error_cell(model):
 
 
 def report(records, args):
-  records = sorted(records, key=lambda r: r['num_images'])
+  sizes = sorted({r['num_images'] for r in records})
+  records = [merge_runs([r for r in records if r['num_images'] == size])
+             for size in sizes]
   with_limit = any('limit' in r for r in records)
   heads = ['images', 'verified pairs', *STEPS.values(), 'together',
            'coarse error', 'error']
@@ -152,6 +168,12 @@ def report(records, args):
               '{:.2f} of memory, {:.2f} of the number of pairs.'.format(
                   FIRST_OF_EXPONENTS, records[-1]['num_images'], time, memory,
                   exponent(records, lambda r: r['num_pairs']))]
+  repeated = ['{:,} images {} runs of {:.1f} to {:.1f} s'.format(
+      r['num_images'], len(r['all_cpu_s']), min(r['all_cpu_s']),
+      max(r['all_cpu_s'])) for r in records if len(r['all_cpu_s']) > 1]
+  if repeated:
+    lines += ['', 'CPU times of small sizes are means of runs between those of '
+              'large ones: %s.' % ', '.join(repeated)]
   draw(records, args.plot_path)
   return '\n'.join(lines) + '\n'
 
@@ -176,13 +198,29 @@ def list_sizes(text):
   return [int(size) for size in text.split(',') if size]
 
 
+def order_runs(sizes):
+  """Sizes in the order of their runs."""
+  small = [size for size in sizes if size <= MAX_SMALL_SIZE]
+  order = list(small)
+  for size in sizes:
+    if size > MAX_SMALL_SIZE:
+      order += [size] + small
+  return order
+
+
 def main():
   args = parse_arguments()
   limits = list_sizes(args.limits)
-  run_table({'%d images' % size:
-             ([size in limits],
-              functools.partial(run_size, size, size in limits, args))
-             for size in list_sizes(args.sizes)}, report, args)
+  rows = {}
+  counts = {}
+  for size in order_runs(list_sizes(args.sizes)):
+    counts[size] = counts.get(size, 0) + 1
+    key = '%d images' % size
+    if counts[size] > 1:
+      key += ', run %d' % counts[size]
+    rows[key] = ([size in limits],
+                 functools.partial(run_size, size, size in limits, args))
+  run_table(rows, report, args)
 
 
 if __name__ == '__main__':
