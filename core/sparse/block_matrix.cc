@@ -4,8 +4,8 @@
 #include <algorithm>
 #include <utility>
 
-#include "core/huge_pages.h"
 #include "core/sparse/block_ordering.h"
+#include "core/sparse/huge_pages.h"
 
 namespace adasfm {
 

@@ -5,7 +5,7 @@
 #include <Eigen/SparseCore>
 #include <new>
 
-#include "core/huge_pages.h"
+#include "core/sparse/huge_pages.h"
 
 namespace adasfm {
 
@@ -41,6 +41,9 @@ class OrderedCholesky
     Base::factorize(matrix);
     CheckMemory();
   }
+
+  // Eigen's would call its own two.
+  void compute(const Eigen::SparseMatrix<double>& matrix) = delete;
 
   // After analyzePattern, by its count: the floating-point operations of a
   // factorisation, and the entries of the factor.

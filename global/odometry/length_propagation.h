@@ -57,8 +57,8 @@ class LengthPropagation {
     float offset = 0.0f;
     float weight = 0.0f;
   };
-  // An observation of a keypoint. Its edge stands here since what is asked of
-  // most is only whether that is known.
+  // An observation of a keypoint, with its edge: Spread() reads the edges of
+  // all links, and no observation.
   struct Link {
     int observation = 0;
     int edge = 0;

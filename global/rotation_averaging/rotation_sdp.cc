@@ -13,9 +13,6 @@
 namespace adasfm {
 namespace {
 
-// Of matrices that are rotations.
-constexpr int kMinRank = 3;
-
 // The nearest matrix with orthonormal rows.
 RotationBlock PolarFactor(const RotationBlock& matrix) {
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(
@@ -152,12 +149,7 @@ RotationSdpSolution SolveRotationSdp(
   solution.rotations = start;
   if (start.empty() || edges.empty()) return solution;
   const RotationSdpProblem problem(edges, start.size());
-  std::vector<RotationBlock> blocks;
-  for (const Eigen::Matrix3d& rotation : start) {
-    RotationBlock block = RotationBlock::Zero(3, kMinRank);
-    block.leftCols<3>() = rotation;
-    blocks.push_back(block);
-  }
+  std::vector<RotationBlock> blocks(start.begin(), start.end());
   const double negligible = NegligibleCost(edges);
   Eigenpair smallest;
   while (true) {

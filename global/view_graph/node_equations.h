@@ -3,6 +3,7 @@
 
 #include <Eigen/Core>
 #include <algorithm>
+#include <stdexcept>
 #include <utility>
 #include <vector>
 
@@ -21,10 +22,13 @@ class NodeEquations {
   using Vectors = Eigen::Matrix<double, Eigen::Dynamic, 3>;
   using Weight = Eigen::Matrix<double, kSize, kSize>;
 
-  // Edges (i, j) of nodes 0 ... num_nodes - 1.
+  // Edges (i, j) of nodes 0 ... num_nodes - 1; throws where one is not.
   NodeEquations(int num_nodes, const std::vector<std::pair<int, int>>& edges) {
     for (int node = 1; node < num_nodes; ++node) matrix_.AddBlock(kSize);
     for (const auto& [i, j] : edges) {
+      if (i < 0 || j < 0 || i >= num_nodes || j >= num_nodes || i == j) {
+        throw std::invalid_argument("NodeEquations: edge out of range");
+      }
       if (i > 0 && j > 0) matrix_.AddPair(i - 1, j - 1);
     }
     if (num_nodes < 2) return;

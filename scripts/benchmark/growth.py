@@ -172,8 +172,8 @@ def report(records, args):
       r['num_images'], len(r['all_cpu_s']), min(r['all_cpu_s']),
       max(r['all_cpu_s'])) for r in records if len(r['all_cpu_s']) > 1]
   if repeated:
-    lines += ['', 'CPU times of small sizes are means of runs between those of '
-              'large ones: %s.' % ', '.join(repeated)]
+    lines += ['', 'CPU times of small sizes are means of runs before and after '
+              'those of large ones: %s.' % ', '.join(repeated)]
   draw(records, args.plot_path)
   return '\n'.join(lines) + '\n'
 

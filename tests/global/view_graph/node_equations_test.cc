@@ -5,6 +5,7 @@
 
 #include <Eigen/Dense>
 #include <random>
+#include <stdexcept>
 
 #include "global/view_graph/laplacian_solver.h"
 
@@ -112,6 +113,13 @@ TEST(NodeEquations, RefuseNodesWithoutEdges) {
   ASSERT_TRUE(equations.Solve(1e-14, &nodes));
   EXPECT_LT((nodes.row(1) - Eigen::RowVector3d(1.0, 2.0, 3.0)).norm(), 1e-5);
   EXPECT_TRUE(nodes.row(2).isZero());
+}
+
+TEST(NodeEquations, RefuseEdgesThatJoinNoTwoNodes) {
+  for (const auto& edge :
+       {std::pair(0, 3), std::pair(-1, 1), std::pair(1, 1)}) {
+    EXPECT_THROW(NodeEquations<3>(3, {edge}), std::invalid_argument);
+  }
 }
 
 TEST(NodeEquations, OfOneNodeHaveNoUnknown) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "core/huge_pages.h"
+#include "core/sparse/huge_pages.h"
 
 #include <gtest/gtest.h>
 #include <sys/mman.h>
