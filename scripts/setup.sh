@@ -43,7 +43,8 @@ demo_packages=(
   # buffers for each core. Its serial build errs if two threads call it at once.
   libopenblas-openmp-dev
   # The project's dependencies.
-  libopencv-dev libyaml-cpp-dev nlohmann-json3-dev libzstd-dev)
+  libopencv-dev libyaml-cpp-dev nlohmann-json3-dev libzstd-dev
+  libgoogle-perftools-dev)
 more_packages=(
   ccache clang-format
   # ROS 1 bags, tests and benchmarks.
