@@ -36,8 +36,7 @@ constexpr double kBytesPerObservation = 100.0;
 // tie see common points anyway.
 struct SystemSize {
   explicit SystemSize(const Covisibility& covisibility)
-      : num_factor_blocks(
-            FindBlockOrdering(covisibility.Neighbors()).num_factor_blocks) {
+      : num_factor_blocks(BoundNumFactorBlocks(covisibility.Neighbors())) {
     for (const std::vector<int>& neighbors : covisibility.Neighbors()) {
       num_blocks += 1 + neighbors.size();
     }

@@ -12,7 +12,6 @@
 #include "colmap_ext/scene/georeference.h"
 #include "colmap_ext/scene/scene_bearings.h"
 #include "core/option_checker.h"
-#include "core/release_memory.h"
 
 namespace adasfm {
 namespace {
@@ -307,7 +306,6 @@ CoarseModel BuildCoarseModel(
   if (is_georeferenced) AddPositions(scene, input, &problem);
   const RoundTracks tracks = BuildRoundTracks(options, input, problem.images);
   input.matches.clear();  // The tracks have them.
-  ReleaseFreedMemory();
   model.num_tracks = tracks.all.size();
   model.num_keyframes = tracks.num_keyframes;
 

@@ -16,7 +16,6 @@
 #include "colmap_ext/scene/untied_parts.h"
 #include "core/option_checker.h"
 #include "core/prior_lengths.h"
-#include "core/release_memory.h"
 #include "core/so3.h"
 #include "core/stopwatch.h"
 #include "global/odometry/bridge_gaps.h"
@@ -215,7 +214,6 @@ class GlobalStage {
     MeasurePairAgreements(options_, scene_, correspondences_.bearings,
                           &result_);
     correspondences_.matches.clear();
-    ReleaseFreedMemory();
     RefineAllMatches();
     MeasureSizes();
     return std::move(result_);
@@ -260,7 +258,6 @@ class GlobalStage {
                             priors, scene_.frame_priors);
     result_.steps.insert(result_.steps.end(), result_.poses.steps.begin(),
                          result_.poses.steps.end());
-    ReleaseFreedMemory();
     const std::vector<CoarseComponent>& components = result_.poses.components;
     if (components.size() > 1 ||
         (!components.empty() && !components[0].metric)) {

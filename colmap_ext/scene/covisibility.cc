@@ -8,6 +8,8 @@
 namespace adasfm {
 namespace {
 
+constexpr int kNumNear = 64;  // Bits of near_.
+
 // Whether two sorted lists have a common entry.
 bool Intersect(const std::vector<int>& list1, const std::vector<int>& list2) {
   auto entry = list1.begin();
@@ -21,13 +23,11 @@ bool Intersect(const std::vector<int>& list1, const std::vector<int>& list2) {
 
 Covisibility::Covisibility(const std::set<image_t>& images,
                            const colmap::Reconstruction& reconstruction,
-                           int min_num_shared_points) {
-  for (const image_t image_id : images) {
-    index_of_.emplace(image_id, static_cast<int>(index_of_.size()));
-  }
+                           int min_num_shared_points)
+    : images_(images.begin(), images.end()) {
   neighbors_.resize(images.size());
   num_shared_.resize(images.size());
-  end_of_run_.resize(images.size());
+  near_.resize(images.size());
   std::vector<int> num_shared(images.size(), 0);
   for (const image_t image_id : images) {
     if (!reconstruction.ExistsImage(image_id)) continue;
@@ -64,12 +64,12 @@ void Covisibility::Filter(const Function& keep) {
     }
     neighbors.resize(num_kept);
     num_shared.resize(num_kept);
-    int end = static_cast<int>(index) + 1;
+    near_[index] = 0;
     for (const int other : neighbors) {
-      if (other != end) break;
-      ++end;
+      const int offset = other - static_cast<int>(index) - 1;
+      if (offset >= kNumNear) break;
+      near_[index] |= uint64_t{1} << offset;
     }
-    end_of_run_[index] = end;
   }
 }
 
@@ -95,15 +95,23 @@ void Covisibility::CutRedundant(int min_num_shared_points) {
   });
 }
 
+// Most scenes number their images one by one, or nearly so.
 int Covisibility::IndexOf(image_t image_id) const {
-  const auto found = index_of_.find(image_id);
-  return found == index_of_.end() ? -1 : found->second;
+  if (images_.empty() || image_id < images_.front()) return -1;
+  const size_t most =
+      std::min<size_t>(image_id - images_.front(), images_.size() - 1);
+  if (images_[most] == image_id) return static_cast<int>(most);
+  const auto found =
+      std::lower_bound(images_.begin(), images_.begin() + most, image_id);
+  return *found == image_id ? static_cast<int>(found - images_.begin()) : -1;
 }
 
 bool Covisibility::SharePoints(int index1, int index2) const {
   if (index1 == index2 || index1 < 0 || index2 < 0) return true;
   const auto [first, last] = std::minmax(index1, index2);
-  if (last < end_of_run_[first]) return true;
+  if (last - first <= kNumNear) {
+    return (near_[first] >> (last - first - 1)) & 1;
+  }
   const std::vector<int>& neighbors = neighbors_[first];
   return std::binary_search(neighbors.begin(), neighbors.end(), last);
 }

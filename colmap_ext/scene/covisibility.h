@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <cstdint>
 #include <set>
-#include <unordered_map>
 #include <vector>
 
 #include "colmap_ext/host/colmap.h"
@@ -37,17 +37,17 @@ class Covisibility {
   int IndexOf(image_t image_id) const;
   bool SharePoints(int index1, int index2) const;
   // Keeps the pairs for which keep(index1, index2, num_shared) is true, and
-  // finds the runs.
+  // marks those near each other.
   template <typename Function>
   void Filter(const Function& keep);
 
-  std::unordered_map<image_t, int> index_of_;
+  std::vector<image_t> images_;  // Sorted.
   std::vector<std::vector<int>> neighbors_;
   // Numbers of shared points, parallel to neighbors_.
   std::vector<std::vector<int>> num_shared_;
-  // All images from the next one up to this index share points with an image,
-  // as most of those in a track do: no search is needed.
-  std::vector<int> end_of_run_;
+  // Bit k of an image: the image k + 1 places later shares points with it. No
+  // search is needed for most images of a track.
+  std::vector<uint64_t> near_;
 };
 
 }  // namespace adasfm

@@ -14,7 +14,9 @@ namespace {
 
 // CHOLMOD's own nested dissection takes longer than both other methods, and
 // saves a twentieth of the factor of 30,000 images, an eighth of that of 4,000.
-constexpr int kMinNumBlocksToDissect = 2000;
+constexpr size_t kMinNumBlocksToDissect = 2000;
+constexpr int kNumFastMethods = 2;
+constexpr int kNumMethods = 3;
 
 using Pattern = Eigen::SparseMatrix<double>;
 
@@ -58,9 +60,11 @@ std::vector<int> Dissect(const Pattern& pattern) {
 class BlockAnalysis
     : public Eigen::CholmodSupernodalLLT<Eigen::SparseMatrix<double>> {
  public:
-  explicit BlockAnalysis(const Pattern& pattern) {
+  // Tries the first num_methods of minimum degree, METIS' and CHOLMOD's
+  // dissections.
+  BlockAnalysis(const Pattern& pattern, int num_methods) {
     cholmod().print = 0;
-    cholmod().nmethods = pattern.rows() < kMinNumBlocksToDissect ? 2 : 3;
+    cholmod().nmethods = num_methods;
     cholmod().method[0].ordering = CHOLMOD_AMD;
     cholmod().method[1].ordering = CHOLMOD_GIVEN;
     cholmod().method[2].ordering = CHOLMOD_NESDIS;
@@ -78,8 +82,10 @@ class BlockAnalysis
   const int* Order() const {
     return static_cast<const int*>(m_cholmodFactor->Perm);
   }
-  // Including the diagonal.
-  double NumFactorBlocks() { return cholmod().lnz; }
+  // Below the diagonal.
+  size_t NumFactorBlocks() {
+    return static_cast<size_t>(cholmod().lnz) - m_cholmodFactor->n;
+  }
 };
 
 }  // namespace
@@ -88,12 +94,20 @@ BlockOrdering FindBlockOrdering(
     const std::vector<std::vector<int>>& neighbors) {
   BlockOrdering ordering;
   if (neighbors.empty()) return ordering;
-  BlockAnalysis analysis(BuildPattern(neighbors));
+  BlockAnalysis analysis(BuildPattern(neighbors),
+                         neighbors.size() < kMinNumBlocksToDissect
+                             ? kNumFastMethods
+                             : kNumMethods);
   ordering.block_of_number.assign(analysis.Order(),
                                   analysis.Order() + neighbors.size());
-  ordering.num_factor_blocks =
-      static_cast<size_t>(analysis.NumFactorBlocks()) - neighbors.size();
+  ordering.num_factor_blocks = analysis.NumFactorBlocks();
   return ordering;
+}
+
+size_t BoundNumFactorBlocks(const std::vector<std::vector<int>>& neighbors) {
+  if (neighbors.empty()) return 0;
+  return BlockAnalysis(BuildPattern(neighbors), kNumFastMethods)
+      .NumFactorBlocks();
 }
 
 }  // namespace adasfm

@@ -78,6 +78,16 @@ Neighbors MakeLanes(int num_lanes, int lane_length) {
   return lanes;
 }
 
+TEST(BlockOrderingTest, TheBoundIsNearTheFactor) {
+  EXPECT_EQ(BoundNumFactorBlocks({}), 0);
+  for (const int num_lanes : {20, 120}) {  // 400 and 2,400 images.
+    const Neighbors lanes = MakeLanes(num_lanes, 20);
+    const size_t exact = NumFactorBlocks(lanes);
+    EXPECT_GE(BoundNumFactorBlocks(lanes), exact);
+    EXPECT_LE(BoundNumFactorBlocks(lanes), 1.25 * exact);
+  }
+}
+
 // Orderings must not depend on rand(), which METIS uses and COLMAP's threads
 // seed.
 TEST(BlockOrderingTest, OrdersSideBySideAreThoseOfOneThread) {
