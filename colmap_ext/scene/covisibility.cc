@@ -95,7 +95,8 @@ void Covisibility::CutRedundant(int min_num_shared_points) {
   });
 }
 
-// Most scenes number their images one by one, or nearly so.
+// Where images are numbered one by one, as mostly, the difference of the ids is
+// the index; elsewhere the index is smaller.
 int Covisibility::IndexOf(image_t image_id) const {
   if (images_.empty() || image_id < images_.front()) return -1;
   const size_t most =

@@ -60,8 +60,7 @@ std::vector<int> Dissect(const Pattern& pattern) {
 class BlockAnalysis
     : public Eigen::CholmodSupernodalLLT<Eigen::SparseMatrix<double>> {
  public:
-  // Tries the first num_methods of minimum degree, METIS' and CHOLMOD's
-  // dissections.
+  // Tries the first num_methods: minimum degree, METIS' dissection, CHOLMOD's.
   BlockAnalysis(const Pattern& pattern, int num_methods) {
     cholmod().print = 0;
     cholmod().nmethods = num_methods;

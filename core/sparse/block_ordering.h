@@ -24,9 +24,8 @@ struct BlockOrdering {
 // n - 1 blocks, a complete graph n (n - 1) / 2. Throws where memory is short.
 BlockOrdering FindBlockOrdering(const std::vector<std::vector<int>>& neighbors);
 
-// At least num_factor_blocks of FindBlockOrdering: a twentieth more on 30,000
-// images, an eighth on 4,000. Leaves out CHOLMOD's dissection, which takes most
-// of the time.
+// At least num_factor_blocks of FindBlockOrdering: without CHOLMOD's own
+// dissection, the slowest method.
 size_t BoundNumFactorBlocks(const std::vector<std::vector<int>>& neighbors);
 
 }  // namespace adasfm

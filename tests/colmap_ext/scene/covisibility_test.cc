@@ -41,6 +41,7 @@ class CovisibilityTest : public testing::TestWithParam<int> {
   CovisibilityTest() {
     BundleWorldOptions options;
     options.num_images = 120;
+    options.spacing_m = 0.1;  // Long tracks.
     options.seed = GetParam();
     world_ = BuildBundleWorld(options);
     counts_ = CountSharedPoints(world_);
@@ -122,23 +123,12 @@ TEST_P(CovisibilityTest, CutsTracksWhereImagesShareFewPoints) {
   };
   int num_cut = 0;
   for (const auto& [id, point] : world_.Points3D()) {
-    std::vector<image_t> images = ImagesOf(point);
-    const std::vector<int> group_of_all = covisibility.CutTrack(images);
-    std::vector<int> group_of;
-    for (size_t i = 0; i < images.size(); ++i) {
-      if (images_.count(images[i])) {
-        group_of.push_back(group_of_all[i]);
-      } else {
-        // Not among those of the constructor: fits all groups.
-        EXPECT_EQ(group_of_all[i], 0);
-      }
+    std::vector<image_t> images;
+    for (const image_t image_id : ImagesOf(point)) {
+      if (images_.count(image_id)) images.push_back(image_id);
     }
-    images.erase(std::remove_if(images.begin(), images.end(),
-                                [&](image_t image_id) {
-                                  return images_.count(image_id) == 0;
-                                }),
-                 images.end());
     if (images.empty()) continue;
+    const std::vector<int> group_of = covisibility.CutTrack(images);
     ASSERT_EQ(group_of.size(), images.size());
     for (size_t i = 0; i < images.size(); ++i) {
       EXPECT_TRUE(fits(images[i], group_of[i], images, group_of));
@@ -149,6 +139,27 @@ TEST_P(CovisibilityTest, CutsTracksWhereImagesShareFewPoints) {
     num_cut += *std::max_element(group_of.begin(), group_of.end()) > 0;
   }
   EXPECT_GT(num_cut, 0);
+}
+
+// Images up to 64 places apart are looked up in another way.
+TEST_P(CovisibilityTest, TheWorldHasTracksOfMoreThan64Images) {
+  size_t longest = 0;
+  for (const auto& [id, point] : world_.Points3D()) {
+    size_t length = 0;
+    for (const image_t image_id : ImagesOf(point)) {
+      length += images_.count(image_id);
+    }
+    longest = std::max(longest, length);
+  }
+  EXPECT_GT(longest, 64);
+}
+
+TEST_P(CovisibilityTest, ImagesOfNoConcernFitAllGroups) {
+  const Covisibility covisibility(images_, world_);
+  ASSERT_EQ(images_.count(3), 0);
+  const image_t last = *images_.rbegin();
+  EXPECT_EQ(covisibility.CutTrack({0, 3, last + 1, last, last + 1000}),
+            std::vector<int>(5, 0));
 }
 
 INSTANTIATE_TEST_SUITE_P(Seeds, CovisibilityTest, testing::Values(1, 2, 3));
