@@ -54,8 +54,9 @@ class BundleReducer {
     double squared_norm = 0.0;
     double squared_length = 0.0;
   };
-  // Moves all parameters by the solution of the last equations.
-  Step Move(const Eigen::VectorXd& step);
+  // Moves all parameters by the solution of the last equations, points by
+  // inverse distances or as Ceres does.
+  Step Move(const Eigen::VectorXd& step, bool by_inverse_distance);
   void TakeBack();
   // Moves each point to its optimum at the present poses (minimize_point.h).
   // Returns the cost.
@@ -128,8 +129,8 @@ class BundleReducer {
   void AddToColumn(const std::vector<PointSums>& points,
                    const PointColumn& column);
   // Moves a point according to the step of the poses; adds to `total`.
-  void MovePoint(const Eigen::VectorXd& step, size_t point,
-                 const PointSums& sums, Step* total);
+  void MovePoint(const Eigen::VectorXd& step, bool by_inverse_distance,
+                 size_t point, const PointSums& sums, Step* total);
   void MoveOthers(const Eigen::VectorXd& step, Step* total);
   void DampPoses();
 

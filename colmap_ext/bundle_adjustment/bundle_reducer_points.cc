@@ -210,13 +210,14 @@ void BundleReducer::AddToColumn(const std::vector<PointSums>& points,
   }
 }
 
-BundleReducer::Step BundleReducer::Move(const Eigen::VectorXd& step) {
+BundleReducer::Step BundleReducer::Move(const Eigen::VectorXd& step,
+                                        bool by_inverse_distance) {
   last_points_.resize(bundle_.NumPointsApart());
   std::vector<Totals> parts;
   const auto move = [&](size_t point, PointSums* sums, Totals* part) {
     Sum(point, sums);
     Damp(point, sums);
-    MovePoint(step, point, *sums, &part->step);
+    MovePoint(step, by_inverse_distance, point, *sums, &part->step);
   };
   ForEachPoint(0, bundle_.NumPointsApart(), move, &parts);
   Step total = AddUp(parts).step;
@@ -224,7 +225,8 @@ BundleReducer::Step BundleReducer::Move(const Eigen::VectorXd& step) {
   return total;
 }
 
-void BundleReducer::MovePoint(const Eigen::VectorXd& step, size_t point,
+void BundleReducer::MovePoint(const Eigen::VectorXd& step,
+                              bool by_inverse_distance, size_t point,
                               const PointSums& sums, Step* total) {
   Eigen::Vector3d pull = sums.gradient;
   double slope = 0.0;
@@ -245,7 +247,18 @@ void BundleReducer::MovePoint(const Eigen::VectorXd& step, size_t point,
   total->squared_norm += xyz.squaredNorm();
   total->squared_length += moved.squaredNorm();
   last_points_[point] = xyz;
-  xyz += moved;
+  if (!by_inverse_distance) {
+    xyz += moved;
+    return;
+  }
+  const AdjustedPose& first = *bundle_.ObservationsOf(point).begin()->pose;
+  const int block = block_of_pose_[&first - bundle_.Poses().data()];
+  Eigen::Vector3d center_step = Eigen::Vector3d::Zero();
+  if (block >= 0) {
+    center_step = step.segment<3>(matrix_.FirstColumnOf(block) + 3);
+  }
+  xyz = first.center + center_step +
+        MoveByInverseDistance(xyz - first.center, moved - center_step);
 }
 
 void BundleReducer::MoveOthers(const Eigen::VectorXd& step, Step* total) {

@@ -145,7 +145,8 @@ class BundleMinimizer {
   bool Iterate() {
     const std::optional<Eigen::VectorXd> step = SolveForStep();
     if (!step) return EndsWithInvalidStep();
-    const BundleReducer::Step moved = reducer_.Move(*step);
+    const BundleReducer::Step moved =
+        reducer_.Move(*step, options_.moves_inverse_distances);
     if (!(moved.predicted_decrease > 0.0)) {
       reducer_.TakeBack();
       return EndsWithInvalidStep();

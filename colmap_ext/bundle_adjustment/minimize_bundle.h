@@ -19,6 +19,9 @@ struct MinimizeBundleOptions {
   double initial_radius = 1e4;
   // Iterations of each point alone, after each joint step (minimize_point.h).
   int max_num_point_iterations = MinimizePointOptions().max_num_iterations;
+  // Joint steps move points by their inverse distances (minimize_point.h). Else
+  // as Ceres does.
+  bool moves_inverse_distances = true;
   int num_threads = 1;  // For the loops of BundleReducer.
 };
 

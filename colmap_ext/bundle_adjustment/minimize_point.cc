@@ -36,6 +36,7 @@ double MinimizePoint(const MinimizePointOptions& options,
                      const BundleProblem::ObservationRange& observations,
                      const ceres::LossFunction* loss, Eigen::Vector3d* point) {
   PointEquations equations = Linearize(observations, loss, *point);
+  const Eigen::Vector3d center = observations.begin()->pose->center;
   for (int i = 0; i < options.max_num_iterations; ++i) {
     const Eigen::Vector3d step =
         -equations.information.inverse() * equations.gradient;
@@ -44,7 +45,8 @@ double MinimizePoint(const MinimizePointOptions& options,
     if (!(predicted_decrease > options.function_tolerance * equations.cost)) {
       break;
     }
-    const Eigen::Vector3d moved = *point + step;
+    const Eigen::Vector3d moved =
+        center + MoveByInverseDistance(*point - center, step);
     const PointEquations next = Linearize(observations, loss, moved);
     if (!(next.cost < equations.cost)) break;
     *point = moved;

@@ -73,6 +73,7 @@ MinimizeBundleOptions WithoutPointIterations(double initial_radius) {
   MinimizeBundleOptions options;
   options.initial_radius = initial_radius;
   options.max_num_point_iterations = 0;
+  options.moves_inverse_distances = false;
   return options;
 }
 

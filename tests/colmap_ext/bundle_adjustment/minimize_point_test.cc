@@ -128,6 +128,33 @@ TEST(MinimizePointTest, EndsAtAMinimumOfContradictingObservations) {
   }
 }
 
+// The keypoint and the inverse depth in a camera that looks at the point change
+// linearly, and the point remains in front of it.
+TEST(MoveByInverseDistanceTest, IsLinearInKeypointAndInverseDepth) {
+  for (uint64_t seed = 1; seed <= 20; ++seed) {
+    SCOPED_TRACE(seed);
+    Random random(seed);
+    const double depth = random.Uniform(1.0, 100.0);
+    const Eigen::Vector3d point(0.0, 0.0, depth);
+    const Eigen::Quaterniond turn = ExpSo3(random.GaussianVector(1.0));
+    for (const double size : {1e-3, 0.1, 0.8}) {
+      const Eigen::Vector3d step = depth * size * random.UnitVector();
+      const Eigen::Vector3d moved =
+          turn.inverse() * MoveByInverseDistance(turn * point, turn * step);
+      const Eigen::Vector2d keypoint = moved.head<2>() / moved.z();
+      EXPECT_LT((keypoint - step.head<2>() / depth).norm(), 1e-12);
+      EXPECT_NEAR(depth / moved.z(), 1.0 - step.z() / depth, 1e-12);
+    }
+    const Eigen::Vector3d step = random.UnitVector();
+    EXPECT_EQ(MoveByInverseDistance(Eigen::Vector3d::Zero(), step), step);
+    for (const double along : {-1e6, -1.0, 1.0, 1e6}) {
+      const Eigen::Vector3d moved = MoveByInverseDistance(point, along * point);
+      EXPECT_GT(moved.z(), 0.0);
+      EXPECT_LT(moved.z(), 10.1 * depth);
+    }
+  }
+}
+
 TEST(MinimizePointTest, LeavesWhatItCannotImprove) {
   const SeenPoint seen(1);
   MinimizePointOptions options;
