@@ -90,6 +90,9 @@ struct MapRequest {
   MapperSteps steps = MapperSteps::kAll;
   // The part of kPart; parts are numbered through all models.
   int part_index = -1;
+  // Folder of a model that is extended: its images keep their poses. Empty:
+  // none.
+  std::string existing_path = {};
 };
 
 // What a run of stage 3 reports beside its files.

@@ -15,10 +15,12 @@
 #include "colmap_ext/database/two_view_geometry_backup.h"
 #include "colmap_ext/host/database.h"
 #include "colmap_ext/host/frames.h"
+#include "colmap_ext/host/model.h"
 #include "colmap_ext/host/model_folder.h"
 #include "colmap_ext/io/folder_lock.h"
 #include "colmap_ext/io/georeference_file.h"
 #include "colmap_ext/io/output_files.h"
+#include "colmap_ext/mapper_stage/existing_model.h"
 #include "colmap_ext/mapper_stage/leftover_components.h"
 #include "colmap_ext/mapper_stage/lost_images.h"
 #include "colmap_ext/mapper_stage/map_components.h"
@@ -322,7 +324,7 @@ StatusOr<MapReport> MapParts(const MapOptions& options,
   if (!scene.ok()) return scene.status();
   status = CheckHasMatches(request.database_path, *scene);
   if (!status.ok()) return status;
-  const MapperStageOptions stage_options = ResolveOptions(options, *scene);
+  MapperStageOptions stage_options = ResolveOptions(options, *scene);
   const bool has_priors = !scene->priors.empty() || !scene->positions.empty() ||
                           !scene->frame_priors.empty();
   std::vector<std::string> frame_warnings;
@@ -335,6 +337,15 @@ StatusOr<MapReport> MapParts(const MapOptions& options,
   for (ComponentToMap& component : coarse->components) {
     CompleteRigs(component.coarse, &component.data);
     AlignCoarseModel(&component, &coarse->warnings);
+  }
+  if (!request.existing_path.empty()) {
+    const StatusOr<colmap::Reconstruction> existing =
+        ReadModel(request.existing_path);
+    if (!existing.ok()) return existing.status();
+    status = UseExistingModel(*existing, &coarse->components,
+                              &stage_options.refine.constant_cameras,
+                              &coarse->warnings);
+    if (!status.ok()) return status;
   }
   report.warnings.insert(report.warnings.end(), coarse->warnings.begin(),
                          coarse->warnings.end());

@@ -43,6 +43,9 @@ Status RunAdasfmMapper(int argc, char** argv) {
   command.AddRequired("output_path", &options.request.output_path,
                       "folder for the models (0, 1, ..., one for each coarse "
                       "model) and checkpoints");
+  command.AddDefault("existing_path", &options.request.existing_path,
+                     "model that is extended: its images, known by their "
+                     "names, keep their poses, and the others are added to it");
   command.AddDefault("AdaSfmMapper.stage", &options.stage,
                      "what to run: all, plan, part or merge");
   command.AddDefault("AdaSfmMapper.part_index", &options.request.part_index,

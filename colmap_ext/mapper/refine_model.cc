@@ -40,7 +40,16 @@ class ModelRefiner {
         local_(local),
         scene_(*scene),
         reconstruction_(scene->reconstruction),
-        summary_(*summary) {}
+        summary_(*summary) {
+    for (const auto& [image_id, pose] : scene->data->fixed_poses) {
+      if (scene->images.count(image_id) == 0) continue;
+      if (IsRegistered(reconstruction_, image_id)) {
+        SetCamFromWorld(pose, &reconstruction_.Image(image_id));
+      } else {
+        scene_.mapper.Register(image_id, pose);
+      }
+    }
+  }
 
   void JoinParts() {
     if (!options_.join_parts) return;
@@ -69,6 +78,10 @@ class ModelRefiner {
   }
 
  private:
+  bool IsFixed(image_t image_id) const {
+    return scene_.data->fixed_poses.count(image_id) > 0;
+  }
+
   // Adjustments take much memory of their own.
   void ReleaseMatches() {
     scene_.mapper.ReleaseMatches();
@@ -179,9 +192,20 @@ class ModelRefiner {
   void Adjust(double function_tolerance, std::vector<PosePriorEdge> priors,
               double* keypoint_sigma_factor, bool is_tentative = false) {
     PriorBundleAdjustmentProblem problem;
-    problem.images = RegisteredImages(reconstruction_);
+    for (const image_t image_id : RegisteredImages(reconstruction_)) {
+      (IsFixed(image_id) ? problem.constant_images : problem.images)
+          .insert(image_id);
+    }
     problem.priors = std::move(priors);
     AddCoarseEdges(&problem.priors);
+    // Their residuals cannot change, and no keypoint is to blame for them.
+    problem.priors.erase(
+        std::remove_if(problem.priors.begin(), problem.priors.end(),
+                       [this](const PosePriorEdge& edge) {
+                         return IsFixed(edge.image_id1) &&
+                                IsFixed(edge.image_id2);
+                       }),
+        problem.priors.end());
     // Frames of a rig become rigid once its parts and gaps are in place.
     if (!is_tentative && local_.use_priors_in_adjustment) {
       problem.rigs = scene_.data->rigs;
@@ -239,7 +263,7 @@ class ModelRefiner {
         num_contradicted += is_violated.value_or(false);
       }
       if (num_contradicted > 0 && num_contradicted == num_usable &&
-          scene_.coarse->count(image_id)) {
+          scene_.coarse->count(image_id) && !IsFixed(image_id)) {
         contradicted.insert(image_id);
       }
     }
@@ -289,7 +313,8 @@ class ModelRefiner {
       }
     }
     for (const image_t image_id : images) {
-      if (supported_chains.count(chains.Find(index_of_image.at(image_id)))) {
+      if (IsFixed(image_id) ||
+          supported_chains.count(chains.Find(index_of_image.at(image_id)))) {
         continue;
       }
       scene_.mapper.Deregister(image_id);
@@ -302,6 +327,10 @@ class ModelRefiner {
     if (!scene_.data->positions.empty()) return;
     for (const std::set<image_t>& part :
          FindUntiedParts(scene_.priors, reconstruction_)) {
+      if (std::any_of(part.begin(), part.end(),
+                      [this](image_t id) { return IsFixed(id); })) {
+        continue;
+      }
       for (const image_t image_id : part) {
         scene_.mapper.Deregister(image_id);
         ++summary_.num_images_deregistered;

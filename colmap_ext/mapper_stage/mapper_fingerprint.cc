@@ -106,6 +106,7 @@ void AddScene(const SceneData& data, Hash* hash) {
   AddMotions(data, hash);
   AddPositions(data.positions, hash);
   AddRigs(data.rigs, hash);
+  for (const auto& [image_id, pose] : data.fixed_poses) hash->Add(image_id);
 }
 
 void AddVarianceComponents(const VarianceComponentOptions& balance,

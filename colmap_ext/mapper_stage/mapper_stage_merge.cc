@@ -282,9 +282,11 @@ StatusOr<colmap::Reconstruction> MapperStage::Merge(bool require_all_parts) {
   const Stopwatch refine_watch;
   status = RefineMerged(fingerprint, &*merged);
   if (!status.ok()) return status;
-  SetMetres(&model);
-  summary_.is_level =
-      summary_.is_georeferenced || AlignToGravity(data_, &model);
+  if (data_.fixed_poses.empty()) {
+    SetMetres(&model);
+    summary_.is_level =
+        summary_.is_georeferenced || AlignToGravity(data_, &model);
+  }
   summary_.refine_seconds = refine_watch.Seconds();
   summary_.num_images = model.NumRegImages();
   summary_.num_points = model.NumPoints3D();

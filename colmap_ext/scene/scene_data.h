@@ -75,6 +75,9 @@ struct SceneData {
   // an origin, in a metric frame of their own.
   std::vector<PositionPrior> positions;
   std::optional<GeodeticPosition> position_origin;
+  // Poses that the mapper does not change, in whose frame the coarse poses are.
+  // Set for a model that is extended (existing_model.h).
+  std::map<image_t, Rigid3d> fixed_poses;
   // For the user: what was skipped, and why.
   std::vector<std::string> warnings;
 };
