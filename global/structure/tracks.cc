@@ -2,7 +2,6 @@
 #include "global/structure/tracks.h"
 
 #include <algorithm>
-#include <cmath>
 #include <utility>
 
 #include "core/disjoint_sets.h"
@@ -140,13 +139,6 @@ Track Shorten(const Track& track, size_t max_length) {
   return shortened;
 }
 
-// Pairs whose numbers of matches differ by less than a fifth.
-int StrengthClass(const std::vector<FeatureMatch>& matches) {
-  constexpr double kNumClassesPerOctave = 4.0;
-  return static_cast<int>(kNumClassesPerOctave *
-                          std::log2(1.0 + static_cast<double>(matches.size())));
-}
-
 // Longest first; a track is kept while one of its images still needs it.
 std::vector<Track> SelectNeededTracks(const TrackOptions& options,
                                       std::vector<Track> tracks) {
@@ -215,13 +207,11 @@ std::vector<Track> BuildTracks(const TrackOptions& options,
                                const Matches& matches) {
   const MatchedKeypoints keypoints(matches);
   KeypointSets sets(keypoints);
-  // Strongest first. Pairs of like strength remain in the order of images,
-  // whose keypoints and sets are then in the processor's cache.
   std::vector<const Matches::value_type*> pairs;
   for (const auto& pair : matches) pairs.push_back(&pair);
   std::stable_sort(pairs.begin(), pairs.end(),
                    [](const auto* a, const auto* b) {
-                     return StrengthClass(a->second) > StrengthClass(b->second);
+                     return a->second.size() > b->second.size();
                    });
   for (const auto* pair : pairs) {
     const std::vector<int>& numbers1 =

@@ -46,9 +46,9 @@ size_t EstimateTrackBytes(
     const std::map<ImagePair, std::vector<FeatureMatch>>& matches);
 
 // Tracks of matched keypoints (union-find), of at least min_track_length. Where
-// matches would join two keypoints of one image, the later match is left out,
-// so one wrong match does not cost the whole track. Pairs with more matches
-// come first, in classes of a factor of 1.2.
+// matches would join two keypoints of one image, the later match (pairs by
+// number of matches, most first) is left out, so one wrong match does not cost
+// the whole track.
 std::vector<Track> BuildTracks(
     const TrackOptions& options,
     const std::map<ImagePair, std::vector<FeatureMatch>>& matches);
