@@ -41,6 +41,9 @@ Status CheckMapPaths(const MapRequest& request) {
   if (status.ok()) {
     status = CheckCoarseModels(request.input_path, request.output_path);
   }
+  if (status.ok() && !request.existing_path.empty()) {
+    status = CheckExistingModel(request.existing_path, request.output_path);
+  }
   if (status.ok()) status = CheckModelFolders(request.output_path);
   if (status.ok()) status = CheckComponentCheckpoints(request.output_path);
   return status;
@@ -183,6 +186,14 @@ Verdict Assess(const MapRequest& request, const CoarseModels& coarse,
       AssessModels(assessed, coarse.rest, ReadEarlierWarnings(request));
   verdict.lost_images = std::move(lost);
   return verdict;
+}
+
+Status ReadExistingModel(const std::string& path, MapperStageOptions* options,
+                         CoarseModels* coarse) {
+  const StatusOr<colmap::Reconstruction> existing = ReadModel(path);
+  if (!existing.ok()) return existing.status();
+  return UseExistingModel(*existing, &coarse->components,
+                          &options->refine.constant_cameras, &coarse->warnings);
 }
 
 // Moves the coarse poses into the frame of the scene's positions; removes the
@@ -334,18 +345,13 @@ StatusOr<MapReport> MapParts(const MapOptions& options,
   StatusOr<CoarseModels> coarse =
       ReadCoarseModels(request.input_path, std::move(*scene));
   if (!coarse.ok()) return coarse.status();
+  if (!request.existing_path.empty()) {
+    status = ReadExistingModel(request.existing_path, &stage_options, &*coarse);
+    if (!status.ok()) return status;
+  }
   for (ComponentToMap& component : coarse->components) {
     CompleteRigs(component.coarse, &component.data);
     AlignCoarseModel(&component, &coarse->warnings);
-  }
-  if (!request.existing_path.empty()) {
-    const StatusOr<colmap::Reconstruction> existing =
-        ReadModel(request.existing_path);
-    if (!existing.ok()) return existing.status();
-    status = UseExistingModel(*existing, &coarse->components,
-                              &stage_options.refine.constant_cameras,
-                              &coarse->warnings);
-    if (!status.ok()) return status;
   }
   report.warnings.insert(report.warnings.end(), coarse->warnings.begin(),
                          coarse->warnings.end());

@@ -83,6 +83,23 @@ StatusOr<std::vector<CoarseModelFile>> ReadFiles(const std::string& input_path,
   return models;
 }
 
+// The models would replace the one that they are made from, and summary.json
+// the summary of that.
+Status CheckIsNotReplaced(const std::string& what, const std::string& path,
+                          bool is_model, const std::string& output_path) {
+  std::error_code error;
+  const fs::path input = fs::canonical(path, error);
+  const bool is_beside =
+      !error && is_model &&
+      fs::equivalent(input.parent_path(), output_path, error);
+  if (!is_beside && !fs::equivalent(input, output_path, error)) {
+    return Status::Ok();
+  }
+  return Status::Error("the output folder " + output_path + " is that of the " +
+                       what + " " + path +
+                       ", which would be replaced; choose another one");
+}
+
 bool IsLargeEnough(const CoarseModelFile& model) {
   return model.poses.size() >= kMinImagesOfComponent && model.num_points > 0;
 }
@@ -123,19 +140,17 @@ Status CheckCoarseModels(const std::string& input_path,
   const bool is_folder = IsFolderOfModels(input_path);
   const Status status = is_folder ? Status::Ok() : CheckCoarseModel(input_path);
   if (!status.ok()) return status;
-  std::error_code error;
-  const fs::path input = fs::canonical(input_path, error);
-  // The models would replace their own coarse models, and summary.json the
-  // summary of those.
-  const bool is_beside =
-      !error && !is_folder &&
-      fs::equivalent(input.parent_path(), output_path, error);
-  if (!is_beside && !fs::equivalent(input, output_path, error)) {
-    return Status::Ok();
+  return CheckIsNotReplaced("coarse model", input_path, !is_folder,
+                            output_path);
+}
+
+Status CheckExistingModel(const std::string& path,
+                          const std::string& output_path) {
+  if (FindModels(path) != std::vector<std::string>{path}) {
+    return Status::Error("no model in " + path);
   }
-  return Status::Error("the output folder " + output_path +
-                       " is that of the coarse model " + input_path +
-                       ", which would be replaced; choose another one");
+  return CheckIsNotReplaced("existing model", path, /*is_model=*/true,
+                            output_path);
 }
 
 StatusOr<CoarseModels> ReadCoarseModels(const std::string& input_path,

@@ -20,6 +20,9 @@ bool IsFolderOfModels(const std::string& input_path);
 // writing models to output_path would replace it.
 Status CheckCoarseModels(const std::string& input_path,
                          const std::string& output_path);
+// The same for a model that is extended.
+Status CheckExistingModel(const std::string& path,
+                          const std::string& output_path);
 
 struct CoarseModels {
   // Each with its poses and its own part of the scene.

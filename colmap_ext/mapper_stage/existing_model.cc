@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <sstream>
 #include <utility>
 
@@ -64,24 +63,26 @@ CoarsePosesAtExisting MoveToExistingModel(
     const std::map<image_t, Rigid3d>& existing, const CoarsePoseMap& coarse) {
   CoarsePosesAtExisting moved;
   moved.scale = FindScale(existing, coarse);
+  std::vector<std::pair<image_t, Eigen::Vector3d>> centers;
+  for (const auto& [image_id, pose] : existing) {
+    const auto found = coarse.find(image_id);
+    if (found == coarse.end()) continue;
+    centers.emplace_back(image_id, found->second.TargetOriginInSource());
+  }
   for (const auto& [image_id, pose] : coarse) {
     const auto fixed = existing.find(image_id);
     if (fixed != existing.end()) {
       moved.poses.emplace(image_id, fixed->second);
       continue;
     }
-    double smallest = std::numeric_limits<double>::infinity();
-    image_t nearest = kInvalidImageId;
-    for (const auto& [other, other_pose] : existing) {
-      const auto found = coarse.find(other);
-      if (found == coarse.end()) continue;
-      const double distance =
-          (found->second.TargetOriginInSource() - pose.TargetOriginInSource())
-              .squaredNorm();
-      if (distance >= smallest) continue;
-      smallest = distance;
-      nearest = other;
-    }
+    const Eigen::Vector3d center = pose.TargetOriginInSource();
+    const image_t nearest =
+        std::min_element(centers.begin(), centers.end(),
+                         [&center](const auto& a, const auto& b) {
+                           return (a.second - center).squaredNorm() <
+                                  (b.second - center).squaredNorm();
+                         })
+            ->first;
     const Rigid3d cam_from_nearest = pose * coarse.at(nearest).Inverse();
     moved.poses.emplace(
         image_id,

@@ -17,11 +17,6 @@ constexpr int kNumMappedBefore = 100;
 
 class ExistingModelTest : public CommandLineTest {
  protected:
-  void ExpectSuccess(const std::string& arguments) {
-    const Run run = Call(arguments);
-    ASSERT_EQ(run.ExitCode(), 0) << arguments << "\n" << run.err;
-  }
-
   void SetUp() override {
     ExpectSuccess("adasfm_synthesizer --output_path " + folder_.Path() +
                   " --seed 2 --alias_ratio 0.04 --num_images " +
@@ -90,7 +85,10 @@ TEST_F(ExistingModelTest, KeepsItsPosesAndTakesTheOtherImages) {
 
   ExpectError(
       MapperCall("database") + " --existing_path " + folder_.File("nowhere"),
-      "nowhere");
+      "no model in " + folder_.File("nowhere"));
+  ExpectError(MapperCall("database") + " --existing_path " +
+                  folder_.File("database_sparse/0"),
+              "would be replaced");
   SqliteConnection(folder_.File("database.db"), SqliteConnection::Mode::kWrite)
       .Execute("UPDATE images SET name = 'new_' || name");
   ExpectSuccess("adasfm_global --database_path " + folder_.File("database.db") +

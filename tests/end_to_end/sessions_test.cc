@@ -18,11 +18,6 @@ constexpr int kNumImagesPerSession = 80;
 // the sessions in turn, ids 1, 3, ... to s0 and 2, 4, ... to s1.
 class SessionsTest : public CommandLineTest {
  protected:
-  void ExpectSuccess(const std::string& arguments) {
-    const Run run = Call(arguments);
-    ASSERT_EQ(run.ExitCode(), 0) << arguments << "\n" << run.err;
-  }
-
   std::string SessionPath(int session) const {
     return folder_.File("session" + std::to_string(session) + ".db");
   }

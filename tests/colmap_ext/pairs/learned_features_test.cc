@@ -61,11 +61,6 @@ class LearnedFeaturesTest : public CommandLineTest {
                   camera.str());
   }
 
-  void ExpectSuccess(const std::string& arguments) {
-    const Run run = Call(arguments);
-    EXPECT_EQ(run.ExitCode(), 0) << arguments << "\n" << run.out << run.err;
-  }
-
   int Count(const std::string& table) {
     SqliteConnection database(imported_, SqliteConnection::Mode::kRead);
     SqliteStatement statement(

@@ -36,6 +36,11 @@ class CommandLineTest : public testing::Test {
     return run;
   }
 
+  void ExpectSuccess(const std::string& arguments) {
+    const Run run = Call(arguments);
+    ASSERT_EQ(run.ExitCode(), 0) << arguments << "\n" << run.out << run.err;
+  }
+
   // One line on standard error, exit code 1.
   void ExpectError(const std::string& arguments, const std::string& message,
                    const std::string& environment = "") {
