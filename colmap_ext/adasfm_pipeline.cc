@@ -19,6 +19,7 @@
 #include "colmap_ext/io/folder_lock.h"
 #include "colmap_ext/io/georeference_file.h"
 #include "colmap_ext/io/output_files.h"
+#include "colmap_ext/scene/drives.h"
 #include "colmap_ext/stage_memory.h"
 #include "core/check_options.h"
 #include "core/so3.h"
@@ -70,12 +71,6 @@ Status CheckGlobalPaths(const GlobalStageOptions& options,
   return status.ok() ? CheckModelFolders(output_path) : status;
 }
 
-std::optional<Eigen::Quaterniond> FindCameraImuCorrection(
-    const CoarsePoses& poses) {
-  if (!poses.camera_imu_rotation.corrected) return std::nullopt;
-  return poses.camera_imu_rotation.Correction();
-}
-
 // Waits for another writer; an error before anything is replaced.
 Status CheckDatabaseIsFree(const std::string& database_path) {
   try {
@@ -92,8 +87,6 @@ Status CheckDatabaseIsFree(const std::string& database_path) {
 std::vector<NewPosePrior> CollectPosePriors(const GlobalStageOptions& options,
                                             const SceneData& scene,
                                             const GlobalStageResult& result) {
-  const Eigen::Quaterniond camera_imu_correction =
-      result.poses.camera_imu_rotation.Correction();
   const double variance = options.pose_prior_sigma * options.pose_prior_sigma;
   std::vector<NewPosePrior> priors;
   for (size_t i = 0; i < result.models.size(); ++i) {
@@ -107,7 +100,7 @@ std::vector<NewPosePrior> CollectPosePriors(const GlobalStageOptions& options,
       prior.position = pose.TargetOriginInSource();
       prior.covariance = variance * Eigen::Matrix3d::Identity();
       if (image.gravity_in_cam) {
-        prior.gravity_in_cam = camera_imu_correction * *image.gravity_in_cam;
+        prior.gravity_in_cam = image.gravity_in_cam;
       } else if (model.gravity_aligned) {
         prior.gravity_in_cam = pose.rotation * -Eigen::Vector3d::UnitZ();
       }
@@ -169,7 +162,9 @@ Status WriteGlobalResult(const GlobalStageOptions& options,
   if (status.ok() && ChangesDatabase(options)) {
     status = RewriteTwoViewGeometries(
         database_path, result.geometries, result.removed_pairs,
-        FindCameraImuCorrection(result.poses), result.inertial_lengths);
+        CorrectionsByCamera(
+            scene, CameraImuCorrections(result.poses.camera_imu_rotations)),
+        result.inertial_lengths);
   }
   return status;
 }

@@ -29,6 +29,7 @@ struct MeasuredTranslation {
 struct InertialMotion {
   image_t image_id1 = kInvalidImageId;  // the earlier one
   image_t image_id2 = kInvalidImageId;
+  int drive = 0;  // as RelativePosePrior::drive
   double dt_s = 0.0;
   Eigen::Vector3d delta_velocity = Eigen::Vector3d::Zero();    // m/s
   Eigen::Vector3d delta_position = Eigen::Vector3d::Zero();    // m

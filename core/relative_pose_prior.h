@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <Eigen/Core>
+#include <Eigen/Geometry>
 #include <cstdint>
 
 #include "core/rigid3d.h"
@@ -35,6 +37,9 @@ struct RelativePosePrior {
   Eigen::Matrix<double, 6, 6> covariance =
       Eigen::Matrix<double, 6, 6>::Identity();
   uint32_t flags = 0;
+  // Number of the drive, from 0. The errors of calibration and biases are those
+  // of one drive.
+  int drive = 0;
 
   bool HasRotation() const { return flags & kPriorRotation; }
   bool HasDirection() const { return flags & kPriorDirection; }
@@ -46,5 +51,24 @@ struct RelativePosePrior {
     return HasTranslation() || (HasLength() && !(flags & kPriorInertialLength));
   }
 };
+
+// Transforms the prior to a rotated camera frame.
+inline void RotatePrior(const Eigen::Quaterniond& rotated_from_cam,
+                        RelativePosePrior* prior) {
+  Rigid3d& motion = prior->cam2_from_cam1;
+  motion.rotation =
+      (rotated_from_cam * motion.rotation * rotated_from_cam.conjugate())
+          .normalized();
+  motion.translation = rotated_from_cam * motion.translation;
+  const Eigen::Matrix3d matrix = rotated_from_cam.toRotationMatrix();
+  for (int row = 0; row < 6; row += 3) {
+    for (int col = 0; col < 6; col += 3) {
+      auto block = prior->covariance.block<3, 3>(row, col);
+      // A block that is not observed is not finite in any direction.
+      if (!block.allFinite()) continue;
+      block = (matrix * block * matrix.transpose()).eval();
+    }
+  }
+}
 
 }  // namespace adasfm

@@ -15,14 +15,19 @@
 namespace adasfm {
 namespace {
 
-std::string DescribeCameraImuRotation(
-    const CameraImuRotationReport& camera_imu) {
-  if (!camera_imu.corrected) return "";
-  char text[96];
-  std::snprintf(text, sizeof(text), ", camera turned by %.2f +- %.2f deg",
-                RadToDeg(camera_imu.rotation_rad.norm()),
-                RadToDeg(camera_imu.sigma_rad));
-  return text;
+std::string DescribeCameraImuRotations(
+    const CameraImuRotationReports& camera_imu_rotations) {
+  std::string description;
+  for (const auto& [drive, camera_imu] : camera_imu_rotations) {
+    if (!camera_imu.corrected) continue;
+    char text[96];
+    std::snprintf(text, sizeof(text), "%s%.2f +- %.2f deg",
+                  description.empty() ? ", camera turned by " : " and ",
+                  RadToDeg(camera_imu.rotation_rad.norm()),
+                  RadToDeg(camera_imu.sigma_rad));
+    description += text;
+  }
+  return description;
 }
 
 }  // namespace
@@ -44,7 +49,7 @@ void CoarsePoseEstimator::RefinePairs() {
   EndStep("relative poses",
           std::to_string(graph_.edges.size()) + " pairs, " +
               std::to_string(num_removed) + " with few inliers removed" +
-              DescribeCameraImuRotation(result_.camera_imu_rotation));
+              DescribeCameraImuRotations(result_.camera_imu_rotations));
 }
 
 // The chain, with what vision observes of the camera-IMU rotation and of the
@@ -69,13 +74,24 @@ void CoarsePoseEstimator::BuildChain() {
           }),
       near.edges.end());
   RefineRelativePoses(options_.relative_poses, correspondences_, {}, &near);
-  // The errors that all steps share are the unknowns here and no noise.
-  const OdometryChain independent(priors_, WithoutSharedErrors(options_.chain),
-                                  frame_priors_);
-  result_.camera_imu_rotation = CorrectCameraImuRotation(
-      camera_imu, independent, near, correspondences_, &priors_);
-  chain_options_.shared_rotation_errors =
-      result_.camera_imu_rotation.left_in_priors;
+  std::map<int, std::vector<RelativePosePrior>> by_drive;
+  for (const RelativePosePrior& prior : priors_) {
+    by_drive[prior.drive].push_back(prior);
+  }
+  priors_.clear();
+  for (auto& [drive, priors] : by_drive) {
+    // The errors that all steps share are the unknowns here and no noise.
+    const OdometryChain independent(priors, WithoutSharedErrors(options_.chain),
+                                    frame_priors_);
+    const CameraImuRotationReport report = CorrectCameraImuRotation(
+        camera_imu, independent, near, correspondences_, &priors);
+    result_.camera_imu_rotations.emplace(drive, report);
+    if (report.left_in_priors) {
+      chain_options_.shared_rotation_errors.emplace(drive,
+                                                    *report.left_in_priors);
+    }
+    priors_.insert(priors_.end(), priors.begin(), priors.end());
+  }
   chain_ = OdometryChain(priors_, chain_options_, frame_priors_);
 }
 

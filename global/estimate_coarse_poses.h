@@ -75,9 +75,9 @@ struct CoarsePoses {
   // The input's edges and those added, with reasons of removal and the
   // relative poses as they were used.
   ViewGraph graph;
-  // The input's, rotated where vision corrected T_cam_imu.
+  // The input's, by drive, rotated where vision corrected T_cam_imu.
   std::vector<RelativePosePrior> priors;
-  CameraImuRotationReport camera_imu_rotation;
+  CameraImuRotationReports camera_imu_rotations;
   LoopClosureReport loop_closures;
   std::vector<CoarseStep> steps;
 };

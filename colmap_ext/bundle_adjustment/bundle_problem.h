@@ -58,9 +58,9 @@ class BundleProblem final : private ceres::EvaluationCallback {
   // The pose of an image that already takes part in a residual; else null.
   const AdjustedPose* UsedPose(image_t image_id) const;
   bool IsConstant(image_t image_id) const;
-  // The rotation error of T_cam_imu (shared_errors.h).
-  double* ExtrinsicRotation() {
-    return shared_errors_.ExtrinsicRotation(problem_.get());
+  // The rotation error of T_cam_imu in a drive (shared_errors.h).
+  double* ExtrinsicRotation(int drive) {
+    return shared_errors_.ExtrinsicRotation(drive, problem_.get());
   }
   // Adds parameters with these values; returns their address.
   double* AddParameters(std::vector<double> values);

@@ -282,9 +282,10 @@ InertialTerms AddInertialFactors(const PriorBundleAdjustmentOptions& options,
   const bool has_lengths = std::any_of(
       factors.begin(), factors.end(),
       [](const Factor& factor) { return factor.motion1->by_wheels; });
-  double* turn = has_lengths ? bundle->ExtrinsicRotation()
-                             : bundle->AddParameters({0.0, 0.0, 0.0});
-  const double noise_at_start = FitSharedMotion(factors, turn, &shared);
+  double* held_turn =
+      has_lengths ? nullptr : bundle->AddParameters({0.0, 0.0, 0.0});
+  const double no_turn[] = {0.0, 0.0, 0.0};
+  const double noise_at_start = FitSharedMotion(factors, no_turn, &shared);
   const double noise = options.accelerometer_noise > 0.0
                            ? options.accelerometer_noise
                            : noise_at_start;
@@ -293,11 +294,16 @@ InertialTerms AddInertialFactors(const PriorBundleAdjustmentOptions& options,
   double* gravity = bundle->AddParameters(shared.gravity);
   double* unit = bundle->AddParameters(shared.unit);
   AddNormalPrior(kUnitSigma, {1.0}, unit, bundle);
-  double* bias = bundle->AddParameters(shared.bias);
-  AddNormalPrior(kBiasSigmaMps2, {0.0, 0.0, 0.0}, bias, bundle);
+  const int* drive = nullptr;
+  double* bias = nullptr;
   double seconds = 0.0;
   for (const Factor& factor : factors) {
-    if (seconds >= kBiasWindowS) {
+    if (drive == nullptr || *drive != factor.motion1->drive) {
+      drive = &factor.motion1->drive;
+      bias = bundle->AddParameters(shared.bias);
+      AddNormalPrior(kBiasSigmaMps2, {0.0, 0.0, 0.0}, bias, bundle);
+      seconds = 0.0;
+    } else if (seconds >= kBiasWindowS) {
       double* next = bundle->AddParameters(shared.bias);
       bundle->AddResidual(
           std::make_unique<DifferenceCost>(kBiasWalk * std::sqrt(seconds), 1.0),
@@ -306,10 +312,14 @@ InertialTerms AddInertialFactors(const PriorBundleAdjustmentOptions& options,
       seconds = 0.0;
     }
     seconds += factor.motion2->dt_s;
-    bundle->AddVelocityTerm(factor.Cost(sigma_factor * noise), factor.images,
-                            {gravity, bias, unit, turn});
+    bundle->AddVelocityTerm(
+        factor.Cost(sigma_factor * noise), factor.images,
+        {gravity, bias, unit,
+         has_lengths ? bundle->ExtrinsicRotation(*drive) : held_turn});
   }
-  if (!has_lengths) bundle->CeresProblem()->SetParameterBlockConstant(turn);
+  if (!has_lengths) {
+    bundle->CeresProblem()->SetParameterBlockConstant(held_turn);
+  }
   return {noise, unit};
 }
 

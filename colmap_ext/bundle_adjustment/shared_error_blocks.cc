@@ -6,19 +6,13 @@
 #include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 namespace adasfm {
 
 SharedErrorBlocks::SharedErrorBlocks(const SharedErrorOptions& options,
                                      const std::vector<PosePriorEdge>& edges)
     : options_(options) {
-  SharedErrorWindows last;
-  for (const PosePriorEdge& edge : edges) {
-    last.gyroscope = std::max(last.gyroscope, edge.windows.gyroscope);
-    last.direction = std::max(last.direction, edge.windows.direction);
-  }
-  direction_drift_ = kGyroscopeBias + last.gyroscope + 1;
-  blocks_.resize(direction_drift_ + last.direction + 1);
   if (options.direction_drift_time_s > 0.0) {
     direction_drift_sigma_rad_ = MedianDirectionSigma(edges);
   }
@@ -27,27 +21,36 @@ SharedErrorBlocks::SharedErrorBlocks(const SharedErrorOptions& options,
 std::vector<double*> SharedErrorBlocks::ParametersOf(const PosePriorEdge& edge,
                                                      const PosePriorCost& cost,
                                                      PosePriorCost::Term term) {
-  if (cost.parameter_block_sizes().size() == 2) return {};
-  if (term == PosePriorCost::Term::kLength) {
-    Block& drift = blocks_[direction_drift_ + edge.windows.direction];
-    drift.is_used = true;
-    return {drift.values};
+  const size_t num_shared = cost.parameter_block_sizes().size() - 2;
+  if (num_shared == 0) return {};
+  const SharedErrorWindows& windows = edge.windows;
+  const auto use = [&windows](int index, Blocks* blocks) {
+    Block& block = (*blocks)[index];
+    block.drive = windows.drive;
+    return block.values;
+  };
+  if (term == PosePriorCost::Term::kRotation) {
+    return {use(windows.drive, &extrinsic_rotation_),
+            use(windows.gyroscope, &gyroscope_bias_)};
   }
-  if (term != PosePriorCost::Term::kRotation) {
-    Block& direction = blocks_[kDrivingDirection];
-    Block& drift = blocks_[direction_drift_ + edge.windows.direction];
-    direction.is_used = drift.is_used = true;
-    return {direction.values, drift.values};
+  std::vector<double*> parameters;
+  if (term != PosePriorCost::Term::kLength) {
+    parameters.push_back(use(windows.drive, &driving_direction_));
   }
-  Block& rotation = blocks_[kExtrinsicRotation];
-  Block& bias = blocks_[kGyroscopeBias + edge.windows.gyroscope];
-  rotation.is_used = bias.is_used = true;
-  return {rotation.values, bias.values};
+  if (term != PosePriorCost::Term::kLength ||
+      windows.length_per_direction > 0.0) {
+    parameters.push_back(use(windows.direction, &direction_drift_));
+  }
+  if (parameters.size() < num_shared) {
+    LengthScale& scale = length_scale_[windows.drive];
+    ++scale.num_lengths;
+    parameters.push_back(&scale.value);
+  }
+  return parameters;
 }
 
 void SharedErrorBlocks::AddPrior(double sigma, Block* block,
                                  ceres::Problem* problem) {
-  if (!block->is_used) return;
   if (!options_.enabled || !(sigma > 0.0)) {
     problem->SetParameterBlockConstant(block->values);
     return;
@@ -65,10 +68,12 @@ void SharedErrorBlocks::AddStep(double sigma, double decay, Block* before,
                             block->values);
 }
 
-double* SharedErrorBlocks::ExtrinsicRotation(ceres::Problem* problem) {
-  Block& block = blocks_[kExtrinsicRotation];
-  if (!block.is_used) {
-    block.is_used = true;
+double* SharedErrorBlocks::ExtrinsicRotation(int drive,
+                                             ceres::Problem* problem) {
+  const auto [found, is_new] = extrinsic_rotation_.emplace(drive, Block());
+  Block& block = found->second;
+  if (is_new) {
+    block.drive = drive;
     problem->AddParameterBlock(block.values, 3);
     AddPrior(options_.extrinsic_rotation_sigma_rad, &block, problem);
   }
@@ -76,26 +81,27 @@ double* SharedErrorBlocks::ExtrinsicRotation(ceres::Problem* problem) {
 }
 
 void SharedErrorBlocks::AddPriors(ceres::Problem* problem) {
-  AddPrior(options_.extrinsic_rotation_sigma_rad, &blocks_[kExtrinsicRotation],
-           problem);
-  AddPrior(options_.driving_direction_sigma_rad, &blocks_[kDrivingDirection],
-           problem);
+  for (auto& [key, block] : extrinsic_rotation_) {
+    AddPrior(options_.extrinsic_rotation_sigma_rad, &block, problem);
+  }
+  for (auto& [key, block] : driving_direction_) {
+    AddPrior(options_.driving_direction_sigma_rad, &block, problem);
+  }
   AddGyroscopePriors(problem);
   AddDirectionDriftPriors(problem);
+  AddLengthScalePriors(problem);
 }
 
-// A random walk: the first value has a prior, each later value only a prior on
-// its step. Priors on all values would penalise a constant bias once a window.
+// A random walk in each drive: the first value has a prior, each later value
+// only a prior on its step. Priors on all values would penalise a constant bias
+// once a window.
 void SharedErrorBlocks::AddGyroscopePriors(ceres::Problem* problem) {
   const double sigma = options_.gyroscope_bias_sigma_rad_s;
   const double step_sigma = options_.gyroscope_random_walk_rad_s_sqrt_s *
                             std::sqrt(options_.gyroscope_window_s);
   Block* before = nullptr;
-  for (size_t k = kGyroscopeBias; k < direction_drift_; ++k) {
-    Block& block = blocks_[k];
-    if (!block.is_used) continue;
-    if (before == nullptr || !options_.enabled || !(sigma > 0.0) ||
-        !(step_sigma > 0.0)) {
+  for (auto& [key, block] : gyroscope_bias_) {
+    if (!Continues(before, block) || !(sigma > 0.0) || !(step_sigma > 0.0)) {
       AddPrior(sigma, &block, problem);
     } else {
       AddStep(step_sigma, 1.0, before, &block, problem);
@@ -104,17 +110,15 @@ void SharedErrorBlocks::AddGyroscopePriors(ceres::Problem* problem) {
   }
 }
 
-// A stationary process: the first value has the sigma; each later value decays
-// towards zero, with process noise that keeps the sigma.
+// A stationary process in each drive: the first value has the sigma; each later
+// value decays towards zero, with process noise that keeps the sigma.
 void SharedErrorBlocks::AddDirectionDriftPriors(ceres::Problem* problem) {
   const double sigma = direction_drift_sigma_rad_;
   const double decay =
       std::exp(-options_.direction_window_s / options_.direction_drift_time_s);
   Block* before = nullptr;
-  for (size_t k = direction_drift_; k < blocks_.size(); ++k) {
-    Block& block = blocks_[k];
-    if (!block.is_used) continue;
-    if (before == nullptr || !options_.enabled || !(sigma > 0.0)) {
+  for (auto& [key, block] : direction_drift_) {
+    if (!Continues(before, block) || !(sigma > 0.0)) {
       AddPrior(sigma, &block, problem);
     } else {
       AddStep(sigma * std::sqrt(1.0 - decay * decay), decay, before, &block,
@@ -124,28 +128,63 @@ void SharedErrorBlocks::AddDirectionDriftPriors(ceres::Problem* problem) {
   }
 }
 
+// The mean of all lengths keeps its scale: an unknown factor of all residuals
+// would shrink with them.
+void SharedErrorBlocks::AddLengthScalePriors(ceres::Problem* problem) {
+  constexpr double kMeanSigma = 1e-6;
+  if (length_scale_.empty()) return;
+  int num_lengths = 0;
+  for (const auto& [drive, scale] : length_scale_) {
+    num_lengths += scale.num_lengths;
+  }
+  std::vector<double*> values;
+  std::vector<double> shares;
+  for (auto& [drive, scale] : length_scale_) {
+    values.push_back(&scale.value);
+    shares.push_back(1.0 * scale.num_lengths / num_lengths);
+    if (!options_.enabled || !(options_.length_scale_sigma > 0.0)) {
+      problem->SetParameterBlockConstant(&scale.value);
+      continue;
+    }
+    costs_.push_back(std::make_unique<WeightedSumCost>(
+        options_.length_scale_sigma, std::vector<double>{1.0}));
+    problem->AddResidualBlock(costs_.back().get(), nullptr, &scale.value);
+  }
+  costs_.push_back(
+      std::make_unique<WeightedSumCost>(kMeanSigma, std::move(shares)));
+  problem->AddResidualBlock(costs_.back().get(), nullptr, values);
+}
+
+bool SharedErrorBlocks::Continues(const Block* before,
+                                  const Block& block) const {
+  return options_.enabled && before != nullptr && before->drive == block.drive;
+}
+
 std::vector<double*> SharedErrorBlocks::Used() {
   std::vector<double*> used;
-  for (Block& block : blocks_) {
-    if (block.is_used) used.push_back(block.values);
+  for (Blocks* blocks : {&extrinsic_rotation_, &driving_direction_,
+                         &gyroscope_bias_, &direction_drift_}) {
+    for (auto& [key, block] : *blocks) used.push_back(block.values);
   }
+  for (auto& [drive, scale] : length_scale_) used.push_back(&scale.value);
   return used;
 }
 
 SharedErrors SharedErrorBlocks::Estimated() const {
-  SharedErrors errors;
-  const auto vector = [](const Block& block) {
-    return Eigen::Vector3d(block.values[0], block.values[1], block.values[2]);
-  };
-  errors.extrinsic_rotation = vector(blocks_[kExtrinsicRotation]);
-  errors.driving_direction = vector(blocks_[kDrivingDirection]);
-  for (size_t k = kGyroscopeBias; k < blocks_.size(); ++k) {
-    if (!blocks_[k].is_used) continue;
-    if (k < direction_drift_) {
-      errors.gyroscope_bias[k - kGyroscopeBias] = vector(blocks_[k]);
-    } else {
-      errors.direction_drift[k - direction_drift_] = vector(blocks_[k]);
+  const auto values_of = [](const Blocks& blocks) {
+    std::map<int, Eigen::Vector3d> values;
+    for (const auto& [key, block] : blocks) {
+      values.emplace(key, Eigen::Vector3d(block.values));
     }
+    return values;
+  };
+  SharedErrors errors;
+  errors.extrinsic_rotation = values_of(extrinsic_rotation_);
+  errors.driving_direction = values_of(driving_direction_);
+  errors.gyroscope_bias = values_of(gyroscope_bias_);
+  errors.direction_drift = values_of(direction_drift_);
+  for (const auto& [drive, scale] : length_scale_) {
+    errors.length_scale.emplace(drive, scale.value);
   }
   return errors;
 }

@@ -4,7 +4,7 @@
 #include <ceres/cost_function.h>
 #include <ceres/problem.h>
 
-#include <cstddef>
+#include <map>
 #include <memory>
 #include <vector>
 
@@ -15,7 +15,7 @@
 namespace adasfm {
 
 // The errors that the priors of an adjustment share, as parameters of three
-// numbers each (shared_errors.h). Errors that affect no prior are not used.
+// numbers each (shared_errors.h). Errors that affect no prior have none.
 class SharedErrorBlocks {
  public:
   // The windows of the edges must be set (AssignSharedErrorWindows).
@@ -31,8 +31,8 @@ class SharedErrorBlocks {
   // Adds the priors of the errors that terms use. The problem owns no costs;
   // these live as long as this object.
   void AddPriors(ceres::Problem* problem);
-  // The rotation error of T_cam_imu; it is used from then on.
-  double* ExtrinsicRotation(ceres::Problem* problem);
+  // The rotation error of T_cam_imu in a drive; it is used from then on.
+  double* ExtrinsicRotation(int drive, ceres::Problem* problem);
 
   std::vector<double*> Used();
   SharedErrors Estimated() const;
@@ -40,25 +40,34 @@ class SharedErrorBlocks {
  private:
   struct Block {
     double values[3] = {0, 0, 0};
-    bool is_used = false;
+    int drive = 0;
   };
+  // Those in use, by drive or by window.
+  using Blocks = std::map<int, Block>;
 
   void AddGyroscopePriors(ceres::Problem* problem);
   void AddDirectionDriftPriors(ceres::Problem* problem);
+  void AddLengthScalePriors(ceres::Problem* problem);
   // A normal prior around zero; sigma 0 holds the values.
   void AddPrior(double sigma, Block* block, ceres::Problem* problem);
   // A normal prior of the change from decay * before to block.
   void AddStep(double sigma, double decay, Block* before, Block* block,
                ceres::Problem* problem);
 
-  static constexpr size_t kExtrinsicRotation = 0;
-  static constexpr size_t kDrivingDirection = 1;
-  static constexpr size_t kGyroscopeBias = 2;  // of the first window
+  // Whether a varying error goes on from the window before.
+  bool Continues(const Block* before, const Block& block) const;
+
   const SharedErrorOptions options_;
   double direction_drift_sigma_rad_ = 0.0;
-  // Index of the first window of the direction's drift.
-  size_t direction_drift_ = kGyroscopeBias;
-  std::vector<Block> blocks_;
+  Blocks extrinsic_rotation_;  // by drive
+  Blocks driving_direction_;   // by drive
+  Blocks gyroscope_bias_;      // by window
+  Blocks direction_drift_;     // by window
+  struct LengthScale {
+    double value = 0.0;
+    int num_lengths = 0;
+  };
+  std::map<int, LengthScale> length_scale_;  // by drive
   std::vector<std::unique_ptr<ceres::CostFunction>> costs_;
 };
 

@@ -99,8 +99,7 @@ void AlignInput(const SceneData& scene, CoarseModelInput* input,
                 PositionAlignment* alignment) {
   if (scene.positions.empty()) return;
   *alignment =
-      AlignSceneToPositions(scene, input->cams_from_world, input->metric,
-                            input->camera_imu_correction);
+      AlignSceneToPositions(scene, input->cams_from_world, input->metric);
   if (!alignment->success) return;
   input->cams_from_world =
       TransformCamsFromWorld(alignment->enu_from_world, input->cams_from_world);
@@ -109,8 +108,7 @@ void AlignInput(const SceneData& scene, CoarseModelInput* input,
 void AddPositions(const SceneData& scene, const CoarseModelInput& input,
                   PriorBundleAdjustmentProblem* problem) {
   problem->positions = scene.positions;
-  Verticals verticals =
-      FindVerticals(scene, input.cams_from_world, input.camera_imu_correction);
+  Verticals verticals = FindVerticals(scene, input.cams_from_world);
   problem->gravity_in_cam = std::move(verticals.gravity_in_cam);
   problem->gravity_sigma_rad = verticals.sigma_rad;
 }
@@ -328,8 +326,7 @@ CoarseModel BuildCoarseModel(
                options.triangulation.min_triangulation_angle_deg),
       &model.reconstruction);
   model.gravity_aligned =
-      is_georeferenced ||
-      AlignToGravity(scene, &model.reconstruction, input.camera_imu_correction);
+      is_georeferenced || AlignToGravity(scene, &model.reconstruction);
   model.keypoint_sigma_px = model.rounds.back().keypoint_sigma_px;
   FillFigures(options, &model);
   return model;

@@ -65,9 +65,6 @@ struct CoarseModelInput {
   std::map<ImagePair, std::vector<FeatureMatch>> matches;
   // Priors on images of other components are ignored.
   std::vector<RelativePosePrior> priors;
-  // Correction of the camera-IMU rotation for the scene's gravity directions;
-  // the priors include it already.
-  Eigen::Quaterniond camera_imu_correction = Eigen::Quaterniond::Identity();
   // Whether pairs determined focal lengths and distortions of unknown lenses
   // (CalibrateFocalLengths). The adjustment then refines them, since points in
   // many images determine them better, and so do the sensors' rotations. Known

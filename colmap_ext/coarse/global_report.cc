@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "colmap_ext/coarse/global_report.h"
 
+#include <algorithm>
 #include <cmath>
 #include <iomanip>
 #include <nlohmann/json.hpp>
@@ -133,14 +134,24 @@ Json ModelJson(const SceneData& scene, const CoarseComponent& component,
           {"adjustments", rounds}};
 }
 
-Json CameraImuRotationJson(const CameraImuRotationReport& camera_imu) {
+// The first image of a drive.
+std::string DriveName(const SceneData& scene, int drive) {
+  const auto prior = std::find_if(
+      scene.priors.begin(), scene.priors.end(),
+      [drive](const RelativePosePrior& prior) { return prior.drive == drive; });
+  return scene.images.at(prior->image_id1).name;
+}
+
+Json CameraImuRotationJson(const std::string& drive_name,
+                           const CameraImuRotationReport& camera_imu) {
   const Eigen::Matrix3d rotation =
       ExpSo3(camera_imu.rotation_rad).toRotationMatrix();
   Json rows = Json::array();
   for (int row = 0; row < 3; ++row) {
     rows.push_back({rotation(row, 0), rotation(row, 1), rotation(row, 2)});
   }
-  return {{"corrected", camera_imu.corrected},
+  return {{"first_image", drive_name},
+          {"corrected", camera_imu.corrected},
           {"pairs", camera_imu.num_pairs},
           {"angle_deg", RadToDeg(camera_imu.rotation_rad.norm())},
           {"sigma_deg", RadToDeg(camera_imu.sigma_rad)},
@@ -175,7 +186,9 @@ void AppendLostImages(const SceneData& scene, const GlobalStageResult& result,
   }
 }
 
-void AppendCameraImuWarning(const CameraImuRotationReport& camera_imu,
+// drive_name: empty for the only drive.
+void AppendCameraImuWarning(const std::string& drive_name,
+                            const CameraImuRotationReport& camera_imu,
                             std::vector<std::string>* warnings) {
   // Below this an error of the direction of driving is as likely, by the sigma
   // that the import states for it.
@@ -185,8 +198,9 @@ void AppendCameraImuWarning(const CameraImuRotationReport& camera_imu,
     return;
   }
   std::ostringstream text;
-  text << std::fixed << std::setprecision(2) << "the camera-IMU rotation is "
-       << RadToDeg(camera_imu.rotation_rad.norm()) << " +- "
+  text << std::fixed << std::setprecision(2) << "the camera-IMU rotation ";
+  if (!drive_name.empty()) text << "of the drive from " << drive_name << ' ';
+  text << "is " << RadToDeg(camera_imu.rotation_rad.norm()) << " +- "
        << RadToDeg(camera_imu.sigma_rad)
        << " deg off what T_cam_imu says (turned by "
        << RadToDeg(camera_imu.rotation_rad.x()) << ", "
@@ -249,8 +263,11 @@ std::string FormatGlobalReportJson(const SceneData& scene,
     removals[EdgeRemovalName(removal)] = count;
   }
   report["edges"] = removals;
-  report["camera_imu_rotation"] =
-      CameraImuRotationJson(result.poses.camera_imu_rotation);
+  report["camera_imu_rotations"] = Json::array();
+  for (const auto& [drive, camera_imu] : result.poses.camera_imu_rotations) {
+    report["camera_imu_rotations"].push_back(
+        CameraImuRotationJson(DriveName(scene, drive), camera_imu));
+  }
   report["loop_closures"] = LoopClosuresJson(result.poses.loop_closures);
   report["segment_closures"] =
       SegmentClosuresJson(scene, result.poses.loop_closures);
@@ -313,7 +330,12 @@ std::vector<std::string> ListGlobalWarnings(const SceneData& scene,
                                             const GlobalStageResult& result) {
   std::vector<std::string> warnings;
   AppendLostImages(scene, result, &warnings);
-  AppendCameraImuWarning(result.poses.camera_imu_rotation, &warnings);
+  const CameraImuRotationReports& rotations = result.poses.camera_imu_rotations;
+  for (const auto& [drive, camera_imu] : rotations) {
+    AppendCameraImuWarning(
+        rotations.size() > 1 ? DriveName(scene, drive) : std::string(),
+        camera_imu, &warnings);
+  }
   for (const CoarseModel& model : result.models) {
     AppendPriorWarnings(model, &warnings);
     if (model.positions.failure.empty()) continue;

@@ -12,6 +12,7 @@
 #include "colmap_ext/coarse/refine_stage_matches.h"
 #include "colmap_ext/coarse/split_models.h"
 #include "colmap_ext/host/pose_conversion.h"
+#include "colmap_ext/scene/drives.h"
 #include "colmap_ext/scene/scene_bearings.h"
 #include "colmap_ext/scene/untied_parts.h"
 #include "core/option_checker.h"
@@ -220,6 +221,15 @@ class GlobalStage {
   }
 
  private:
+  static CameraImuCorrectionMap CorrectionsOf(const GlobalStageResult& result) {
+    return CameraImuCorrections(result.poses.camera_imu_rotations);
+  }
+
+  // The priors of a result are rotated already.
+  void RotateScene(const CameraImuCorrectionMap& corrections) {
+    RotateGravityAndMotions(corrections, &scene_);
+  }
+
   void Begin(const std::string& name, double share_done) {
     if (progress_) progress_(name, share_done);
     watch_ = Stopwatch();
@@ -256,6 +266,7 @@ class GlobalStage {
     result_.poses =
         EstimateCoarsePoses(pose_options, initial_.graph, correspondences_,
                             priors, scene_.frame_priors);
+    RotateScene(CorrectionsOf(result_));
     result_.steps.insert(result_.steps.end(), result_.poses.steps.begin(),
                          result_.poses.steps.end());
     const std::vector<CoarseComponent>& components = result_.poses.components;
@@ -299,15 +310,14 @@ class GlobalStage {
       models.push_back(PosesHeldByPoints(model.reconstruction));
     }
     InertialOdometry odometry =
-        BridgeGaps(MotionsOfCamera(scene_, result_.poses.camera_imu_rotation),
-                   result_.poses.priors, models);
+        BridgeGaps(scene_.inertial_motions, result_.poses.priors, models);
     End("gaps", std::to_string(odometry.num_gaps) +
                     " bridged by the accelerometer, over " +
                     std::to_string(odometry.bridges.size()) + " steps");
     if (odometry.num_gaps == 0) return;
-    const Eigen::Quaterniond back =
-        result_.poses.camera_imu_rotation.Correction().conjugate();
-    for (RelativePosePrior& prior : odometry.priors) RotatePrior(back, &prior);
+    const CameraImuCorrectionMap back = Inverted(CorrectionsOf(result_));
+    RotatePriors(back, &odometry.priors);
+    RotateScene(back);
     GlobalStageResult in_parts = std::move(result_);
     const int num_split = num_split_;
     result_ = GlobalStageResult();
@@ -323,6 +333,8 @@ class GlobalStage {
     End("gaps", "left open: with them bridged the largest model has " +
                     DescribeLargest(result_) + ", without " +
                     DescribeLargest(in_parts));
+    RotateScene(Inverted(CorrectionsOf(result_)));
+    RotateScene(CorrectionsOf(in_parts));
     in_parts.steps = std::move(result_.steps);
     result_ = std::move(in_parts);
     num_split_ = num_split;
@@ -363,8 +375,8 @@ class GlobalStage {
     }
     Begin("metres from the accelerometer", 0.95);
     for (CoarseModel& model : result_.models) {
-      const std::vector<InertialLength> lengths = MeasureSize(
-          scene_, result_.poses.camera_imu_rotation, result_.bridges, &model);
+      const std::vector<InertialLength> lengths =
+          MeasureSize(scene_, result_.bridges, &model);
       result_.inertial_lengths.insert(result_.inertial_lengths.end(),
                                       lengths.begin(), lengths.end());
     }

@@ -216,8 +216,8 @@ bool ModelJoiner::Adjust(const std::set<int>& models,
   if (!model.rounds.back().success ||
       !MeasureModelAgreement(options_, scene_, poses.graph, bearings_, model)
            .IsSound() ||
-      !FindPartsByInertia(MotionsOfCamera(scene_, poses.camera_imu_rotation),
-                          poses.priors, CamsFromWorld(model.reconstruction))
+      !FindPartsByInertia(scene_.inertial_motions, poses.priors,
+                          CamsFromWorld(model.reconstruction))
            .empty()) {
     return false;
   }

@@ -13,26 +13,12 @@
 
 namespace adasfm {
 
-std::vector<InertialMotion> MotionsOfCamera(
-    const SceneData& scene,
-    const CameraImuRotationReport& camera_imu_rotation) {
-  std::vector<InertialMotion> motions = scene.inertial_motions;
-  if (camera_imu_rotation.corrected) {
-    const Eigen::Quaterniond rotation = camera_imu_rotation.Correction();
-    for (InertialMotion& motion : motions) {
-      RotateInertialMotion(rotation, &motion);
-    }
-  }
-  return motions;
-}
-
 std::vector<InertialLength> MeasureSize(
-    const SceneData& scene, const CameraImuRotationReport& camera_imu_rotation,
-    const std::map<ImagePair, Eigen::Matrix3d>& bridges, CoarseModel* model) {
+    const SceneData& scene, const std::map<ImagePair, Eigen::Matrix3d>& bridges,
+    CoarseModel* model) {
   if (model->metric || scene.inertial_motions.empty()) return {};
-  const std::optional<InertialScale> scale =
-      EstimateInertialScale(MotionsOfCamera(scene, camera_imu_rotation),
-                            CamsFromWorld(model->reconstruction));
+  const std::optional<InertialScale> scale = EstimateInertialScale(
+      scene.inertial_motions, CamsFromWorld(model->reconstruction));
   if (!scale) return {};
   model->metric = true;
   model->inertial_scale_sigma = scale->sigma_ratio;

@@ -8,14 +8,8 @@
 #include "colmap_ext/coarse/coarse_structure.h"
 #include "colmap_ext/scene/scene_data.h"
 #include "core/inertial_motion.h"
-#include "global/calibration/correct_camera_imu_rotation.h"
 
 namespace adasfm {
-
-// The scene's motions in the true camera frame. camera_imu_rotation: rotation
-// to it from the frame that they are stated in.
-std::vector<InertialMotion> MotionsOfCamera(
-    const SceneData& scene, const CameraImuRotationReport& camera_imu_rotation);
 
 // Scales an adjusted model without metres to metres of the accelerometer, where
 // that determines them (EstimateInertialScale); else the model is unchanged.
@@ -24,7 +18,7 @@ std::vector<InertialMotion> MotionsOfCamera(
 // shape, which vision determines better: all of them together constrain the
 // size to 100 % only. Bridges (BridgeGaps) must constrain the shape.
 std::vector<InertialLength> MeasureSize(
-    const SceneData& scene, const CameraImuRotationReport& camera_imu_rotation,
-    const std::map<ImagePair, Eigen::Matrix3d>& bridges, CoarseModel* model);
+    const SceneData& scene, const std::map<ImagePair, Eigen::Matrix3d>& bridges,
+    CoarseModel* model);
 
 }  // namespace adasfm

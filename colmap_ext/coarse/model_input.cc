@@ -10,7 +10,6 @@ CoarseModelInput CreateModelInput(const GlobalStageOptions& options,
                                   std::map<image_t, Rigid3d> cams_from_world) {
   CoarseModelInput input;
   input.priors = result.poses.priors;
-  input.camera_imu_correction = result.poses.camera_imu_rotation.Correction();
   input.cams_from_world = std::move(cams_from_world);
   input.refine_lenses = options.structure.refine_unknown_focal_length &&
                         !result.focal_lengths.empty();

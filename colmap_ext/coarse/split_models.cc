@@ -24,7 +24,6 @@ class ModelSplitter {
         scene_(scene),
         bearings_(bearings),
         matches_(matches),
-        motions_(MotionsOfCamera(scene, result->poses.camera_imu_rotation)),
         result_(*result) {}
 
   // These return the number of parts taken out of a model.
@@ -38,7 +37,7 @@ class ModelSplitter {
 
   int SplitByInertia(size_t model) {
     return TakeOut(
-        FindPartsByInertia(motions_, result_.poses.priors,
+        FindPartsByInertia(scene_.inertial_motions, result_.poses.priors,
                            CamsFromWorld(result_.models[model].reconstruction)),
         model);
   }
@@ -112,7 +111,6 @@ class ModelSplitter {
   const SceneData& scene_;
   const std::map<image_t, std::vector<Bearing>>& bearings_;
   const Matches& matches_;
-  const std::vector<InertialMotion> motions_;
   GlobalStageResult& result_;
 };
 

@@ -2,6 +2,7 @@
 #include "colmap_ext/cost_functions/pose_prior_cost.h"
 
 #include <cmath>
+#include <utility>
 
 #include "core/so3.h"
 
@@ -132,11 +133,18 @@ PosePriorCost::PosePriorCost(const PosePriorEdge& edge, Term term,
   }
   *mutable_parameter_block_sizes() = {6, 6};
   mutable_parameter_block_sizes()->resize(2 + from_shared_.size(), 3);
+  if (!edge.windows.has_length_scale) return;
+  if (term == Term::kTranslation) {
+    from_length_scale_ = inverse_sigma_ * translation_;
+  } else if (term == Term::kLength) {
+    from_length_scale_ = inverse_sigma_ * length_ * Eigen::Vector3d::UnitX();
+  }
+  if (from_length_scale_) mutable_parameter_block_sizes()->push_back(1);
 }
 
 bool PosePriorCost::Evaluate(double const* const* parameters, double* residuals,
                              double** jacobians) const {
-  double* no_jacobians[4] = {nullptr, nullptr, nullptr, nullptr};
+  double* no_jacobians[5] = {};
   if (jacobians == nullptr) jacobians = no_jacobians;
   if (term_ == Term::kRotation) {
     EvaluateRotation(residuals, jacobians);
@@ -158,6 +166,14 @@ void PosePriorCost::SubtractSharedErrors(double const* const* parameters,
       for (int col = 0; col < 3; ++col) {
         jacobians[2 + k][3 * row + col] = -from_shared_[k](row, col);
       }
+    }
+  }
+  if (!from_length_scale_) return;
+  const size_t last = 2 + from_shared_.size();
+  for (int row = 0; row < num_residuals(); ++row) {
+    residuals[row] -= (*from_length_scale_)[row] * *parameters[last];
+    if (jacobians[last] != nullptr) {
+      jacobians[last][row] = -(*from_length_scale_)[row];
     }
   }
 }
@@ -217,6 +233,25 @@ void PosePriorCost::EvaluateTranslation(double* residuals,
     WriteTranslationJacobians<3>(inverse_sigma_ * Eigen::Matrix3d::Identity(),
                                  translation, *pose2_, jacobians);
   }
+}
+
+WeightedSumCost::WeightedSumCost(double sigma, std::vector<double> weights)
+    : weights_(std::move(weights)) {
+  for (double& weight : weights_) weight /= sigma;
+  set_num_residuals(1);
+  mutable_parameter_block_sizes()->assign(weights_.size(), 1);
+}
+
+bool WeightedSumCost::Evaluate(double const* const* parameters,
+                               double* residuals, double** jacobians) const {
+  *residuals = 0.0;
+  for (size_t k = 0; k < weights_.size(); ++k) {
+    *residuals += weights_[k] * *parameters[k];
+    if (jacobians != nullptr && jacobians[k] != nullptr) {
+      *jacobians[k] = weights_[k];
+    }
+  }
+  return true;
 }
 
 bool DifferenceCost::Evaluate(double const* const* parameters,

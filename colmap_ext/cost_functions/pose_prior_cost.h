@@ -5,6 +5,7 @@
 #include <ceres/sized_cost_function.h>
 
 #include <Eigen/Core>
+#include <optional>
 #include <vector>
 
 #include "colmap_ext/cost_functions/adjusted_pose.h"
@@ -33,6 +34,7 @@ Eigen::Vector2d DirectionError(const Eigen::Vector3d& vector,
 //   kRotation: extrinsic_rotation (3), gyroscope_bias of the window (3)
 //   kDirection, kTranslation: driving_direction (3), direction_drift (3)
 //   kLength: direction_drift (3), where length_per_direction > 0
+//   kLength, kTranslation: length_scale (1), last, where has_length_scale
 // whose effect on R^ and t^ is subtracted to first order. The poses are read
 // from the objects, which must be up to date. One cost per term, so that the
 // robust loss can reject a wrong term and keep the others.
@@ -66,6 +68,20 @@ class PosePriorCost final : public ceres::CostFunction {
   // Effect of the shared parameters, subtracted from the residuals; as many
   // rows as residuals are used.
   std::vector<Eigen::Matrix3d> from_shared_;
+  std::optional<Eigen::Vector3d> from_length_scale_;
+};
+
+// Sum of weight * value / sigma, 1 residual. Parameters: one of 1 for each
+// weight.
+class WeightedSumCost final : public ceres::CostFunction {
+ public:
+  WeightedSumCost(double sigma, std::vector<double> weights);
+
+  bool Evaluate(double const* const* parameters, double* residuals,
+                double** jacobians) const final;
+
+ private:
+  std::vector<double> weights_;  // over sigma
 };
 
 // (second - decay * first) / sigma, 3 residuals. Parameters: 3 and 3.

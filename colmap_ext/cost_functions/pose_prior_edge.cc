@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <set>
 
 #include "core/median.h"
 
@@ -38,6 +39,7 @@ PosePriorEdge PosePriorEdgeFromPrior(const RelativePosePrior& prior) {
   edge.image_id1 = prior.image_id1;
   edge.image_id2 = prior.image_id2;
   edge.cam2_from_cam1 = prior.cam2_from_cam1;
+  edge.windows.drive = prior.drive;
   // Within a frame of a rig no time passes, and no log measured the motion.
   if (prior.dt_ns > 0) edge.dt_s = SecondsFromNs(prior.dt_ns);
   const auto sigma_or_infinity = [](double variance) {
@@ -91,6 +93,13 @@ void AssignSharedErrorWindows(const SharedErrorOptions& options,
                 edges);
   AssignWindows(options.direction_window_s, &SharedErrorWindows::direction,
                 edges);
+  std::set<int> drives;
+  for (const PosePriorEdge& edge : *edges) {
+    if (edge.MeasuresLength()) drives.insert(edge.windows.drive);
+  }
+  for (PosePriorEdge& edge : *edges) {
+    edge.windows.has_length_scale = drives.size() > 1 && edge.MeasuresLength();
+  }
   const double direction_sigma_rad = MedianDirectionSigma(*edges);
   if (!(direction_sigma_rad > 0.0)) return;
   for (PosePriorEdge& edge : *edges) {

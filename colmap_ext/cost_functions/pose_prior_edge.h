@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <cmath>
 #include <limits>
 #include <vector>
 
@@ -56,9 +57,15 @@ struct PosePriorEdge {
   // whole log affect it (shared_errors.h). Negative: not measured, no shared
   // errors.
   double dt_s = -1.0;
-  // Set by AssignSharedErrorWindows.
+  // The drive; the rest is set by AssignSharedErrorWindows.
   SharedErrorWindows windows;
 
+  // Whether a sensor measured the length with a drive's unit.
+  bool MeasuresLength() const {
+    return dt_s >= 0.0 && is_length_measured &&
+           (std::isfinite(length_sigma_m) ||
+            std::isfinite(translation_sigma_m));
+  }
   double SigmaOf(PriorTerm term) const {
     return std::array<double, kNumPriorTerms>{
         rotation_sigma_rad, direction_sigma_rad, length_sigma_m,
@@ -75,8 +82,8 @@ PosePriorEdge PosePriorEdgeFromPrior(const RelativePosePrior& prior);
 double MedianDirectionSigma(const std::vector<PosePriorEdge>& edges);
 
 // Sets the windows of the shared errors of edges with a duration, in order of
-// time. A window ends where an edge does not begin with the image that ended
-// the previous one.
+// time in each drive, drives one after the other. A window ends where an edge
+// does not begin with the image that ended the previous one.
 void AssignSharedErrorWindows(const SharedErrorOptions& options,
                               std::vector<PosePriorEdge>* edges);
 

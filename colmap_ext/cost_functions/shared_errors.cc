@@ -15,7 +15,8 @@ bool SharedErrorOptions::IsValid(std::string* error) const {
            {"extrinsic_rotation_sigma_rad", extrinsic_rotation_sigma_rad},
            {"driving_direction_sigma_rad", driving_direction_sigma_rad},
            {"direction_drift_time_s", direction_drift_time_s},
-           {"length_drift_ratio", length_drift_ratio}})
+           {"length_drift_ratio", length_drift_ratio},
+           {"length_scale_sigma", length_scale_sigma}})
       .Positive({{"gyroscope_window_s", gyroscope_window_s},
                  {"direction_window_s", direction_window_s}})
       .AllHold();
@@ -25,24 +26,36 @@ Eigen::Matrix3d CameraFromMiddle(const Eigen::Quaterniond& cam2_from_cam1) {
   return ExpSo3(0.5 * LogSo3(cam2_from_cam1)).toRotationMatrix();
 }
 
+namespace {
+
+template <typename Value>
+Value ValueOr(const Value& fallback, const std::map<int, Value>& values,
+              int key) {
+  const auto found = values.find(key);
+  return found == values.end() ? fallback : found->second;
+}
+
+}  // namespace
+
 Rigid3d SharedErrors::Correct(const Rigid3d& cam2_from_cam1, double dt_s,
                               const SharedErrorWindows& windows) const {
   const Eigen::Quaterniond& rotation = cam2_from_cam1.rotation;
   const Eigen::Matrix3d from_middle = CameraFromMiddle(rotation);
-  Eigen::Vector3d error = extrinsic_rotation - rotation * extrinsic_rotation;
-  const auto bias = gyroscope_bias.find(windows.gyroscope);
-  if (bias != gyroscope_bias.end()) {
-    error += dt_s * (from_middle * bias->second);
-  }
-  Eigen::Vector3d direction = driving_direction;
-  Eigen::Vector3d translation = cam2_from_cam1.translation;
-  const auto drift = direction_drift.find(windows.direction);
-  if (drift != direction_drift.end()) {
-    direction += drift->second;
-    translation *=
-        1.0 + windows.length_per_direction *
-                  translation.normalized().dot(from_middle * drift->second);
-  }
+  const Eigen::Vector3d zero = Eigen::Vector3d::Zero();
+  const Eigen::Vector3d extrinsic =
+      ValueOr(zero, extrinsic_rotation, windows.drive);
+  const Eigen::Vector3d error =
+      extrinsic - rotation * extrinsic +
+      dt_s * (from_middle * ValueOr(zero, gyroscope_bias, windows.gyroscope));
+  const Eigen::Vector3d drift =
+      ValueOr(zero, direction_drift, windows.direction);
+  const Eigen::Vector3d direction =
+      ValueOr(zero, driving_direction, windows.drive) + drift;
+  const Eigen::Vector3d& stated = cam2_from_cam1.translation;
+  const Eigen::Vector3d translation =
+      stated * (1.0 + ValueOr(0.0, length_scale, windows.drive) +
+                windows.length_per_direction *
+                    stated.normalized().dot(from_middle * drift));
   return Rigid3d((ExpSo3(error) * rotation).normalized(),
                  ExpSo3(from_middle * direction) * translation);
 }

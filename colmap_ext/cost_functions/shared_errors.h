@@ -10,7 +10,7 @@
 
 namespace adasfm {
 
-// Priors of mean zero on the errors that all motions of a sequence share
+// Priors of mean zero on the errors that all motions of a drive share
 // (docs/reference/math.md, Shared errors of the odometry). The adjustment
 // estimates the errors together with the poses; a sigma of 0 holds one at zero.
 struct SharedErrorOptions {
@@ -36,37 +36,46 @@ struct SharedErrorOptions {
   // also errs along the motion, as where wheels slip for seconds. The import
   // states it; 0 leaves lengths independent.
   double length_drift_ratio = 0.0;
+  // Relative 1 sigma of the scale of a drive's lengths, in an adjustment of
+  // several drives with lengths.
+  double length_scale_sigma = 0.01;
 
   bool IsValid(std::string* error) const;
 };
 
-// Selects the values of varying errors that apply to a motion.
+// Selects the values of the errors that apply to a motion.
 struct SharedErrorWindows {
-  // Numbers of the windows, counted through the sequence.
+  int drive = 0;  // RelativePosePrior::drive
+  // Numbers of the windows of varying errors, counted through all drives.
   int gyroscope = 0;
   int direction = 0;
   // Drift along the motion over drift across it: relative sigma of lengths over
   // sigma of directions.
   double length_per_direction = 0.0;
+  // Whether the lengths of the drive have a scale of their own.
+  bool has_length_scale = false;
 };
 
-// The errors of a sequence. For a motion with the stated cam2_from_cam1 = (R^,
+// The errors of all drives. For a motion with the stated cam2_from_cam1 = (R^,
 // t^) over dt, H = Exp(Log(R^) / 2), to first order
-//   R = Exp(dt H b + (I - R^) e) R^,  t = (1 + k u . H d) Exp(H (m + d)) t^
-// with b: gyroscope_bias of its window, e: extrinsic_rotation, m:
-// driving_direction, d: direction_drift of its window, all in the frame of the
-// camera, u = t^ / |t^| and k = length_per_direction. A rotation about u does
-// not change t^, so that component of d serves as the drift of the length. A
+//   R = Exp(dt H b + (I - R^) e) R^
+//   t = (1 + s + k u . H d) Exp(H (m + d)) t^
+// with b: gyroscope_bias of its window, e: extrinsic_rotation and m:
+// driving_direction of its drive, d: direction_drift of its window, all in the
+// frame of the camera, u = t^ / |t^| and k = length_per_direction. A rotation
+// about u does not change t^, so that component of d serves as the drift of the
+// length. s: length_scale of the drive, where several drives have lengths. A
 // common scale of all lengths is not included: it does not change the shape of
 // the model, and only the lengths observe it.
 struct SharedErrors {
-  // By window, rad/s; zero for missing windows.
-  std::map<int, Eigen::Vector3d> gyroscope_bias;
-  Eigen::Vector3d extrinsic_rotation = Eigen::Vector3d::Zero();  // rad
-  Eigen::Vector3d driving_direction = Eigen::Vector3d::Zero();   // rad
+  // Errors that a map does not have are zero.
+  std::map<int, Eigen::Vector3d> gyroscope_bias;      // by window, rad/s
+  std::map<int, Eigen::Vector3d> extrinsic_rotation;  // by drive, rad
+  std::map<int, Eigen::Vector3d> driving_direction;   // by drive, rad
   // By window: rad across the motion; along it relative length error over
   // length_per_direction.
   std::map<int, Eigen::Vector3d> direction_drift;
+  std::map<int, double> length_scale;  // by drive, relative
 
   Rigid3d Correct(const Rigid3d& cam2_from_cam1, double dt_s,
                   const SharedErrorWindows& windows) const;

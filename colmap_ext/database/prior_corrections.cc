@@ -9,7 +9,6 @@
 #include "colmap_ext/database/inertial_tables.h"
 #include "colmap_ext/database/prior_tables.h"
 #include "colmap_ext/io/double_blob.h"
-#include "global/calibration/correct_camera_imu_rotation.h"
 
 namespace adasfm {
 namespace {
@@ -30,25 +29,33 @@ Eigen::Quaterniond ReadRotation(const SqliteStatement& statement, int column,
   return Eigen::Quaterniond(qvec(0), qvec(1), qvec(2), qvec(3));
 }
 
-void WriteCameraImuCorrection(const Eigen::Quaterniond& camera_imu_correction,
-                              SqliteConnection* database) {
-  database->Execute("CREATE TABLE adasfm_camera_mount (qvec BLOB NOT NULL)");
+void WriteCameraImuCorrections(
+    const std::map<camera_t, Eigen::Quaterniond>& camera_imu_corrections,
+    SqliteConnection* database) {
+  database->Execute(
+      "CREATE TABLE adasfm_camera_mount (camera_id INTEGER NOT NULL, qvec BLOB "
+      "NOT NULL)");
   SqliteStatement statement(database,
-                            "INSERT INTO adasfm_camera_mount VALUES (?)");
-  BindDoubles(&statement, 1, ToQvec(camera_imu_correction).data(), 4);
-  statement.Step();
+                            "INSERT INTO adasfm_camera_mount VALUES (?, ?)");
+  for (const auto& [camera_id, rotation] : camera_imu_corrections) {
+    statement.Reset();
+    statement.BindInt(1, camera_id);
+    BindDoubles(&statement, 2, ToQvec(rotation).data(), 4);
+    statement.Step();
+  }
 }
 
 }  // namespace
 
 void WritePriorCorrections(
-    const std::optional<Eigen::Quaterniond>& camera_imu_correction,
+    const std::map<camera_t, Eigen::Quaterniond>& camera_imu_corrections,
     const std::vector<InertialLength>& lengths, SqliteConnection* database) {
   RemovePriorCorrections(database);
-  if (!camera_imu_correction && lengths.empty()) return;
+  if (camera_imu_corrections.empty() && lengths.empty()) return;
   CreateMetaTable(database);
-  if (camera_imu_correction)
-    WriteCameraImuCorrection(*camera_imu_correction, database);
+  if (!camera_imu_corrections.empty()) {
+    WriteCameraImuCorrections(camera_imu_corrections, database);
+  }
   WriteInertialLengths(lengths, database);
 }
 
@@ -63,22 +70,22 @@ void RemovePriorCorrections(SqliteConnection* database) {
   }
 }
 
-std::optional<Eigen::Quaterniond> ReadCameraImuCorrection(
+std::map<camera_t, Eigen::Quaterniond> ReadCameraImuCorrections(
     SqliteConnection* database) {
-  if (!database->HasTable(kCorrectionTable)) return std::nullopt;
+  std::map<camera_t, Eigen::Quaterniond> corrections;
+  if (!database->HasTable(kCorrectionTable)) return corrections;
+  // Older versions wrote one correction for all cameras.
+  const bool is_by_camera = database->Columns(kCorrectionTable).size() > 1;
   SqliteStatement statement(
-      database, std::string("SELECT qvec FROM ") + kCorrectionTable);
-  if (!statement.Step()) return std::nullopt;
-  return ReadRotation(statement, 0, std::string("table ") + kCorrectionTable);
-}
-
-double ApplyPriorCorrections(SqliteConnection* database,
-                             std::vector<RelativePosePrior>* priors) {
-  if (const auto camera_imu_correction = ReadCameraImuCorrection(database)) {
-    for (RelativePosePrior& prior : *priors)
-      RotatePrior(*camera_imu_correction, &prior);
+      database, is_by_camera ? "SELECT camera_id, qvec FROM adasfm_camera_mount"
+                             : "SELECT cameras.camera_id, qvec FROM cameras, "
+                               "adasfm_camera_mount");
+  while (statement.Step()) {
+    corrections.emplace(
+        static_cast<camera_t>(statement.Int(0)),
+        ReadRotation(statement, 1, std::string("table ") + kCorrectionTable));
   }
-  return AddInertialLengths(ReadInertialLengths(database), priors);
+  return corrections;
 }
 
 }  // namespace adasfm

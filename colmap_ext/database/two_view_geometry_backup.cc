@@ -263,7 +263,7 @@ Status RewriteTwoViewGeometries(
     const std::string& database_path,
     const std::vector<NewTwoViewGeometry>& rows,
     const std::vector<ImagePair>& removed,
-    const std::optional<Eigen::Quaterniond>& camera_imu_correction,
+    const std::map<camera_t, Eigen::Quaterniond>& camera_imu_corrections,
     const std::vector<InertialLength>& lengths) {
   const Status checked = CheckDatabase(database_path);
   if (!checked.ok()) return checked;
@@ -279,7 +279,7 @@ Status RewriteTwoViewGeometries(
     RemoveRows(removed, &database);
     WriteTwoViewGeometries(&database, rows);
     RecordDigests(rows, &database);
-    WritePriorCorrections(camera_imu_correction, lengths, &database);
+    WritePriorCorrections(camera_imu_corrections, lengths, &database);
     transaction.Commit();
   } catch (const SqliteError& error) {
     return Status::Error("cannot rewrite the two-view geometries of " +

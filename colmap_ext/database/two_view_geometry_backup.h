@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <Eigen/Geometry>
+#include <map>
 #include <string>
 #include <vector>
 
@@ -26,7 +28,7 @@ Status RewriteTwoViewGeometries(
     const std::string& database_path,
     const std::vector<NewTwoViewGeometry>& rows,
     const std::vector<ImagePair>& removed,
-    const std::optional<Eigen::Quaterniond>& camera_imu_correction = {},
+    const std::map<camera_t, Eigen::Quaterniond>& camera_imu_corrections = {},
     const std::vector<InertialLength>& lengths = {});
 
 struct RestoreSummary {

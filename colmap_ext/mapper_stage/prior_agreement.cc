@@ -3,6 +3,7 @@
 
 #include <Eigen/Cholesky>
 #include <algorithm>
+#include <map>
 #include <utility>
 
 #include "colmap_ext/cost_functions/shared_errors.h"
@@ -51,8 +52,8 @@ TranslationResidual ComputeTranslationResidual(const RelativePosePrior& prior,
   return result;
 }
 
-// Robust estimate (Cauchy) of the rotation that all translations share, an
-// unknown of the adjustment; zero where the adjustment's prior excludes it.
+// Robust estimate (Cauchy) of the rotation that translations of a drive share,
+// an unknown of the adjustment; zero where the adjustment's prior excludes it.
 Eigen::Vector3d FindSharedRotation(
     const std::vector<TranslationResidual>& translations) {
   const double sigma = SharedErrorOptions().driving_direction_sigma_rad;
@@ -101,7 +102,7 @@ bool IsHeldByPoints(const colmap::Reconstruction& model, image_t image_id) {
 void AddPriorResiduals(const SceneData& data,
                        const colmap::Reconstruction& model,
                        double size_over_priors, PriorResiduals* residuals) {
-  std::vector<TranslationResidual> translations;
+  std::map<int, std::vector<TranslationResidual>> translations;
   for (const RelativePosePrior& prior : data.priors) {
     if (!IsHeldByPoints(model, prior.image_id1) ||
         !IsHeldByPoints(model, prior.image_id2)) {
@@ -117,14 +118,17 @@ void AddPriorResiduals(const SceneData& data,
       if (chi2 >= 0.0) residuals->rotations.push_back(chi2);
     }
     if (prior.HasTranslation()) {
-      translations.push_back(ComputeTranslationResidual(prior, motion));
+      translations[prior.drive].push_back(
+          ComputeTranslationResidual(prior, motion));
     }
   }
-  const Eigen::Vector3d rotation = FindSharedRotation(translations);
-  for (const TranslationResidual& t : translations) {
-    const double chi2 =
-        Chi2(t.residual - t.by_rotation * rotation, t.covariance);
-    if (chi2 >= 0.0) residuals->translations.push_back(chi2);
+  for (const auto& [drive, of_drive] : translations) {
+    const Eigen::Vector3d rotation = FindSharedRotation(of_drive);
+    for (const TranslationResidual& t : of_drive) {
+      const double chi2 =
+          Chi2(t.residual - t.by_rotation * rotation, t.covariance);
+      if (chi2 >= 0.0) residuals->translations.push_back(chi2);
+    }
   }
 }
 

@@ -9,20 +9,17 @@
 namespace adasfm {
 
 std::optional<Eigen::Vector3d> FindGravityInWorld(
-    const SceneData& scene, const colmap::Reconstruction& reconstruction,
-    const Eigen::Quaterniond& camera_imu_correction) {
-  return FindGravityInWorld(scene, CamsFromWorld(reconstruction),
-                            camera_imu_correction);
+    const SceneData& scene, const colmap::Reconstruction& reconstruction) {
+  return FindGravityInWorld(scene, CamsFromWorld(reconstruction));
 }
 
 std::optional<Eigen::Vector3d> FindGravityInWorld(
-    const SceneData& scene, const std::map<image_t, Rigid3d>& cams_from_world,
-    const Eigen::Quaterniond& camera_imu_correction) {
+    const SceneData& scene, const std::map<image_t, Rigid3d>& cams_from_world) {
   std::vector<Eigen::Vector3d> directions;
   for (const auto& [image_id, pose] : cams_from_world) {
     const auto image = scene.images.find(image_id);
     if (image == scene.images.end() || !image->second.gravity_in_cam) continue;
-    directions.push_back(pose.rotation.conjugate() * camera_imu_correction *
+    directions.push_back(pose.rotation.conjugate() *
                          image->second.gravity_in_cam->normalized());
   }
   if (directions.empty()) return std::nullopt;
@@ -54,10 +51,9 @@ void TransformReconstruction(const Sim3d& new_from_old,
 }
 
 bool AlignToGravity(const SceneData& scene,
-                    colmap::Reconstruction* reconstruction,
-                    const Eigen::Quaterniond& camera_imu_correction) {
+                    colmap::Reconstruction* reconstruction) {
   const std::optional<Eigen::Vector3d> gravity =
-      FindGravityInWorld(scene, *reconstruction, camera_imu_correction);
+      FindGravityInWorld(scene, *reconstruction);
   if (!gravity) return false;
   const std::map<image_t, Rigid3d> poses = CamsFromWorld(*reconstruction);
   const Eigen::Quaterniond level_from_world =

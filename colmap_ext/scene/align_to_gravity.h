@@ -13,19 +13,14 @@ namespace adasfm {
 
 // The unit vector of gravity in the reconstruction's world: the geometric
 // median of the images' gravity directions, which a minority of wrong
-// directions does not change. camera_imu_correction rotates the scene's gravity
-// directions into the true camera frames (CameraImuRotationReport). None when
-// no registered image has a gravity direction.
+// directions does not change. None when no registered image has a gravity
+// direction.
 std::optional<Eigen::Vector3d> FindGravityInWorld(
-    const SceneData& scene, const colmap::Reconstruction& reconstruction,
-    const Eigen::Quaterniond& camera_imu_correction =
-        Eigen::Quaterniond::Identity());
+    const SceneData& scene, const colmap::Reconstruction& reconstruction);
 
 // The same for poses.
 std::optional<Eigen::Vector3d> FindGravityInWorld(
-    const SceneData& scene, const std::map<image_t, Rigid3d>& cams_from_world,
-    const Eigen::Quaterniond& camera_imu_correction =
-        Eigen::Quaterniond::Identity());
+    const SceneData& scene, const std::map<image_t, Rigid3d>& cams_from_world);
 
 // Transforms poses and points into another world frame.
 void TransformReconstruction(const Sim3d& new_from_old,
@@ -35,8 +30,6 @@ void TransformReconstruction(const Sim3d& new_from_old,
 // and moves its origin to the registered camera of the lowest id. False, and
 // nothing is changed, when there is no gravity direction.
 bool AlignToGravity(const SceneData& scene,
-                    colmap::Reconstruction* reconstruction,
-                    const Eigen::Quaterniond& camera_imu_correction =
-                        Eigen::Quaterniond::Identity());
+                    colmap::Reconstruction* reconstruction);
 
 }  // namespace adasfm

@@ -29,13 +29,12 @@ bool HasMetricPriors(const SceneData& scene,
 
 PositionAlignment AlignSceneToPositions(
     const SceneData& scene, const std::map<image_t, Rigid3d>& cams_from_world,
-    bool is_metric, const Eigen::Quaterniond& camera_imu_correction) {
+    bool is_metric) {
   PositionAlignmentInput input;
   input.positions = scene.positions;
   input.cams_from_world = cams_from_world;
   input.is_metric = is_metric;
-  input.down_in_world =
-      FindGravityInWorld(scene, cams_from_world, camera_imu_correction);
+  input.down_in_world = FindGravityInWorld(scene, cams_from_world);
   return AlignToPositions(input);
 }
 
@@ -50,15 +49,13 @@ std::map<image_t, Rigid3d> TransformCamsFromWorld(
 }
 
 Verticals FindVerticals(const SceneData& scene,
-                        const std::map<image_t, Rigid3d>& cams_from_enu,
-                        const Eigen::Quaterniond& camera_imu_correction) {
+                        const std::map<image_t, Rigid3d>& cams_from_enu) {
   Verticals verticals;
   verticals.sigma_rad = kDriveGravitySigmaRad;
   for (const auto& [image_id, pose] : cams_from_enu) {
     const auto image = scene.images.find(image_id);
     if (image == scene.images.end() || !image->second.gravity_in_cam) continue;
-    verticals.gravity_in_cam[image_id] =
-        camera_imu_correction * *image->second.gravity_in_cam;
+    verticals.gravity_in_cam[image_id] = *image->second.gravity_in_cam;
   }
   if (!verticals.gravity_in_cam.empty()) return verticals;
   verticals.sigma_rad = kDriveUprightSigmaRad;

@@ -15,13 +15,10 @@ bool HasMetricPriors(const SceneData& scene,
                      const std::map<image_t, Rigid3d>& cams_from_world);
 
 // AlignToPositions for poses of the scene's images, with the scene's positions
-// and gravity. camera_imu_correction rotates the scene's gravity directions
-// into the true camera frames (CameraImuRotationReport).
+// and gravity.
 PositionAlignment AlignSceneToPositions(
     const SceneData& scene, const std::map<image_t, Rigid3d>& cams_from_world,
-    bool is_metric,
-    const Eigen::Quaterniond& camera_imu_correction =
-        Eigen::Quaterniond::Identity());
+    bool is_metric);
 
 // Transforms the poses into the frame of the positions.
 std::map<image_t, Rigid3d> TransformCamsFromWorld(
@@ -40,9 +37,7 @@ struct Verticals {
 // The IMU's gravity directions if there are any; else the verticals of the
 // given poses, which are in the frame of the positions, with a large sigma.
 Verticals FindVerticals(const SceneData& scene,
-                        const std::map<image_t, Rigid3d>& cams_from_enu,
-                        const Eigen::Quaterniond& camera_imu_correction =
-                            Eigen::Quaterniond::Identity());
+                        const std::map<image_t, Rigid3d>& cams_from_enu);
 
 // The loss scale (PriorBundleAdjustmentOptions::position_loss_scale) of one of
 // num_rounds adjustments: it decreases from what the alignment needed to

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "colmap_ext/database/inertial_tables.h"
 #include "colmap_ext/database/prior_corrections.h"
 #include "colmap_ext/database/prior_tables.h"
 #include "colmap_ext/database/rig_table.h"
@@ -11,6 +12,7 @@
 #include "colmap_ext/host/camera.h"
 #include "colmap_ext/host/camera_models.h"
 #include "colmap_ext/host/database.h"
+#include "colmap_ext/scene/drives.h"
 #include "colmap_ext/scene/raw_matches.h"
 #include "core/prior_lengths.h"
 #include "core/sqlite.h"
@@ -50,7 +52,6 @@ void ReadScenePriors(SqliteConnection* database,
   for (const ImageTimeRow& row : loaded.tables.image_times) {
     scene->images.at(row.image_id).timestamp_ns = row.timestamp_ns;
   }
-  Eigen::Quaterniond camera_imu_correction = Eigen::Quaterniond::Identity();
   scene->priors = std::move(loaded.tables.priors);
   scene->gyroscope_bias_covariance = loaded.tables.gyroscope_bias_covariance;
   scene->length_drift_ratio = loaded.tables.length_drift_ratio;
@@ -59,23 +60,23 @@ void ReadScenePriors(SqliteConnection* database,
   scene->position_origin = loaded.tables.position_origin;
   scene->rigs = ReadCameraRigs(database);
   scene->frame_priors = ComputeFramePriors(scene->rigs);
-  if (!options.use_original_two_view_geometries) {
-    scene->inertial_scale_sigma =
-        ApplyPriorCorrections(database, &scene->priors);
-    camera_imu_correction =
-        ReadCameraImuCorrection(database).value_or(camera_imu_correction);
-  }
-  // Inertial motions constrain nothing in a model without metres.
-  if (options.use_original_two_view_geometries ||
-      scene->inertial_scale_sigma > 0.0 || HasMeasuredLengths(scene->priors)) {
-    scene->inertial_motions = std::move(loaded.tables.inertial_motions);
-    for (InertialMotion& motion : scene->inertial_motions) {
-      RotateInertialMotion(camera_imu_correction, &motion);
-    }
-  }
+  scene->inertial_motions = std::move(loaded.tables.inertial_motions);
+  NumberDrives(scene);
   for (const GravityRow& row : loaded.tables.gravity) {
-    scene->images.at(row.image_id).gravity_in_cam =
-        camera_imu_correction * row.gravity_in_cam;
+    scene->images.at(row.image_id).gravity_in_cam = row.gravity_in_cam;
+  }
+  if (!options.use_original_two_view_geometries) {
+    const CameraImuCorrectionMap corrections =
+        CorrectionsByDrive(*scene, ReadCameraImuCorrections(database));
+    RotatePriors(corrections, &scene->priors);
+    RotateGravityAndMotions(corrections, scene);
+    scene->inertial_scale_sigma =
+        AddInertialLengths(ReadInertialLengths(database), &scene->priors);
+    // Inertial motions constrain nothing in a model without metres.
+    if (!(scene->inertial_scale_sigma > 0.0) &&
+        !HasMeasuredLengths(scene->priors)) {
+      scene->inertial_motions.clear();
+    }
   }
   if (loaded.num_ignored_rows > 0) {
     scene->warnings.push_back(

@@ -29,6 +29,8 @@ struct SceneImage {
   std::optional<timestamp_t> timestamp_ns;
   // Unit vector towards the ground, in the camera frame.
   std::optional<Eigen::Vector3d> gravity_in_cam;
+  // As RelativePosePrior::drive (drives.h); -1: none.
+  int drive = -1;
 };
 
 struct ScenePair {

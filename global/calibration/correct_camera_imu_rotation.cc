@@ -207,22 +207,13 @@ bool CameraImuRotationOptions::IsValid(std::string* error) const {
       .AllHold();
 }
 
-void RotatePrior(const Eigen::Quaterniond& rotated_from_cam,
-                 RelativePosePrior* prior) {
-  Rigid3d& motion = prior->cam2_from_cam1;
-  motion.rotation =
-      (rotated_from_cam * motion.rotation * rotated_from_cam.conjugate())
-          .normalized();
-  motion.translation = rotated_from_cam * motion.translation;
-  const Eigen::Matrix3d matrix = rotated_from_cam.toRotationMatrix();
-  for (int row = 0; row < 6; row += 3) {
-    for (int col = 0; col < 6; col += 3) {
-      auto block = prior->covariance.block<3, 3>(row, col);
-      // A block that is not observed is not finite in any direction.
-      if (!block.allFinite()) continue;
-      block = (matrix * block * matrix.transpose()).eval();
-    }
+std::map<int, Eigen::Quaterniond> CameraImuCorrections(
+    const CameraImuRotationReports& reports) {
+  std::map<int, Eigen::Quaterniond> corrections;
+  for (const auto& [drive, report] : reports) {
+    if (report.corrected) corrections.emplace(drive, report.Correction());
   }
+  return corrections;
 }
 
 CameraImuRotationReport CorrectCameraImuRotation(

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Geometry>
+#include <map>
 #include <optional>
 #include <string>
 #include <vector>
@@ -58,13 +59,13 @@ struct CameraImuRotationReport {
 };
 
 // Estimates the error E of the camera's rotation in T_cam_imu and removes it
-// from the priors: R^ -> E R^ E^T, t^ -> E t^. Vision observes E in the
-// rotation of each pair (R = E R^ E^T) and in its direction of motion: with the
-// sensors' rotation held, the matches have one direction, E t^. The direction
-// of driving may be wrong in the same way, which directions cannot distinguish
-// from E. It is an unknown of its own (kDrivingDirectionSigmaRad), which widens
-// E's sigma to what rotations leave open. The problem is linear in both, in a
-// constant gyroscope bias and in an offset of all visual rotations
+// from the priors of a drive: R^ -> E R^ E^T, t^ -> E t^. Vision observes E in
+// the rotation of each pair (R = E R^ E^T) and in its direction of motion: with
+// the sensors' rotation held, the matches have one direction, E t^. The
+// direction of driving may be wrong in the same way, which directions cannot
+// distinguish from E. It is an unknown of its own (kDrivingDirectionSigmaRad),
+// which widens E's sigma to what rotations leave open. The problem is linear in
+// both, in a constant gyroscope bias and in an offset of all visual rotations
 // (kOffsetSigmaRad); Huber weights, relinearised. Covariance: least squares
 // plus a cluster-robust (sandwich) term with spans of the trajectory as
 // clusters, since pairs of one span share their errors.
@@ -77,8 +78,10 @@ CameraImuRotationReport CorrectCameraImuRotation(
     const ViewGraph& graph, const GlobalCorrespondences& correspondences,
     std::vector<RelativePosePrior>* priors);
 
-// Transforms the prior to a rotated camera frame.
-void RotatePrior(const Eigen::Quaterniond& rotated_from_cam,
-                 RelativePosePrior* prior);
+// By drive (RelativePosePrior::drive).
+using CameraImuRotationReports = std::map<int, CameraImuRotationReport>;
+// The corrections that were made.
+std::map<int, Eigen::Quaterniond> CameraImuCorrections(
+    const CameraImuRotationReports& reports);
 
 }  // namespace adasfm

@@ -50,8 +50,10 @@ Eigen::Matrix3d CameraFromMiddle(const Rigid3d& motion) {
 // The observed part of the motion, corrected by shared_rotation_errors.
 Rigid3d ObservedMotion(const OdometryChainOptions& options,
                        const RelativePosePrior& prior) {
+  const auto found = options.shared_rotation_errors.find(prior.drive);
   const SharedRotationErrors turns =
-      options.shared_rotation_errors.value_or(SharedRotationErrors());
+      found == options.shared_rotation_errors.end() ? SharedRotationErrors()
+                                                    : found->second;
   Rigid3d motion;
   if (prior.HasRotation()) {
     const Eigen::Quaterniond camera_imu = ExpSo3(turns.camera_imu_rad);
@@ -73,7 +75,7 @@ Eigen::Matrix3d PersistentRoot(const OdometryChainOptions& options,
                                const Rigid3d& motion) {
   const Eigen::Matrix3d covariance =
       ObservedCovariance(prior).bottomRightCorner<3, 3>();
-  if (!options.shared_rotation_errors ||
+  if (options.shared_rotation_errors.count(prior.drive) == 0 ||
       !(motion.translation.squaredNorm() > 0.0)) {
     return SquareRoot(covariance);
   }
@@ -119,7 +121,7 @@ OdometryChainOptions WithoutSharedErrors(const OdometryChainOptions& options) {
   independent.gyro_bias_covariance = Eigen::Matrix3d::Zero();
   independent.extrinsic_rotation_sigma_rad = 0.0;
   independent.driving_direction_sigma_rad = 0.0;
-  independent.shared_rotation_errors.reset();
+  independent.shared_rotation_errors.clear();
   independent.persistent_translation_ratio = 0.0;
   return independent;
 }
@@ -172,6 +174,7 @@ void OdometryChain::AppendPiece(image_t first,
     node.place_sum += place;
     node.place_square_sum += place * place.transpose();
     node.image_id = prior.image_id2;
+    node.drive = prior.drive;
     node.cam_from_start = motion * node.cam_from_start;
     node.num_without_rotation += !prior.HasRotation();
     node.num_without_position += !prior.HasMotion();
@@ -290,9 +293,10 @@ ChainMotion OdometryChain::MotionOfLeaders(image_t image_id1,
   shared.block<3, 3>(kGyro, kGyro) = options_.gyro_bias_covariance.value_or(
       std::pow(options_.gyro_bias_sigma_rad_s, 2) *
       Eigen::Matrix3d::Identity());
-  if (options_.shared_rotation_errors) {
-    shared.block<6, 6>(kCameraImu, kCameraImu) =
-        options_.shared_rotation_errors->covariance;
+  // Where vision joins drives in one piece, those of the later one.
+  const auto estimated = options_.shared_rotation_errors.find(later.drive);
+  if (estimated != options_.shared_rotation_errors.end()) {
+    shared.block<6, 6>(kCameraImu, kCameraImu) = estimated->second.covariance;
   }
   const Systematic systematic = later.systematic - earlier.systematic;
   const Matrix6d covariance_in_start =

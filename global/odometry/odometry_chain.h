@@ -13,7 +13,8 @@
 
 namespace adasfm {
 
-// Visual corrections that all priors share (CorrectCameraImuRotation), rad.
+// Visual corrections that the priors of a drive share
+// (CorrectCameraImuRotation), rad.
 // Their rotations R become Exp(camera_imu) R Exp(-camera_imu), their
 // translations t become Exp(H driving_direction) t, where H rotates from the
 // camera halfway to the later camera.
@@ -24,7 +25,7 @@ struct SharedRotationErrors {
   Eigen::Matrix<double, 6, 6> covariance = Eigen::Matrix<double, 6, 6>::Zero();
 };
 
-// Errors that all steps of the chain share. They grow with the length of the
+// Errors that all steps of a drive share. They grow with the length of the
 // path, not with its root, and dominate after kilometres.
 struct OdometryChainOptions {
   // 1 sigma of the wheels' common scale error.
@@ -40,12 +41,13 @@ struct OdometryChainOptions {
   // driving in the camera, rad.
   double extrinsic_rotation_sigma_rad = 5e-3;
   double driving_direction_sigma_rad = 0.01;
-  // Visual estimate of both, whose covariance replaces these sigmas.
-  std::optional<SharedRotationErrors> shared_rotation_errors;
+  // Visual estimates of both by drive (RelativePosePrior::drive), whose
+  // covariance replaces these sigmas.
+  std::map<int, SharedRotationErrors> shared_rotation_errors;
   // The steps of a smoothed drive share errors of tilt and velocity: this many
   // sigmas of their translations persist from step to step, besides the part
-  // that changes. With shared_rotation_errors, only the part along the motion
-  // persists.
+  // that changes. In drives of shared_rotation_errors, only the part along the
+  // motion persists.
   double persistent_translation_ratio = 1.0;
   // 1 sigma, as a ratio, of the scale change at each step, which lasts for all
   // later steps. Visual odometry alone does not constrain its scale.
@@ -119,6 +121,7 @@ class OdometryChain {
   struct Node {
     image_t image_id = kInvalidImageId;
     int piece = -1;
+    int drive = 0;  // of the step to this node
     Rigid3d cam_from_start;
     // Prefix sums over the piece's steps up to this node.
     Matrix6d covariance = Matrix6d::Zero();

@@ -275,7 +275,7 @@ TEST(InertialFactors, TellHowTheImuIsTurned) {
                               prior.covariance.bottomRightCorner<3, 3>()};
     }
     const auto rotation_error = [&](const PriorBundleAdjustmentSummary& found) {
-      return std::abs(found.shared_errors.extrinsic_rotation.y() - angle);
+      return std::abs(found.shared_errors.extrinsic_rotation.at(0).y() - angle);
     };
     colmap::Reconstruction model = start;
     error_without += rotation_error(Adjust(problem, &model)) / 5.0;

@@ -211,9 +211,9 @@ TEST(RunGlobalStageTest,
 
   const GlobalStageResult corrected = RunStage(scene);
   EXPECT_TRUE(corrected.models[0].priors_agree);
-  EXPECT_TRUE(corrected.poses.camera_imu_rotation.corrected);
   const CameraImuRotationReport& camera_imu =
-      corrected.poses.camera_imu_rotation;
+      corrected.poses.camera_imu_rotations.at(0);
+  EXPECT_TRUE(camera_imu.corrected);
   EXPECT_NEAR(camera_imu.rotation_rad.y(), -DegToRad(3.0),
               4.0 * camera_imu.sigma_rad);
   // The drive of 90 m turns little, so that roll is weakly observed; it is not
@@ -227,9 +227,31 @@ TEST(RunGlobalStageTest,
   // A rotation that is not significant causes no warning, since the direction
   // of driving explains it too.
   GlobalStageResult uncertain = corrected;
-  uncertain.poses.camera_imu_rotation.sigma_rad =
+  uncertain.poses.camera_imu_rotations.at(0).sigma_rad =
       0.4 * camera_imu.rotation_rad.norm();
   EXPECT_TRUE(ListGlobalWarnings(scene, uncertain).empty());
+}
+
+// The T_cam_imu of the second of two machines is 3 deg off.
+TEST(RunGlobalStageTest, CorrectsTheCameraImuRotationOfADriveByItself) {
+  SyntheticWorldOptions options = SmallWorld();
+  options.num_images = 160;
+  const SyntheticWorld world = BuildSyntheticWorld(options);
+  SceneData scene = BuildSyntheticScene(world, SyntheticPriorOptions());
+  const Eigen::Quaterniond turn =
+      ExpSo3(DegToRad(3.0) * Eigen::Vector3d::UnitY());
+  const size_t half = scene.priors.size() / 2;
+  for (size_t k = half; k < scene.priors.size(); ++k) {
+    scene.priors[k].drive = 1;
+    RotatePrior(turn, &scene.priors[k]);
+  }
+  scene.priors.erase(scene.priors.begin() + half);
+  const CameraImuRotationReports found =
+      RunStage(scene).poses.camera_imu_rotations;
+  EXPECT_FALSE(found.at(0).corrected);
+  EXPECT_TRUE(found.at(1).corrected);
+  EXPECT_NEAR(found.at(1).rotation_rad.y(), -DegToRad(3.0),
+              4.0 * found.at(1).sigma_rad);
 }
 
 // A phone that was never stationary, and vision too poor to estimate the bias:

@@ -116,11 +116,14 @@ TEST_P(PosePriorCostTest, JacobiansBySharedErrorsEqualNumericOnes) {
     PosePriorEdge edge = RandomEdge(&random);
     edge.dt_s = 0.3;
     edge.windows.length_per_direction = 0.5 * (seed % 3);
+    edge.windows.has_length_scale = seed % 2 == 1;
     const PosePriorCost cost(edge, GetParam(), 1.0, &pose1, &pose2);
     Eigen::Vector3d shared[] = {random.GaussianVector(0.1),
+                                random.GaussianVector(0.1),
                                 random.GaussianVector(0.1)};
     std::vector<double*> parameters = {pose1.parameters, pose2.parameters,
-                                       shared[0].data(), shared[1].data()};
+                                       shared[0].data(), shared[1].data(),
+                                       shared[2].data()};
     parameters.resize(cost.parameter_block_sizes().size());
     const auto changed = [&] {
       pose1.Update();
@@ -141,10 +144,12 @@ TEST_P(PosePriorCostTest, SharedErrorsAreThoseThatCorrectTakesOut) {
     PosePriorEdge edge = RandomEdge(&random);
     edge.dt_s = 0.3;
     edge.windows.length_per_direction = 0.5 * (seed % 3);
+    edge.windows.has_length_scale = seed % 2 == 1;
     SharedErrors errors;
+    if (seed % 2 == 1) errors.length_scale[0] = random.Gaussian(1e-3);
     errors.gyroscope_bias[0] = random.GaussianVector(1e-3);
-    errors.extrinsic_rotation = random.GaussianVector(1e-3);
-    errors.driving_direction = random.GaussianVector(1e-3);
+    errors.extrinsic_rotation[0] = random.GaussianVector(1e-3);
+    errors.driving_direction[0] = random.GaussianVector(1e-3);
     errors.direction_drift[0] = random.GaussianVector(1e-3);
     AdjustedPose pose1 = RandomPose(&random);
     AdjustedPose pose2(
@@ -153,15 +158,25 @@ TEST_P(PosePriorCostTest, SharedErrorsAreThoseThatCorrectTakesOut) {
     const PosePriorCost cost(edge, GetParam(), 1.0, &pose1, &pose2);
     const bool is_rotation = GetParam() == PosePriorCost::Term::kRotation;
     const bool is_length = GetParam() == PosePriorCost::Term::kLength;
-    const double* drift = errors.direction_drift.at(0).data();
-    const double* parameters[] = {
-        pose1.parameters, pose2.parameters,
-        is_rotation ? errors.extrinsic_rotation.data()
-        : is_length ? drift
-                    : errors.driving_direction.data(),
-        is_rotation ? errors.gyroscope_bias.at(0).data() : drift};
+    std::vector<const double*> parameters = {pose1.parameters,
+                                             pose2.parameters};
+    if (is_rotation) {
+      parameters.push_back(errors.extrinsic_rotation.at(0).data());
+      parameters.push_back(errors.gyroscope_bias.at(0).data());
+    } else {
+      if (!is_length) {
+        parameters.push_back(errors.driving_direction.at(0).data());
+      }
+      if (!is_length || edge.windows.length_per_direction > 0.0) {
+        parameters.push_back(errors.direction_drift.at(0).data());
+      }
+      if (parameters.size() < cost.parameter_block_sizes().size()) {
+        parameters.push_back(&errors.length_scale.at(0));
+      }
+    }
+    ASSERT_EQ(parameters.size(), cost.parameter_block_sizes().size());
     std::vector<double> residuals(cost.num_residuals());
-    cost.Evaluate(parameters, residuals.data(), nullptr);
+    cost.Evaluate(parameters.data(), residuals.data(), nullptr);
     // Second-order terms of errors of 1e-3.
     for (const double residual : residuals) EXPECT_NEAR(residual, 0.0, 3e-4);
   }

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <limits>
+#include <map>
 
 #include "colmap_ext/database/inertial_tables.h"
 #include "colmap_ext/database/prior_tables.h"
@@ -11,7 +12,7 @@
 #include "colmap_ext/datasets/write_synthetic_world.h"
 #include "colmap_ext/scene/scene_data.h"
 #include "core/so3.h"
-#include "global/calibration/correct_camera_imu_rotation.h"
+#include "core/sqlite.h"
 #include "tests/testing/colmap_ext/synthetic_scene.h"
 #include "tests/testing/colmap_ext/temporary_folder.h"
 
@@ -67,12 +68,14 @@ class PriorCorrectionsTest : public testing::Test {
   PriorTables tables_;
   const Eigen::Quaterniond correction_ =
       ExpSo3(Eigen::Vector3d(0.01, -0.03, 0.02));
+  const std::map<camera_t, Eigen::Quaterniond> corrections_ = {
+      {1, correction_}};
   Priors corrected_;
 };
 
 TEST_F(PriorCorrectionsTest, AreReadUntilTheyAreRestored) {
   ExpectPriors(Read(), tables_.priors);
-  ASSERT_TRUE(RewriteTwoViewGeometries(path_, {}, {}, correction_).ok());
+  ASSERT_TRUE(RewriteTwoViewGeometries(path_, {}, {}, corrections_).ok());
   ExpectPriors(Read(), corrected_);
   // A second run of the global stage starts from the import.
   ExpectPriors(Read(true), tables_.priors);
@@ -83,20 +86,48 @@ TEST_F(PriorCorrectionsTest, AreReadUntilTheyAreRestored) {
   EXPECT_FALSE(RestoreTwoViewGeometries(path_)->priors_restored);
 }
 
+TEST_F(PriorCorrectionsTest, OlderTablesHaveOneForAllCameras) {
+  ASSERT_TRUE(RewriteTwoViewGeometries(path_, {}, {}, corrections_).ok());
+  SqliteConnection(path_, SqliteConnection::Mode::kWrite)
+      .Execute("ALTER TABLE adasfm_camera_mount DROP COLUMN camera_id");
+  ExpectPriors(Read(), corrected_);
+}
+
+// The second half of the images has a camera of its own, and no prior leads
+// there: another machine, whose T_cam_imu is right.
+TEST_F(PriorCorrectionsTest, AreThoseOfTheCamerasDrive) {
+  const image_t last = tables_.priors[2].image_id1;
+  tables_.priors.erase(tables_.priors.begin() + 2);
+  ASSERT_TRUE(WritePriorTables(path_, tables_).ok());
+  SqliteConnection(path_, SqliteConnection::Mode::kWrite)
+      .Execute(
+          "INSERT INTO cameras SELECT 2, model, width, height, params, "
+          "prior_focal_length FROM cameras WHERE camera_id = 1;"
+          "UPDATE images SET camera_id = 2 WHERE image_id > " +
+          std::to_string(last));
+  ASSERT_TRUE(RewriteTwoViewGeometries(path_, {}, {}, corrections_).ok());
+  Priors expected = tables_.priors;
+  for (size_t k = 0; k < 2; ++k) RotatePrior(correction_, &expected[k]);
+  const Priors read = Read();
+  ExpectPriors(read, expected);
+  for (size_t k = 0; k < read.size(); ++k)
+    EXPECT_EQ(read[k].drive, k < 2 ? 0 : 1);
+}
+
 TEST_F(PriorCorrectionsTest, TheLastRunCounts) {
-  ASSERT_TRUE(RewriteTwoViewGeometries(path_, {}, {}, correction_).ok());
+  ASSERT_TRUE(RewriteTwoViewGeometries(path_, {}, {}, corrections_).ok());
   ASSERT_TRUE(RewriteTwoViewGeometries(path_, {}, {}).ok());
   ExpectPriors(Read(), tables_.priors);
 }
 
 TEST_F(PriorCorrectionsTest, ANewImportRemovesThem) {
-  ASSERT_TRUE(RewriteTwoViewGeometries(path_, {}, {}, correction_).ok());
+  ASSERT_TRUE(RewriteTwoViewGeometries(path_, {}, {}, corrections_).ok());
   ASSERT_TRUE(WritePriorTables(path_, tables_).ok());
   ExpectPriors(Read(), tables_.priors);
 }
 
 TEST_F(PriorCorrectionsTest, DamagedRowsAreAnError) {
-  ASSERT_TRUE(RewriteTwoViewGeometries(path_, {}, {}, correction_).ok());
+  ASSERT_TRUE(RewriteTwoViewGeometries(path_, {}, {}, corrections_).ok());
   SqliteConnection(path_, SqliteConnection::Mode::kWrite)
       .Execute("UPDATE adasfm_camera_mount SET qvec = X'0102'");
   EXPECT_FALSE(ReadSceneData(path_, SceneDataOptions()).ok());
@@ -111,7 +142,7 @@ TEST_F(PriorCorrectionsTest, TurnGravityToo) {
     options.use_original_two_view_geometries = originals;
     return *ReadSceneData(path_, options)->images.at(image_id).gravity_in_cam;
   };
-  ASSERT_TRUE(RewriteTwoViewGeometries(path_, {}, {}, correction_).ok());
+  ASSERT_TRUE(RewriteTwoViewGeometries(path_, {}, {}, corrections_).ok());
   EXPECT_LT((gravity(false) - correction_ * Eigen::Vector3d::UnitY()).norm(),
             1e-9);
   EXPECT_EQ(gravity(true), Eigen::Vector3d::UnitY());
@@ -146,8 +177,8 @@ class InertialLengthsTest : public PriorCorrectionsTest {
   }
 
   Status Rewrite(
-      const std::optional<Eigen::Quaterniond>& correction = {}) const {
-    return RewriteTwoViewGeometries(path_, {}, {}, correction, lengths_);
+      const std::map<camera_t, Eigen::Quaterniond>& corrections = {}) const {
+    return RewriteTwoViewGeometries(path_, {}, {}, corrections, lengths_);
   }
 
   // Whether the priors have the inertial lengths.
@@ -193,7 +224,7 @@ TEST_F(InertialLengthsTest, OlderTablesHaveNoBridges) {
 }
 
 TEST_F(InertialLengthsTest, GoToPriorsWithoutLength) {
-  ASSERT_TRUE(Rewrite(correction_).ok());
+  ASSERT_TRUE(Rewrite(corrections_).ok());
   const StatusOr<SceneData> scene = ReadSceneData(path_, SceneDataOptions());
   ASSERT_TRUE(scene.ok()) << scene.status().message();
   for (size_t k = 0; k + 1 < lengths_.size(); ++k) {
@@ -235,9 +266,9 @@ TEST_F(InertialLengthsTest, StayUntilTheyAreReplaced) {
   EXPECT_TRUE(AreApplied());
   ASSERT_TRUE(RestoreTwoViewGeometries(path_)->priors_restored);
   EXPECT_FALSE(AreApplied());
-  ASSERT_TRUE(Rewrite(correction_).ok());
+  ASSERT_TRUE(Rewrite(corrections_).ok());
   EXPECT_TRUE(AreApplied());
-  ASSERT_TRUE(RewriteTwoViewGeometries(path_, {}, {}, correction_).ok());
+  ASSERT_TRUE(RewriteTwoViewGeometries(path_, {}, {}, corrections_).ok());
   EXPECT_FALSE(AreApplied());
   ASSERT_TRUE(Rewrite().ok());
   ASSERT_TRUE(WritePriorTables(path_, tables_).ok());

@@ -219,7 +219,7 @@ TEST_F(PriorTablesTest, RemovesAllThatItWrote) {
   ASSERT_TRUE(WritePriorTables(path_, tables).ok());
   SqliteConnection database(path_, SqliteConnection::Mode::kWrite);
   WritePriorCorrections(
-      Eigen::Quaterniond::Identity(),
+      {{1, Eigen::Quaterniond::Identity()}},
       {{tables.priors[0].image_id1, tables.priors[0].image_id2, 1.0}},
       &database);
   RemovePriorTables(&database);

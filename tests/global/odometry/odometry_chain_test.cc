@@ -213,7 +213,7 @@ TEST(OdometryChain, SharedErrorsAgreeWithMonteCarlo) {
     }
     return priors;
   };
-  options.shared_rotation_errors = found;
+  options.shared_rotation_errors[0] = found;
   const ChainMotion stated =
       OdometryChain(
           turn_away(found.camera_imu_rad, found.driving_direction_rad), options)

@@ -1,0 +1,100 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "colmap_ext/scene/drives.h"
+
+#include <map>
+
+#include "core/disjoint_sets.h"
+
+namespace adasfm {
+
+void NumberDrives(SceneData* scene) {
+  std::map<camera_t, int> index_of;
+  for (const auto& [camera_id, camera] : scene->cameras) {
+    index_of.emplace(camera_id, static_cast<int>(index_of.size()));
+  }
+  const auto index_of_image = [&](image_t image_id) {
+    return index_of.at(scene->images.at(image_id).camera_id);
+  };
+  DisjointSets machines(index_of.size());
+  std::map<int, int> camera_of_rig;
+  for (const auto& [camera_id, camera] : scene->rigs.cameras) {
+    const auto index = index_of.find(camera_id);
+    if (index == index_of.end()) continue;
+    machines.Join(
+        index->second,
+        camera_of_rig.emplace(camera.rig_id, index->second).first->second);
+  }
+  for (const RelativePosePrior& prior : scene->priors) {
+    machines.Join(index_of_image(prior.image_id1),
+                  index_of_image(prior.image_id2));
+  }
+  std::map<int, int> drives;
+  for (RelativePosePrior& prior : scene->priors) {
+    prior.drive = drives
+                      .emplace(machines.Find(index_of_image(prior.image_id1)),
+                               static_cast<int>(drives.size()))
+                      .first->second;
+  }
+  for (auto& [image_id, image] : scene->images) {
+    const auto drive = drives.find(machines.Find(index_of.at(image.camera_id)));
+    if (drive != drives.end()) image.drive = drive->second;
+  }
+  for (InertialMotion& motion : scene->inertial_motions) {
+    motion.drive = scene->images.at(motion.image_id1).drive;
+  }
+}
+
+void RotatePriors(const CameraImuCorrectionMap& corrections,
+                  std::vector<RelativePosePrior>* priors) {
+  for (RelativePosePrior& prior : *priors) {
+    const auto found = corrections.find(prior.drive);
+    if (found != corrections.end()) RotatePrior(found->second, &prior);
+  }
+}
+
+void RotateGravityAndMotions(const CameraImuCorrectionMap& corrections,
+                             SceneData* scene) {
+  for (auto& [image_id, image] : scene->images) {
+    const auto found = corrections.find(image.drive);
+    if (found == corrections.end() || !image.gravity_in_cam) continue;
+    image.gravity_in_cam = found->second * *image.gravity_in_cam;
+  }
+  for (InertialMotion& motion : scene->inertial_motions) {
+    const auto found = corrections.find(motion.drive);
+    if (found != corrections.end())
+      RotateInertialMotion(found->second, &motion);
+  }
+}
+
+CameraImuCorrectionMap Inverted(CameraImuCorrectionMap corrections) {
+  for (auto& [drive, rotation] : corrections) {
+    rotation = rotation.conjugate();
+  }
+  return corrections;
+}
+
+std::map<camera_t, Eigen::Quaterniond> CorrectionsByCamera(
+    const SceneData& scene, const CameraImuCorrectionMap& corrections) {
+  std::map<camera_t, Eigen::Quaterniond> by_camera;
+  for (const auto& [image_id, image] : scene.images) {
+    const auto found = corrections.find(image.drive);
+    if (found == corrections.end()) continue;
+    by_camera.emplace(image.camera_id, found->second);
+  }
+  return by_camera;
+}
+
+CameraImuCorrectionMap CorrectionsByDrive(
+    const SceneData& scene,
+    const std::map<camera_t, Eigen::Quaterniond>& corrections) {
+  CameraImuCorrectionMap by_drive;
+  for (const auto& [image_id, image] : scene.images) {
+    const auto found = corrections.find(image.camera_id);
+    if (found != corrections.end() && image.drive >= 0) {
+      by_drive.emplace(image.drive, found->second);
+    }
+  }
+  return by_drive;
+}
+
+}  // namespace adasfm
