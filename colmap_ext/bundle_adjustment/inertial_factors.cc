@@ -9,6 +9,7 @@
 #include <cmath>
 #include <map>
 #include <memory>
+#include <optional>
 #include <utility>
 
 #include "colmap_ext/bundle_adjustment/bundle_problem.h"
@@ -294,12 +295,12 @@ InertialTerms AddInertialFactors(const PriorBundleAdjustmentOptions& options,
   double* gravity = bundle->AddParameters(shared.gravity);
   double* unit = bundle->AddParameters(shared.unit);
   AddNormalPrior(kUnitSigma, {1.0}, unit, bundle);
-  const int* drive = nullptr;
+  std::optional<int> drive;
   double* bias = nullptr;
   double seconds = 0.0;
   for (const Factor& factor : factors) {
-    if (drive == nullptr || *drive != factor.motion1->drive) {
-      drive = &factor.motion1->drive;
+    if (drive != factor.motion1->drive) {
+      drive = factor.motion1->drive;
       bias = bundle->AddParameters(shared.bias);
       AddNormalPrior(kBiasSigmaMps2, {0.0, 0.0, 0.0}, bias, bundle);
       seconds = 0.0;

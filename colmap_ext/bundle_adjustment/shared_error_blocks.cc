@@ -4,7 +4,6 @@
 #include <ceres/normal_prior.h>
 
 #include <Eigen/Core>
-#include <algorithm>
 #include <cmath>
 #include <utility>
 
@@ -99,9 +98,11 @@ void SharedErrorBlocks::AddGyroscopePriors(ceres::Problem* problem) {
   const double sigma = options_.gyroscope_bias_sigma_rad_s;
   const double step_sigma = options_.gyroscope_random_walk_rad_s_sqrt_s *
                             std::sqrt(options_.gyroscope_window_s);
-  Block* before = nullptr;
+  std::map<int, Block*> last_of_drive;
   for (auto& [key, block] : gyroscope_bias_) {
-    if (!Continues(before, block) || !(sigma > 0.0) || !(step_sigma > 0.0)) {
+    Block*& before = last_of_drive[block.drive];
+    if (!options_.enabled || before == nullptr || !(sigma > 0.0) ||
+        !(step_sigma > 0.0)) {
       AddPrior(sigma, &block, problem);
     } else {
       AddStep(step_sigma, 1.0, before, &block, problem);
@@ -116,9 +117,10 @@ void SharedErrorBlocks::AddDirectionDriftPriors(ceres::Problem* problem) {
   const double sigma = direction_drift_sigma_rad_;
   const double decay =
       std::exp(-options_.direction_window_s / options_.direction_drift_time_s);
-  Block* before = nullptr;
+  std::map<int, Block*> last_of_drive;
   for (auto& [key, block] : direction_drift_) {
-    if (!Continues(before, block) || !(sigma > 0.0)) {
+    Block*& before = last_of_drive[block.drive];
+    if (!options_.enabled || before == nullptr || !(sigma > 0.0)) {
       AddPrior(sigma, &block, problem);
     } else {
       AddStep(sigma * std::sqrt(1.0 - decay * decay), decay, before, &block,
@@ -133,31 +135,28 @@ void SharedErrorBlocks::AddDirectionDriftPriors(ceres::Problem* problem) {
 void SharedErrorBlocks::AddLengthScalePriors(ceres::Problem* problem) {
   constexpr double kMeanSigma = 1e-6;
   if (length_scale_.empty()) return;
-  int num_lengths = 0;
-  for (const auto& [drive, scale] : length_scale_) {
-    num_lengths += scale.num_lengths;
+  if (!options_.enabled || !(options_.length_scale_sigma > 0.0)) {
+    for (auto& [drive, scale] : length_scale_) {
+      problem->SetParameterBlockConstant(&scale.value);
+    }
+    return;
   }
+  const auto add = [&](double sigma, std::vector<double> weights,
+                       const std::vector<double*>& values) {
+    costs_.push_back(
+        std::make_unique<WeightedSumCost>(sigma, std::move(weights)));
+    problem->AddResidualBlock(costs_.back().get(), nullptr, values);
+  };
+  int num_lengths = 0;
+  for (auto& [drive, scale] : length_scale_) num_lengths += scale.num_lengths;
   std::vector<double*> values;
   std::vector<double> shares;
   for (auto& [drive, scale] : length_scale_) {
+    add(options_.length_scale_sigma, {1.0}, {&scale.value});
     values.push_back(&scale.value);
     shares.push_back(1.0 * scale.num_lengths / num_lengths);
-    if (!options_.enabled || !(options_.length_scale_sigma > 0.0)) {
-      problem->SetParameterBlockConstant(&scale.value);
-      continue;
-    }
-    costs_.push_back(std::make_unique<WeightedSumCost>(
-        options_.length_scale_sigma, std::vector<double>{1.0}));
-    problem->AddResidualBlock(costs_.back().get(), nullptr, &scale.value);
   }
-  costs_.push_back(
-      std::make_unique<WeightedSumCost>(kMeanSigma, std::move(shares)));
-  problem->AddResidualBlock(costs_.back().get(), nullptr, values);
-}
-
-bool SharedErrorBlocks::Continues(const Block* before,
-                                  const Block& block) const {
-  return options_.enabled && before != nullptr && before->drive == block.drive;
+  add(kMeanSigma, std::move(shares), values);
 }
 
 std::vector<double*> SharedErrorBlocks::Used() {

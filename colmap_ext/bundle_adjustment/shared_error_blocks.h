@@ -54,9 +54,6 @@ class SharedErrorBlocks {
   void AddStep(double sigma, double decay, Block* before, Block* block,
                ceres::Problem* problem);
 
-  // Whether a varying error goes on from the window before.
-  bool Continues(const Block* before, const Block& block) const;
-
   const SharedErrorOptions options_;
   double direction_drift_sigma_rad_ = 0.0;
   Blocks extrinsic_rotation_;  // by drive

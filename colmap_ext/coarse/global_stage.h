@@ -83,7 +83,8 @@ using StageProgress = std::function<void(const std::string&, double)>;
 //   2.9      metres without wheels       MeasureSize, per component
 // The scene must be read with its original two-view geometries. Raw matches are
 // requested while the stage works; without a source they are the scene's. An
-// error when no two images of the scene are connected. Throws
+// error when no two images of the scene are connected. Where T_cam_imu was
+// corrected, the scene's gravity and inertial motions are rotated. Throws
 // std::invalid_argument for invalid options.
 StatusOr<GlobalStageResult> RunGlobalStage(const GlobalStageOptions& options,
                                            SceneData* scene,

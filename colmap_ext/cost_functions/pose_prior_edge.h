@@ -82,7 +82,7 @@ PosePriorEdge PosePriorEdgeFromPrior(const RelativePosePrior& prior);
 double MedianDirectionSigma(const std::vector<PosePriorEdge>& edges);
 
 // Sets the windows of the shared errors of edges with a duration, in order of
-// time in each drive, drives one after the other. A window ends where an edge
+// time in each drive. A window ends where an edge
 // does not begin with the image that ended the previous one.
 void AssignSharedErrorWindows(const SharedErrorOptions& options,
                               std::vector<PosePriorEdge>* edges);
