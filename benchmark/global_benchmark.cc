@@ -70,12 +70,14 @@ BENCHMARK(BM_EstimateCoarsePoses)
     ->ArgsProduct({{250, 500, 1000}, {0, 1}})
     ->Unit(benchmark::kMillisecond);
 
+// As in the coarse stage.
+constexpr int kMaxTrackLength = 12;
+
 void BM_BuildTracks(benchmark::State& state) {
   const Input input = BuildInput(state.range(0));
   for (auto _ : state) {
     benchmark::DoNotOptimize(SelectTracks(
-        TrackOptions(),
-        BuildTracks(TrackOptions(), input.correspondences.matches)));
+        kMaxTrackLength, BuildTracks(input.correspondences.matches)));
   }
 }
 BENCHMARK(BM_BuildTracks)->Arg(500)->Unit(benchmark::kMillisecond);
@@ -147,8 +149,7 @@ BENCHMARK(BM_EstimateGlobalPositions)
 void BM_TriangulateTracks(benchmark::State& state) {
   const Input input = BuildInput(state.range(0));
   const std::vector<Track> tracks =
-      SelectTracks(TrackOptions(),
-                   BuildTracks(TrackOptions(), input.correspondences.matches));
+      SelectTracks(kMaxTrackLength, BuildTracks(input.correspondences.matches));
   for (auto _ : state) {
     benchmark::DoNotOptimize(
         TriangulateTracks(TrackTriangulationOptions(), input.cams_from_world,

@@ -98,7 +98,7 @@ int CoarsePoseEstimator::SplitWhereSizeIsUnknown() {
   }
   const std::vector<int> part_of = FindPartsOfOneUnit(
       graph_,
-      FindLengthUnits(options_.lengths, graph_, KnownLengths(),
+      FindLengthUnits(options_.num_threads, graph_, KnownLengths(),
                       correspondences_, lengths_),
       centers);
   int num_removed = 0;
@@ -187,7 +187,7 @@ int CoarsePoseEstimator::RemoveEdgesOffPositions() {
 
 // Metres of the priors that augment the graph, spread through shared points.
 EdgeLengths CoarsePoseEstimator::EstimateLengths() const {
-  return EstimateEdgeLengths(options_.lengths, graph_, KnownLengths(),
+  return EstimateEdgeLengths(options_.num_threads, graph_, KnownLengths(),
                              correspondences_, lengths_);
 }
 

@@ -7,6 +7,7 @@
 
 #include "core/prior_lengths.h"
 #include "core/so3.h"
+#include "global/calibration/extrinsic_observations.h"
 #include "global/coarse_pose_estimator.h"
 #include "global/loop_closures/reject_visual_odometry.h"
 #include "global/odometry/visual_odometry.h"
@@ -70,7 +71,7 @@ void CoarsePoseEstimator::BuildChain() {
                    chain_.IsFollower(edge.image_id2) ||
                    !chain_.IsConnected(edge.image_id1, edge.image_id2) ||
                    std::abs(chain_.NumSteps(edge.image_id1, edge.image_id2)) >
-                       camera_imu.max_num_steps;
+                       kMaxNumExtrinsicSteps;
           }),
       near.edges.end());
   RefineRelativePoses(options_.relative_poses, correspondences_, {}, &near);
@@ -162,11 +163,10 @@ TrajectoryOdometry CoarsePoseEstimator::BuildTrajectoryOdometry(
   if (!steps.priors.empty()) {
     OdometryChainOptions options = chain_options_;
     if (!HasLengths(priors_)) {
-      options.scale_drift_ratio = options_.visual_odometry.scale_drift_ratio;
+      options.scale_drift_ratio = kVisualScaleDriftRatio;
     }
-    const int num_rejected =
-        RejectVisualOdometry(options_.visual_odometry, options_.loops, options,
-                             graph_, priors_.size(), &steps);
+    const int num_rejected = RejectVisualOdometry(
+        options_.loops, options, graph_, priors_.size(), &steps);
     odometry.chain = OdometryChain(steps.priors, options, frame_priors_);
     odometry.unit = steps.unit_m;
     lengths = steps.lengths;
@@ -196,7 +196,7 @@ bool CoarsePoseEstimator::IsSequence(const OdometryChain& chain) const {
 
 // Empty where sensors measure all motions, or without visual odometry.
 VisualOdometryEdges CoarsePoseEstimator::CompleteOdometry() const {
-  if (!options_.visual_odometry.enabled) return VisualOdometryEdges();
+  if (!options_.use_visual_odometry) return VisualOdometryEdges();
   const image_t first = graph_.images.empty() ? 0 : graph_.images.front();
   const bool is_complete = std::all_of(
       graph_.images.begin(), graph_.images.end(), [&](image_t image_id) {
@@ -205,9 +205,8 @@ VisualOdometryEdges CoarsePoseEstimator::CompleteOdometry() const {
         return motion.has_rotation && motion.has_position;
       });
   if (is_complete) return VisualOdometryEdges();
-  return AddVisualOdometry(options_.visual_odometry, options_.lengths, graph_,
-                           correspondences_, KnownLengths(), priors_,
-                           frame_priors_);
+  return AddVisualOdometry(options_.num_threads, graph_, correspondences_,
+                           KnownLengths(), priors_, frame_priors_);
 }
 
 std::vector<RelativePosePrior> CoarsePoseEstimator::AllPriors() const {
@@ -274,19 +273,17 @@ void CoarsePoseEstimator::FilterByRotation() {
 // odometry does not predict. Removed pairs stay removed: refined towards the
 // prediction, a wrong one would look right.
 void CoarsePoseEstimator::RepeatRotations() {
-  for (int round = 1; round < options_.num_rotation_rounds; ++round) {
-    const auto predictions = PredictFromRotations();
-    if (std::none_of(predictions.begin(), predictions.end(),
-                     [](const auto& p) { return p.has_value(); })) {
-      return;
-    }
-    if (options_.relative_poses.enabled) {
-      RefineRelativePoses(options_.relative_poses, correspondences_,
-                          predictions, &graph_);
-    }
-    EstimateRotations();
-    FilterByRotation();
+  const auto predictions = PredictFromRotations();
+  if (std::none_of(predictions.begin(), predictions.end(),
+                   [](const auto& p) { return p.has_value(); })) {
+    return;
   }
+  if (options_.relative_poses.enabled) {
+    RefineRelativePoses(options_.relative_poses, correspondences_, predictions,
+                        &graph_);
+  }
+  EstimateRotations();
+  FilterByRotation();
 }
 
 // For pairs that odometry does not predict.

@@ -14,7 +14,7 @@ CoarsePoses CoarsePoseEstimator::Run() {
   FilterLoops();
   EstimateRotations();
   FilterByRotation();
-  if (options_.num_rotation_rounds > 1) RepeatRotations();
+  RepeatRotations();
   EstimateTranslations();
   EstimatePositions();
   result_.graph = std::move(graph_);
@@ -33,13 +33,10 @@ bool CoarsePoseOptions::IsValid(std::string* error) const {
              .Positive({{"max_rotation_discrepancy_deg",
                          max_rotation_discrepancy_deg}})
              .AtLeast(0, "min_num_inliers", min_num_inliers)
-             .AtLeast(1, "num_rotation_rounds", num_rotation_rounds)
              .AllHold() &&
          chain.IsValid(error) && camera_imu_rotation.IsValid(error) &&
-         relative_poses.IsValid(error) && lengths.IsValid(error) &&
-         visual_odometry.IsValid(error) && loops.IsValid(error) &&
-         rotations.IsValid(error) && translations.IsValid(error) &&
-         augmentation.IsValid(error) && positions.IsValid(error);
+         relative_poses.IsValid(error) && loops.IsValid(error) &&
+         translations.IsValid(error) && augmentation.IsValid(error);
 }
 
 CoarsePoses EstimateCoarsePoses(
@@ -55,7 +52,6 @@ CoarsePoses EstimateCoarsePoses(
   CoarsePoseOptions step_options = options;
   step_options.camera_imu_rotation.num_threads = options.num_threads;
   step_options.relative_poses.num_threads = options.num_threads;
-  step_options.lengths.num_threads = options.num_threads;
   step_options.translations.num_threads = options.num_threads;
   return CoarsePoseEstimator(step_options, initial_graph, correspondences,
                              priors, frame_priors)

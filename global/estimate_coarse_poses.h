@@ -29,8 +29,9 @@ struct CoarsePoseOptions {
   OdometryChainOptions chain;
   CameraImuRotationOptions camera_imu_rotation;
   RelativePoseRefinementOptions relative_poses;
-  EdgeLengthOptions lengths;
-  VisualOdometryOptions visual_odometry;
+  // Visual odometry, for the consistency check of loop closures, where sensors
+  // do not measure a motion.
+  bool use_visual_odometry = true;
   LoopClosureOptions loops;
   RotationAveragingOptions rotations;
   // eps_R.
@@ -38,10 +39,6 @@ struct CoarsePoseOptions {
   RelativeTranslationOptions translations;
   AugmentationOptions augmentation;
   TranslationAveragingOptions positions;
-  // Rounds of relative poses and rotation averaging. From the second round on,
-  // pairs that odometry does not predict are predicted by the global rotations
-  // of the previous round.
-  int num_rotation_rounds = 2;
   // Edges with fewer inliers take no part.
   int min_num_inliers = 15;
   // Threads of all steps; -1: all of the machine.

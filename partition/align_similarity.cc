@@ -21,6 +21,15 @@ constexpr double kOrientationSigmaRad = 0.1;
 // probability that all 100 contain an outlier is 1e-18.
 constexpr int kNumTrials = 100;
 constexpr uint64_t kSeed = 1;
+// Bounds of the adaptation. Alg. 2 has none, but any part would fit a threshold
+// that grows without bound.
+constexpr int kMaxNumThresholds = 20;
+// No threshold exceeds this share of the target's extent: a short part would
+// fit anywhere within tau_init.
+constexpr double kMaxThresholdToExtent = 0.1;
+// An image whose orientation is off by more than this is no inlier, however
+// near its centre is.
+constexpr double kMaxRotationErrorDeg = 20.0;
 
 // The distance between the first and the last decile of the target's centres
 // along their longest axis.
@@ -109,7 +118,7 @@ class Attempt {
           poses_[i].cam_from_target.rotation);
       const bool is_inlier =
           error <= threshold_ &&
-          rotation_error_rad <= DegToRad(options_.max_rotation_error_deg);
+          rotation_error_rad <= DegToRad(kMaxRotationErrorDeg);
       (*mask)[i] = is_inlier;
       num_inliers += is_inlier;
       if (is_inlier) sum_squares += error * error;
@@ -137,18 +146,13 @@ class Attempt {
 
 bool AlignSimilarityOptions::IsValid(std::string* error) const {
   return OptionChecker("AdaSfmAlign", error)
-      .Positive("min_threshold", min_threshold)
-      .Require(initial_threshold >= min_threshold, "initial_threshold",
-               initial_threshold, "must not be below min_threshold")
+      .AtLeast(kMinAlignmentThreshold, "initial_threshold", initial_threshold)
       .Positive("threshold_increase", threshold_increase)
       .Positive("threshold_decrease", threshold_decrease)
       .Require(min_inlier_ratio > 0.0 && min_inlier_ratio <= 1.0,
                "min_inlier_ratio", min_inlier_ratio, "must be in (0, 1]")
       .Require(max_inlier_ratio >= min_inlier_ratio, "max_inlier_ratio",
                max_inlier_ratio, "must not be below min_inlier_ratio")
-      .AtLeast(1, "max_num_iterations", max_num_iterations)
-      .Positive("max_threshold_to_extent", max_threshold_to_extent)
-      .Positive("max_rotation_error_deg", max_rotation_error_deg)
       .Positive("unit", unit)
       .AllHold();
 }
@@ -158,16 +162,15 @@ AlignSimilarityResult AlignSimilarity(const AlignSimilarityOptions& options,
   std::string error;
   if (!options.IsValid(&error)) throw std::invalid_argument(error);
   if (poses.size() < 3) return AlignSimilarityResult();
-  const double max_threshold =
-      options.max_threshold_to_extent * ComputeExtent(poses);
+  const double max_threshold = kMaxThresholdToExtent * ComputeExtent(poses);
   const double min_threshold =
-      std::min(options.min_threshold * options.unit, max_threshold);
+      std::min(kMinAlignmentThreshold * options.unit, max_threshold);
   if (!(max_threshold > 0.0)) return AlignSimilarityResult();
   double threshold =
       std::min(options.initial_threshold * options.unit, max_threshold);
   AlignSimilarityResult best;
   const int max_num_iterations =
-      options.adapt_threshold ? options.max_num_iterations : 1;
+      options.adapt_threshold ? kMaxNumThresholds : 1;
   for (int iteration = 1; iteration <= max_num_iterations; ++iteration) {
     AlignSimilarityResult result = Attempt(options, poses, threshold).Run();
     result.success = result.inlier_ratio >= options.min_inlier_ratio;

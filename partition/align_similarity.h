@@ -25,17 +25,6 @@ struct AlignSimilarityOptions {
   double threshold_decrease = 0.1;
   double min_inlier_ratio = 0.7;
   double max_inlier_ratio = 0.9;
-  // Bounds of the adaptation. Alg. 2 has none, but any part would fit a
-  // threshold that grows without bound.
-  int max_num_iterations = 20;
-  double min_threshold = 0.1;
-  // No threshold exceeds this share of the target's extent (the distance of the
-  // first to the last decile along its longest axis): a short part would fit
-  // anywhere within tau_init.
-  double max_threshold_to_extent = 0.1;
-  // An image whose orientation is off by more than this is no inlier, however
-  // near its centre is.
-  double max_rotation_error_deg = 20.0;
   // Off: tau_init is used as it is (the paper's ablation).
   bool adapt_threshold = true;
   double unit = 1.0;
@@ -56,6 +45,9 @@ struct AlignSimilarityResult {
   int num_iterations = 0;
   std::vector<char> inlier_mask;
 };
+
+// Lower bound of the thresholds, in units of `unit`.
+inline constexpr double kMinAlignmentThreshold = 0.1;
 
 // Aligns a part to the global frame by RANSAC on camera poses. The threshold is
 // raised while fewer than r_min of the images are inliers, and lowered while at

@@ -4,10 +4,8 @@
 #include <algorithm>
 #include <map>
 #include <set>
-#include <stdexcept>
 #include <utility>
 
-#include "core/option_checker.h"
 
 namespace adasfm {
 namespace {
@@ -119,21 +117,12 @@ std::vector<Part> AsSets(const std::vector<std::vector<image_t>>& parts) {
 
 }  // namespace
 
-bool FloodFillOptions::IsValid(std::string* error) const {
-  return OptionChecker("AdaSfmPartition", error)
-      .Require(min_overlap_ratio >= 0.0 && min_overlap_ratio < 1.0,
-               "min_overlap_ratio", min_overlap_ratio, "must be in [0, 1)")
-      .AllHold();
-}
-
 std::vector<std::vector<image_t>> ExpandByFloodFill(
-    const FloodFillOptions& options, const ImageGraph& graph,
+    double min_overlap_ratio, const ImageGraph& graph,
     const std::vector<std::vector<image_t>>& parts) {
-  std::string error;
-  if (!options.IsValid(&error)) throw std::invalid_argument(error);
   const std::vector<WeightedEdge> edges = SortEdges(graph);
   std::vector<Part> expanded = AsSets(parts);
-  while (Layer(edges, options.min_overlap_ratio, &expanded).Grew()) {
+  while (Layer(edges, min_overlap_ratio, &expanded).Grew()) {
   }
   return AsVectors(expanded);
 }

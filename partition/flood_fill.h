@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <string>
 #include <vector>
 
 #include "core/types.h"
@@ -9,19 +8,13 @@
 
 namespace adasfm {
 
-struct FloodFillOptions {
-  // tau_ot: the share of a part's images that other parts contain, too.
-  // Alignment and merging rely on these images. The paper's value.
-  double min_overlap_ratio = 0.3;
-
-  bool IsValid(std::string* error) const;
-};
-
 // Adaptive flood fill (paper, section on graph partition and Alg. 1). The
 // separators of a part are its images with an edge to an image outside. Layer
 // by layer, each separator takes its strongest neighbour outside, until tau_ot
 // of the part is shared. Each part stops by itself: dense cuts need one layer,
-// thin chains as many as necessary.
+// thin chains as many as necessary. `min_overlap_ratio`, in [0, 1), is tau_ot:
+// the share of a part's images that other parts contain, too; alignment and
+// merging rely on these images.
 //
 // In the paper's text every separator takes an image; in its Alg. 1 every edge
 // is given to the smallest part that has one of its ends. The figure needs both
@@ -31,7 +24,7 @@ struct FloodFillOptions {
 // layer; an edge is used once per layer. Returns the parts with their overlap,
 // in the order given, images sorted by id.
 std::vector<std::vector<image_t>> ExpandByFloodFill(
-    const FloodFillOptions& options, const ImageGraph& graph,
+    double min_overlap_ratio, const ImageGraph& graph,
     const std::vector<std::vector<image_t>>& parts);
 
 // The share of each part's images that lie in another part too.

@@ -16,6 +16,9 @@ namespace {
 
 using Part = std::set<image_t>;
 
+// METIS's result depends on the order in which it visits nodes.
+constexpr int kMetisSeed = 1;
+
 // The graph of one component in METIS's compressed rows.
 struct MetisGraph {
   std::vector<idx_t> row_starts = {0};
@@ -50,7 +53,7 @@ MetisGraph BuildMetisGraph(const ImageAdjacency& adjacency,
 
 std::vector<Part> CutWithMetis(const ImageAdjacency& adjacency,
                                const std::vector<image_t>& component,
-                               int num_parts, int seed) {
+                               int num_parts) {
   MetisGraph graph = BuildMetisGraph(adjacency, component);
   idx_t num_nodes = static_cast<idx_t>(component.size());
   idx_t num_constraints = 1;
@@ -58,7 +61,7 @@ std::vector<Part> CutWithMetis(const ImageAdjacency& adjacency,
   idx_t cut = 0;
   idx_t metis_options[METIS_NOPTIONS];
   METIS_SetDefaultOptions(metis_options);
-  metis_options[METIS_OPTION_SEED] = seed;
+  metis_options[METIS_OPTION_SEED] = kMetisSeed;
   metis_options[METIS_OPTION_CONTIG] = 1;
   std::vector<idx_t> part_of_node(component.size(), 0);
   if (METIS_PartGraphKway(&num_nodes, &num_constraints, graph.row_starts.data(),
@@ -137,8 +140,7 @@ std::vector<Part> CutComponent(const NormalizedCutOptions& options,
   for (int num_parts = min_num_parts;
        num_parts <= max_num_parts && MaxSize(best) > options.max_part_size;
        ++num_parts) {
-    std::vector<Part> parts =
-        CutWithMetis(adjacency, component, num_parts, options.seed);
+    std::vector<Part> parts = CutWithMetis(adjacency, component, num_parts);
     while (RepairOnePart(adjacency, options.min_part_size, &parts)) {
     }
     if (MaxSize(parts) < MaxSize(best)) best = std::move(parts);

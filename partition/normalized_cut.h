@@ -15,8 +15,6 @@ struct NormalizedCutOptions {
   int max_part_size = 150;
   // Smaller pieces have too few images for a reconstruction of their own.
   int min_part_size = 10;
-  // Of METIS, whose result depends on the order in which it visits nodes.
-  int seed = 1;
 
   bool IsValid(std::string* error) const;
 };

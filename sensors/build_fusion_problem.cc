@@ -38,23 +38,16 @@ FusionInput BuildFusionProblem(const PriorEstimationOptions& options,
   FusionInput input;
   OdometryTimeline& timeline = input.timeline;
   OdometryFusionProblem& problem = input.problem;
-  OdometryLinkOptions link_options;
-  link_options.max_imu_gap_s = options.max_imu_gap_s;
-  link_options.max_wheel_gap_s = options.max_wheel_gap_s;
-  link_options.max_link_s = options.max_link_s;
-  link_options.max_lead_s = options.max_lead_s;
-  link_options.lateral_speed_noise = options.fusion.lateral_speed_noise;
-  link_options.vertical_speed_noise = options.fusion.vertical_speed_noise;
-  timeline = BuildTimeline(times_ns, logs, link_options);
+  timeline = BuildTimeline(times_ns, logs);
   problem.imu_from_wheel = calibration.imu_from_wheel;
   problem.imu_noise = calibration.imu_noise;
   problem.links = BuildOdometryLinks(timeline.times_ns, logs, calibration,
-                                     ImuBias(), link_options);
+                                     ImuBias(), options.links);
   const ImuBias bias = FirstBias(problem.links, vision);
   if (bias.gyroscope != Eigen::Vector3d::Zero()) {
     // Preintegrated about the right bias, first-order corrections stay small.
     problem.links = BuildOdometryLinks(timeline.times_ns, logs, calibration,
-                                       bias, link_options);
+                                       bias, options.links);
   }
   AddHoleUncertainty(logs, timeline.times_ns,
                      calibration.imu_from_wheel.rotation, &problem.links);

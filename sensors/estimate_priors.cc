@@ -14,6 +14,7 @@
 #include "sensors/io/format_figures.h"
 #include "sensors/noise_figures.h"
 #include "sensors/select_images.h"
+#include "sensors/smoother/chain_state.h"
 #include "sensors/smoother/compose_inertial_motion.h"
 #include "sensors/smoother/compose_prior.h"
 #include "sensors/smoother/compose_wheel_translation.h"
@@ -122,8 +123,7 @@ void PriorEstimator::CorrectWheelClock() {
   const std::optional<double> shift_s =
       FindWheelClockShift(logs_.imu, logs_.wheel, calibration_);
   // Small delays are an unknown of the smoother, which estimates them better.
-  if (!shift_s || std::abs(*shift_s) <
-                      kMaxDelaySigmas * options_.fusion.wheel_delay_sigma_s) {
+  if (!shift_s || std::abs(*shift_s) < kMaxDelaySigmas * kWheelDelaySigmaS) {
     return;
   }
   for (WheelSpeed& speed : logs_.wheel) {
@@ -239,8 +239,8 @@ void PriorEstimator::BuildInertialMotions() {
     motion->image_id1 = images_[i].image_id;
     motion->image_id2 = images_[i + 1].image_id;
     motion->by_wheels = ComposeWheelTranslation(
-        problem_, options_.fusion, fused_, timeline_.indices[i],
-        timeline_.indices[i + 1], calibration_.cam_from_imu);
+        problem_, fused_, timeline_.indices[i], timeline_.indices[i + 1],
+        calibration_.cam_from_imu);
     estimate_.inertial_motions.push_back(*motion);
   }
 }
@@ -325,16 +325,11 @@ StatusOr<PriorEstimate> PriorEstimator::Run(
 
 bool PriorEstimationOptions::IsValid(std::string* error) const {
   return OptionChecker("AdaSfmPriors", error)
-             .Positive({{"max_imu_gap_s", max_imu_gap_s},
-                        {"max_wheel_gap_s", max_wheel_gap_s},
-                        {"max_link_s", max_link_s},
-                        {"visual_bias_sigma_rad_s", visual_bias_sigma}})
-             .NotNegative({{"max_lead_s", max_lead_s}})
              .Require(estimate_time_shift >= -1 && estimate_time_shift <= 1,
                       "estimate_time_shift", estimate_time_shift,
                       "must be -1, 0 or 1")
              .AllHold() &&
-         fusion.IsValid(error);
+         links.IsValid(error) && fusion.IsValid(error);
 }
 
 StatusOr<PriorEstimate> EstimatePriors(

@@ -12,6 +12,7 @@
 #include "core/status.h"
 #include "sensors/io/calibration.h"
 #include "sensors/sensor_summary.h"
+#include "sensors/smoother/build_odometry_links.h"
 #include "sensors/smoother/odometry_fusion.h"
 
 namespace adasfm {
@@ -43,21 +44,10 @@ struct VisualRotation {
 };
 
 struct PriorEstimationOptions {
-  // A link between two times needs samples at most this far apart: beyond it
-  // linear interpolation of a vehicle's motion is a guess.
-  double max_imu_gap_s = 0.1;
-  double max_wheel_gap_s = 0.25;
-  // Links are no longer than this: images further apart get states between.
-  double max_link_s = 0.5;
-  // Logs are used from this long before the first to this long after the last
-  // image, since standstills there observe the biases.
-  double max_lead_s = 20.0;
+  OdometryLinkOptions links;
   // Whether two-view rotations help to find the gyroscope's bias, and where
   // wheels without an IMU slip.
   bool use_visual_rotations = true;
-  // Error that all two-view rotations share and that their scatter does not
-  // show, as a rate, 1 sigma, rad/s.
-  double visual_bias_sigma = 0.002;
   // Whether a contradiction between sensors is an error: vision against the
   // gyroscope (sensors/calibration_check/check_against_vision.h), wheels
   // against the IMU (check_wheels.h there). Else it is a warning.

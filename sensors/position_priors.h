@@ -15,9 +15,6 @@ struct PositionPriorOptions {
   // An image between two fixes further apart than this gets no position: the
   // path between the fixes is unknown.
   double max_fix_gap_s = 3.0;
-  // A fix between two images at most this far apart belongs to both, weighted
-  // by time. At 2 m/s^2 a straight line between them errs by 6 cm at most.
-  double max_image_gap_s = 0.5;
   // Correlation time of the receiver's errors. Fixes at shorter intervals share
   // errors, so the variance of each is raised. 0: independent errors.
   double correlation_time_s = 0.0;
@@ -36,9 +33,10 @@ struct PositionPriors {
 };
 
 // Assigns fixes to images (ordered by time, on the camera's clock). A fix
-// between two near images is a position on the line between them. Where images
-// are further apart, each of them gets a position on the line between the fixes
-// around it. Error that names both time spans when no prior results.
+// between two images at most 0.5 s apart is a position on the line between
+// them. Where images are further apart, each of them gets a position on the
+// line between the fixes around it. Error that names both time spans when no
+// prior results.
 StatusOr<PositionPriors> ComputePositionPriors(
     const PositionPriorOptions& options, const SensorCalibration& calibration,
     const std::vector<ImageStamp>& images, const std::vector<GnssFix>& fixes);

@@ -208,11 +208,10 @@ void TakeVisualRotations(const std::vector<TimedRotation>& rotations,
                          timestamp_t timeshift_ns,
                          const Eigen::Quaterniond& cam_from_imu,
                          const OdometryTimeline& timeline, double scale_rad,
-                         double threshold_sigma,
                          OdometryFusionProblem* problem) {
   const RotationTriples triples(rotations);
   // The loop has the errors of three rotations.
-  const double max_angle_rad = threshold_sigma * std::sqrt(3.0) * scale_rad;
+  const double max_angle_rad = kSlipThresholdSigma * std::sqrt(3.0) * scale_rad;
   for (const TimedRotation& rotation : rotations) {
     const std::optional<size_t> k =
         FindLinkOfRotation(rotation, timeshift_ns, timeline);
@@ -249,7 +248,7 @@ int UseSeenWheelYaw(const std::vector<TimedRotation>& rotations,
         std::max(fit.scale_rad() * fit.scale_rad(), turn.yaw_variance) +
         fit.Variance(turn);
     return std::abs(fit.Residual(turn)) >
-           options.slip_threshold_sigma * std::sqrt(variance);
+           kSlipThresholdSigma * std::sqrt(variance);
   };
   std::set<size_t> slips;
   for (const VisualYaw& turn : seen) {
@@ -268,7 +267,7 @@ int UseSeenWheelYaw(const std::vector<TimedRotation>& rotations,
   }
   AddUnseenSlips(seen, slips, fit, problem);
   TakeVisualRotations(rotations, timeshift_ns, cam_from_imu, timeline,
-                      fit.scale_rad(), options.slip_threshold_sigma, problem);
+                      fit.scale_rad(), problem);
   return static_cast<int>(slips.size());
 }
 

@@ -24,7 +24,7 @@ namespace adasfm {
 // m by the wheels' noise. The estimate replaces the options' prior in the
 // problem (wheel_yaw_prior).
 //
-// A link whose residual exceeds slip_threshold_sigma slips, unless wheels and
+// A link whose residual exceeds kSlipThresholdSigma slips, unless wheels and
 // cameras agree over this link and a neighbour together (then the image between
 // the two links is wrong). The motion of a slipping link is unknown, including
 // its length. If more than a fifth of the links seem to slip, none is treated

@@ -13,6 +13,9 @@ namespace {
 // Below this correlation gyroscope and pictures are of different drives; a
 // stabilised video keeps the slow rotations.
 constexpr double kMinSameMotionCorrelation = 0.4;
+// Error that all two-view rotations share and that their scatter does not show,
+// as a rate, 1 sigma.
+constexpr double kVisualBiasSigma = 0.002;  // rad/s
 
 class VisionComparison {
  public:
@@ -115,8 +118,8 @@ Status VisionComparison::LeaveOutImu(const VisionCheck& check) {
 void VisionComparison::SetBias(const VisionCheck& check) {
   vision_.has_bias = options_.use_visual_rotations;
   // The prior of the bias is zero, with gyroscope_bias_sigma.
-  const double visual_variance = std::pow(options_.visual_bias_sigma, 2) +
-                                 std::pow(check.gyroscope_bias_sigma, 2);
+  const double visual_variance =
+      std::pow(kVisualBiasSigma, 2) + std::pow(check.gyroscope_bias_sigma, 2);
   const double prior_variance =
       std::pow(options_.fusion.gyroscope_bias_sigma, 2);
   const double share = prior_variance / (prior_variance + visual_variance);

@@ -86,7 +86,7 @@ class BundleMinimizer {
       }
       cost_ = reducer_.Linearize(1.0 / region_.Radius());
       if (summary_.num_iterations == 1) summary_.initial_cost = cost_;
-      if (reducer_.LargestGradient() <= options_.tolerance) {
+      if (reducer_.LargestGradient() <= kGradientAndStepTolerance) {
         return Finish(true, "no gradient is left");
       }
       if (!std::isfinite(cost_)) return Finish(false, "the cost is infinite");
@@ -155,9 +155,10 @@ class BundleMinimizer {
     const double new_cost = reducer_.MinimizePoints(
         {options_.max_num_point_iterations, options_.function_tolerance});
     const double decrease = cost_ - new_cost;
-    const bool is_short = std::sqrt(moved.squared_length) <=
-                          options_.tolerance * (std::sqrt(moved.squared_norm) +
-                                                options_.tolerance);
+    const bool is_short =
+        std::sqrt(moved.squared_length) <=
+        kGradientAndStepTolerance *
+            (std::sqrt(moved.squared_norm) + kGradientAndStepTolerance);
     if (is_short || std::abs(decrease) <= options_.function_tolerance * cost_) {
       // Ceres omits the last step; with it the most weakly constrained
       // directions are nearer to the minimum.

@@ -9,12 +9,13 @@ namespace adasfm {
 
 class BundleProblem;
 
+// Limit of gradients and, relative to the parameters, of steps.
+inline constexpr double kGradientAndStepTolerance = 1e-12;
+
 struct MinimizeBundleOptions {
   int max_num_iterations = 50;
   // Relative change of the cost at which the minimum is found.
   double function_tolerance = 1e-5;
-  // Limit of gradients and, relative to the parameters, of steps.
-  double tolerance = 1e-12;
   // Initial radius of the trust region; the damping is its inverse.
   double initial_radius = 1e4;
   // Iterations of each point alone, after each joint step (minimize_point.h).

@@ -95,15 +95,14 @@ void SharedErrorBlocks::AddPriors(ceres::Problem* problem) {
 // only a prior on its step. Priors on all values would penalise a constant bias
 // once a window.
 void SharedErrorBlocks::AddGyroscopePriors(ceres::Problem* problem) {
-  const double sigma = options_.gyroscope_bias_sigma_rad_s;
+  constexpr double kSigma = 1e-3;  // rad/s, per axis: what the import left.
   const double step_sigma = options_.gyroscope_random_walk_rad_s_sqrt_s *
                             std::sqrt(options_.gyroscope_window_s);
   std::map<int, Block*> last_of_drive;
   for (auto& [key, block] : gyroscope_bias_) {
     Block*& before = last_of_drive[block.drive];
-    if (!options_.enabled || before == nullptr || !(sigma > 0.0) ||
-        !(step_sigma > 0.0)) {
-      AddPrior(sigma, &block, problem);
+    if (!options_.enabled || before == nullptr || !(step_sigma > 0.0)) {
+      AddPrior(kSigma, &block, problem);
     } else {
       AddStep(step_sigma, 1.0, before, &block, problem);
     }
@@ -116,7 +115,7 @@ void SharedErrorBlocks::AddGyroscopePriors(ceres::Problem* problem) {
 void SharedErrorBlocks::AddDirectionDriftPriors(ceres::Problem* problem) {
   const double sigma = direction_drift_sigma_rad_;
   const double decay =
-      std::exp(-options_.direction_window_s / options_.direction_drift_time_s);
+      std::exp(-kDirectionWindowS / options_.direction_drift_time_s);
   std::map<int, Block*> last_of_drive;
   for (auto& [key, block] : direction_drift_) {
     Block*& before = last_of_drive[block.drive];
@@ -134,8 +133,9 @@ void SharedErrorBlocks::AddDirectionDriftPriors(ceres::Problem* problem) {
 // would shrink with them.
 void SharedErrorBlocks::AddLengthScalePriors(ceres::Problem* problem) {
   constexpr double kMeanSigma = 1e-6;
+  constexpr double kSigma = 0.01;  // Relative, of the scale of one drive.
   if (length_scale_.empty()) return;
-  if (!options_.enabled || !(options_.length_scale_sigma > 0.0)) {
+  if (!options_.enabled) {
     for (auto& [drive, scale] : length_scale_) {
       problem->SetParameterBlockConstant(&scale.value);
     }
@@ -152,7 +152,7 @@ void SharedErrorBlocks::AddLengthScalePriors(ceres::Problem* problem) {
   std::vector<double*> values;
   std::vector<double> shares;
   for (auto& [drive, scale] : length_scale_) {
-    add(options_.length_scale_sigma, {1.0}, {&scale.value});
+    add(kSigma, {1.0}, {&scale.value});
     values.push_back(&scale.value);
     shares.push_back(1.0 * scale.num_lengths / num_lengths);
   }

@@ -6,13 +6,11 @@
 #include <limits>
 #include <memory>
 #include <optional>
-#include <stdexcept>
 
 #include "colmap_ext/bundle_adjustment/estimate_keypoint_sigma.h"
 #include "colmap_ext/bundle_adjustment/linear_adjustment.h"
 #include "colmap_ext/bundle_adjustment/prior_components.h"
 #include "colmap_ext/bundle_adjustment/reduced_system.h"
-#include "core/option_checker.h"
 
 namespace adasfm {
 namespace {
@@ -193,15 +191,14 @@ class VarianceComponentAdjustment {
     }
     while (true) {
       const double mean_square = LargestMeanSquare(components_);
-      const bool raises = mean_square > balance_.max_mean_square &&
+      const bool raises = mean_square > kMaxPriorMeanSquare &&
                           factor_ < balance_.max_sigma_factor;
       if (!raises && is_final_) return;
       if (raises) {
         factor_ = std::min(
             balance_.max_sigma_factor,
-            factor_ *
-                std::clamp(std::sqrt(mean_square / balance_.max_mean_square),
-                           kMinStep, kMaxStep));
+            factor_ * std::clamp(std::sqrt(mean_square / kMaxPriorMeanSquare),
+                                 kMinStep, kMaxStep));
       }
       if (!Adjust(raises ? tolerance : given_.function_tolerance)) return;
       components_ = Components();
@@ -212,7 +209,7 @@ class VarianceComponentAdjustment {
 
   void DescribePriors() {
     summary_.priors_agree =
-        LargestMeanSquare(Components()) <= balance_.max_mean_square;
+        LargestMeanSquare(Components()) <= kMaxPriorMeanSquare;
     if (system_) {
       LinearAdjustment linear(system_.get(), options_.prior_loss_scale);
       linear.Solve(kStatedPriorSigmas, &components_);
@@ -241,14 +238,6 @@ class VarianceComponentAdjustment {
 
 }  // namespace
 
-bool VarianceComponentOptions::IsValid(std::string* error) const {
-  // Honest priors have a mean square of 1.
-  return OptionChecker(error)
-      .AtLeast(1, "max_mean_square", max_mean_square)
-      .AtLeast(1, "max_sigma_factor", max_sigma_factor)
-      .AllHold();
-}
-
 double ComputePriorMeanSquare(const std::vector<PosePriorEdge>& priors,
                               const colmap::Reconstruction& reconstruction) {
   return LargestMeanSquare(
@@ -260,8 +249,6 @@ PriorBundleAdjustmentSummary AdjustBundleWithVarianceComponents(
     const PriorBundleAdjustmentOptions& options,
     const PriorBundleAdjustmentProblem& problem,
     colmap::Reconstruction* reconstruction, double* keypoint_sigma_factor) {
-  std::string error;
-  if (!balance.IsValid(&error)) throw std::invalid_argument(error);
   return VarianceComponentAdjustment(balance, options, problem,
                                      keypoint_sigma_factor, reconstruction)
       .Run();

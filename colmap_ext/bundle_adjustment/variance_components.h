@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <string>
 #include <vector>
 
 #include "colmap_ext/bundle_adjustment/bundle_adjustment.h"
@@ -19,9 +18,6 @@ namespace adasfm {
 // (docs/reference/mapper.md).
 struct VarianceComponentOptions {
   bool enabled = true;
-  // Largest mean squared whitened residual of the priors; correct priors have 1
-  // or less.
-  double max_mean_square = 1.5;
   // The search begins with the keypoint noise that residuals show
   // (estimate_keypoint_sigma.h), where there are enough.
   bool estimate_keypoint_sigma = true;
@@ -34,9 +30,11 @@ struct VarianceComponentOptions {
   // wrong calibration do not dominate. Real drives need up to 16: keypoints of
   // 0.27 px that share calibration errors of 4 px.
   double max_sigma_factor = 32.0;
-
-  bool IsValid(std::string* error) const;
 };
+
+// Largest mean squared whitened residual of priors that agree with vision;
+// correct priors have 1 or less.
+inline constexpr double kMaxPriorMeanSquare = 1.5;
 
 // The largest mean squared whitened residual of a kind of prior term, at the
 // reconstruction's poses. Counts priors between images that points constrain,

@@ -16,6 +16,15 @@
 namespace adasfm {
 namespace {
 
+// Rounds of triangulation and adjustment: the first with a loose threshold,
+// since the poses are coarse, the last with the final one.
+constexpr int kNumRounds = 3;
+// Smallest triangulation angle of points in images with few points, degrees.
+constexpr double kMinAngleFloorDeg = 1.0;
+// Relative change of the cost at which the rounds before the last end. Their
+// points are discarded, so they need no last digits.
+constexpr double kEarlyFunctionTolerance = 1e-3;
+
 // Takes the cameras of the previous model, where it has them.
 colmap::Reconstruction CreateReconstruction(
     const SceneData& scene, const std::map<image_t, Rigid3d>& cams_from_world,
@@ -77,7 +86,7 @@ PriorBundleAdjustmentProblem CreateProblem(
   return problem;
 }
 
-void FillFigures(const CoarseStructureOptions& options, CoarseModel* model) {
+void FillFigures(CoarseModel* model) {
   const colmap::Reconstruction& reconstruction = model->reconstruction;
   model->num_points = reconstruction.NumPoints3D();
   model->num_observations = reconstruction.ComputeNumObservations();
@@ -87,8 +96,7 @@ void FillFigures(const CoarseStructureOptions& options, CoarseModel* model) {
   for (const image_t image_id : reconstruction.RegImageIds()) {
     const int num_points = reconstruction.Image(image_id).NumPoints3D();
     model->num_images_without_points += num_points == 0;
-    model->num_images_with_few_points +=
-        num_points < options.min_num_points_per_image;
+    model->num_images_with_few_points += num_points < kMinNumPointsPerImage;
   }
   model->prior_chi2_per_dof = model->rounds.back().prior_chi2_per_dof;
   model->priors_agree = model->rounds.back().priors_agree;
@@ -119,18 +127,15 @@ TrackTriangulationOptions TriangulationOptions(
     const CoarseStructureOptions& options, int round,
     const colmap::Reconstruction& before) {
   TrackTriangulationOptions triangulation = options.triangulation;
-  triangulation.min_triangulation_angle_deg =
-      std::min(options.min_angle_floor_deg,
-               options.triangulation.min_triangulation_angle_deg);
-  const double ratio = options.final_max_reproj_error_px /
-                       options.triangulation.max_reproj_error_px;
-  const double progress = options.num_rounds > 1 ? static_cast<double>(round) /
-                                                       (options.num_rounds - 1)
-                                                 : 1.0;
+  triangulation.min_triangulation_angle_deg = std::min(
+      kMinAngleFloorDeg, options.triangulation.min_triangulation_angle_deg);
+  const double ratio =
+      kFinalMaxReprojErrorPx / options.triangulation.max_reproj_error_px;
+  const double progress = static_cast<double>(round) / (kNumRounds - 1);
   triangulation.max_reproj_error_px *= std::pow(ratio, progress);
-  if (round + 1 == options.num_rounds) {
+  if (round + 1 == kNumRounds) {
     triangulation.max_reproj_error_px =
-        MaxReprojErrorPx(options.final_max_reproj_error_px, before);
+        MaxReprojErrorPx(kFinalMaxReprojErrorPx, before);
   }
   return triangulation;
 }
@@ -149,21 +154,22 @@ struct RoundTracks {
 
 RoundTracks BuildRoundTracks(const CoarseStructureOptions& options,
                              const CoarseModelInput& input,
-                             const std::set<image_t>& images) {
-  std::vector<Track> joined = BuildTracks(options.tracks, input.matches);
+                             const std::set<image_t>& images,
+                             size_t min_num_images_for_keyframes) {
+  std::vector<Track> joined = BuildTracks(input.matches);
   const bool has_metres = input.metric && options.use_priors;
   const std::set<image_t> keyframes =
-      has_metres
-          ? SelectKeyframes(options.keyframes, images, joined, input.priors)
-          : images;
+      has_metres ? SelectKeyframes(images, joined, input.priors,
+                                   min_num_images_for_keyframes)
+                 : images;
   RoundTracks tracks;
   tracks.num_keyframes = keyframes.size();
   tracks.has_keyframes = keyframes.size() < images.size();
   if (tracks.has_keyframes) {
-    tracks.within_keyframes = SelectTracks(
-        options.tracks, RestrictTracks(options.tracks, joined, keyframes));
+    tracks.within_keyframes = SelectTracks(options.max_track_length,
+                                           RestrictTracks(joined, keyframes));
   }
-  tracks.all = SelectTracks(options.tracks, std::move(joined));
+  tracks.all = SelectTracks(options.max_track_length, std::move(joined));
   return tracks;
 }
 
@@ -184,7 +190,7 @@ void BuildRound(const CoarseStructureOptions& options, const SceneData& scene,
   std::vector<TriangulatedTrack> points = TriangulateTracks(
       TriangulationOptions(options, round, model->reconstruction),
       cams_from_world, refined.empty() ? bearings : refined,
-      tracks.Of(round + 1 == options.num_rounds));
+      tracks.Of(round + 1 == kNumRounds));
   model->reconstruction =
       CreateReconstruction(scene, cams_from_world, model->reconstruction);
   AddPoints(
@@ -201,12 +207,12 @@ PriorBundleAdjustmentSummary AdjustRound(
     double* keypoint_sigma_factor) {
   PriorBundleAdjustmentOptions bundle = options.bundle;
   bundle.position_loss_scale = PositionLossScale(
-      alignment, bundle.position_loss_scale, round, options.num_rounds);
+      alignment, bundle.position_loss_scale, round, kNumRounds);
   VarianceComponentOptions balance = options.balance;
   balance.estimate_prior_sigmas = false;
-  if (round + 1 < options.num_rounds) {
+  if (round + 1 < kNumRounds) {
     bundle.function_tolerance =
-        std::max(bundle.function_tolerance, options.early_function_tolerance);
+        std::max(bundle.function_tolerance, kEarlyFunctionTolerance);
     balance.enabled = false;
     balance.estimate_keypoint_sigma = false;
   }
@@ -233,7 +239,7 @@ void RepeatWithFreeLenses(
     const CoarseModelInput& input, const RoundTracks& tracks,
     const PriorBundleAdjustmentProblem& problem, double* keypoint_sigma_factor,
     CoarseModel* model) {
-  const int last = options.num_rounds - 1;
+  const int last = kNumRounds - 1;
   options.bundle.refine_focal_length = true;
   options.bundle.refine_extra_params = input.refine_lenses;
   *keypoint_sigma_factor = 1.0;
@@ -257,8 +263,8 @@ void AdjustLenses(const CoarseStructureOptions& options, const SceneData& scene,
   const std::set<camera_t> known = FindCameras(model->reconstruction, true);
   const std::set<camera_t> unknown = FindCameras(model->reconstruction, false);
   const auto find_error = [&] {
-    model->focal_length_error = FindFocalLengthError(
-        options.balance, options.bundle, problem, model->reconstruction);
+    model->focal_length_error =
+        FindFocalLengthError(options.bundle, problem, model->reconstruction);
     return model->focal_length_error.has_value();
   };
   if (!unknown.empty()) {
@@ -278,23 +284,15 @@ void AdjustLenses(const CoarseStructureOptions& options, const SceneData& scene,
 
 bool CoarseStructureOptions::IsValid(std::string* error) const {
   return OptionChecker(error)
-             .AtLeast(1, "num_rounds", num_rounds)
-             .Positive(
-                 {{"min_angle_floor_deg", min_angle_floor_deg},
-                  {"final_max_reproj_error_px", final_max_reproj_error_px}})
-             .NotNegative(
-                 {{"early_function_tolerance", early_function_tolerance}})
-             .AtLeast(0, "min_num_points_per_image", min_num_points_per_image)
+             .AtLeast(3, "max_track_length", max_track_length)
              .AllHold() &&
-         tracks.IsValid(error) && triangulation.IsValid(error) &&
-         bundle.IsValid(error) && balance.IsValid(error) &&
-         keyframes.IsValid(error);
+         triangulation.IsValid(error) && bundle.IsValid(error);
 }
 
 CoarseModel BuildCoarseModel(
     const CoarseStructureOptions& options, const SceneData& scene,
     const std::map<image_t, std::vector<Bearing>>& bearings,
-    CoarseModelInput input) {
+    CoarseModelInput input, size_t min_num_images_for_keyframes) {
   CoarseModel model;
   AlignInput(scene, &input, &model.positions);
   const bool is_georeferenced = model.positions.success;
@@ -302,13 +300,14 @@ CoarseModel BuildCoarseModel(
   model.max_track_bytes = EstimateTrackBytes(input.matches);
   PriorBundleAdjustmentProblem problem = CreateProblem(options, scene, input);
   if (is_georeferenced) AddPositions(scene, input, &problem);
-  const RoundTracks tracks = BuildRoundTracks(options, input, problem.images);
+  const RoundTracks tracks = BuildRoundTracks(options, input, problem.images,
+                                              min_num_images_for_keyframes);
   input.matches.clear();  // The tracks have them.
   model.num_tracks = tracks.all.size();
   model.num_keyframes = tracks.num_keyframes;
 
   double keypoint_sigma_factor = 1.0;
-  for (int round = 0; round < options.num_rounds; ++round) {
+  for (int round = 0; round < kNumRounds; ++round) {
     BuildRound(options, scene, bearings, input, tracks, round, &model);
     model.rounds.push_back(AdjustRound(options, problem, round, model.positions,
                                        &model.reconstruction,
@@ -320,15 +319,14 @@ CoarseModel BuildCoarseModel(
     AdjustLenses(options, scene, bearings, input, tracks, problem,
                  &keypoint_sigma_factor, &model);
   }
-  FilterPoints(
-      MaxReprojErrorPx(options.final_max_reproj_error_px, model.reconstruction),
-      std::min(options.min_angle_floor_deg,
-               options.triangulation.min_triangulation_angle_deg),
-      &model.reconstruction);
+  FilterPoints(MaxReprojErrorPx(kFinalMaxReprojErrorPx, model.reconstruction),
+               std::min(kMinAngleFloorDeg,
+                        options.triangulation.min_triangulation_angle_deg),
+               &model.reconstruction);
   model.gravity_aligned =
       is_georeferenced || AlignToGravity(scene, &model.reconstruction);
   model.keypoint_sigma_px = model.rounds.back().keypoint_sigma_px;
-  FillFigures(options, &model);
+  FillFigures(&model);
   return model;
 }
 

@@ -22,29 +22,21 @@
 
 namespace adasfm {
 
+// Largest reprojection error in the last round of triangulation and adjustment,
+// px. The rounds before begin at triangulation.max_reproj_error_px. Where the
+// limit by the keypoints' noise (MaxReprojErrorPx) is more, it counts.
+inline constexpr double kFinalMaxReprojErrorPx = 4.0;
+
 struct CoarseStructureOptions {
-  TrackOptions tracks;
+  // Longer tracks keep this many images, spread evenly from the first to the
+  // last: the adjustment's cost grows with the square of a track's length, and
+  // many short tracks constrain an image as well as few long ones.
+  int max_track_length = 12;
   TrackTriangulationOptions triangulation;
   PriorBundleAdjustmentOptions bundle;
   // Its max_sigma_factor is 8: vision that needs more than eight times its own
   // noise to agree with the sensors contradicts them, as priors_agree reports.
   VarianceComponentOptions balance;
-  // Rounds before the last use points in keyframes only.
-  KeyframeOptions keyframes;
-  // Motion straight ahead leaves some images without points of a wide angle.
-  // Images with fewer points than this get those with the next smaller angles.
-  int min_num_points_per_image = 40;
-  // Smallest angle of such points.
-  double min_angle_floor_deg = 1.0;
-  // Rounds of triangulation and adjustment. The largest reprojection error
-  // shrinks from triangulation.max_reproj_error_px to
-  // final_max_reproj_error_px, or to the limit by the keypoints' noise where
-  // that is more (MaxReprojErrorPx).
-  int num_rounds = 3;
-  double final_max_reproj_error_px = 4.0;
-  // Relative change of the cost at which the rounds before the last end. Their
-  // points are discarded, so they need no last digits.
-  double early_function_tolerance = 1e-3;
   // Sensor priors take part in the adjustment.
   bool use_priors = true;
   // Focal lengths that the database does not mark as known are adjusted when
@@ -116,12 +108,15 @@ struct CoarseModel {
 
 // Step 2.7: tracks, points with an angle, and rounds of bundle adjustment with
 // priors and tightening thresholds. Every round triangulates points anew from
-// the adjusted poses. With enough GNSS positions, which then take part in the
-// adjustments, the world is their frame. Otherwise the unit of the poses is
-// kept, and the world is rotated z-up when images have gravity directions.
+// the adjusted poses. The rounds before the last use points in keyframes only
+// (SelectKeyframes), in components of at least min_num_images_for_keyframes.
+// With enough GNSS positions, which then take part in the adjustments, the
+// world is their frame. Otherwise the unit of the poses is kept, and the world
+// is rotated z-up when images have gravity directions.
 CoarseModel BuildCoarseModel(
     const CoarseStructureOptions& options, const SceneData& scene,
     const std::map<image_t, std::vector<Bearing>>& bearings,
-    CoarseModelInput input);
+    CoarseModelInput input,
+    size_t min_num_images_for_keyframes = kMinNumImagesForKeyframes);
 
 }  // namespace adasfm

@@ -92,7 +92,6 @@ bool HasPriorFocalLengths(const std::set<camera_t>& constant_cameras,
 }  // namespace
 
 std::optional<FocalLengthError> FindFocalLengthError(
-    const VarianceComponentOptions& balance,
     const PriorBundleAdjustmentOptions& options,
     const PriorBundleAdjustmentProblem& whole_problem,
     const colmap::Reconstruction& reconstruction) {
@@ -119,7 +118,7 @@ std::optional<FocalLengthError> FindFocalLengthError(
       ComputePriorMeanSquare(
           CorrectSharedErrors(options.shared_errors, with_free.shared_errors,
                               problem.priors),
-          free) > balance.max_mean_square) {
+          free) > kMaxPriorMeanSquare) {
     return std::nullopt;
   }
   // Half the squares of the residuals are the cost.

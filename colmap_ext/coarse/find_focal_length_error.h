@@ -29,7 +29,6 @@ struct FocalLengthError {
 // would absorb. None without priors, or where they never rotate by 20 deg from
 // the first orientation. The model is unchanged.
 std::optional<FocalLengthError> FindFocalLengthError(
-    const VarianceComponentOptions& balance,
     const PriorBundleAdjustmentOptions& options,
     const PriorBundleAdjustmentProblem& problem,
     const colmap::Reconstruction& reconstruction);

@@ -14,6 +14,7 @@
 #include "colmap_ext/host/pose_conversion.h"
 #include "colmap_ext/scene/drives.h"
 #include "colmap_ext/scene/scene_bearings.h"
+#include "colmap_ext/scene/two_view_poses.h"
 #include "colmap_ext/scene/untied_parts.h"
 #include "core/option_checker.h"
 #include "core/prior_lengths.h"
@@ -29,7 +30,6 @@ namespace {
 GlobalStageOptions SetSharedOptions(GlobalStageOptions options,
                                     const SceneData& scene) {
   options.focal_lengths.num_threads = options.num_threads;
-  options.two_view.num_threads = options.num_threads;
   options.poses.num_threads = options.num_threads;
   options.structure.triangulation.num_threads = options.num_threads;
   options.refinement.num_threads = options.num_threads;
@@ -253,8 +253,8 @@ class GlobalStage {
   void BuildViewGraph() {
     Begin("view graph", 0.0);
     correspondences_ = FindCorrespondences(scene_, options_.num_threads);
-    initial_ = BuildInitialViewGraph(options_.two_view, scene_,
-                                     correspondences_.bearings);
+    initial_ = BuildInitialViewGraph(scene_, correspondences_.bearings,
+                                     options_.num_threads);
     End("view graph", DescribeViewGraph(initial_));
   }
 
@@ -410,7 +410,6 @@ bool GlobalStageOptions::IsValid(std::string* error) const {
              .PositiveOrMinusOne("max_memory_gb", max_memory_gb)
              .PositiveOrMinusOne("num_threads", num_threads)
              .AllHold() &&
-         focal_lengths.IsValid(error) && two_view.IsValid(error) &&
          poses.IsValid(error) && structure.IsValid(error) &&
          refinement.IsValid(error);
 }

@@ -12,7 +12,6 @@
 #include "colmap_ext/scene/calibrate_focal_lengths.h"
 #include "colmap_ext/scene/raw_matches.h"
 #include "colmap_ext/scene/scene_data.h"
-#include "colmap_ext/scene/two_view_poses.h"
 #include "core/inertial_motion.h"
 #include "core/status.h"
 #include "global/estimate_coarse_poses.h"
@@ -23,7 +22,6 @@ namespace adasfm {
 // Nested by step, in order of their use.
 struct GlobalStageOptions {
   FocalLengthCalibrationOptions focal_lengths;
-  TwoViewPoseOptions two_view;
   CoarsePoseOptions poses;
   CoarseStructureOptions structure;
   MatchRefinementOptions refinement;

@@ -129,8 +129,8 @@ class ModelJoiner {
     for (const ImagePair& pair : pairs) {
       images.insert({pair.image_id1, pair.image_id2});
     }
-    const std::vector<SightAcross> sights = FindSightsAcross(
-        options_.structure, PointsOf(a), PointsOf(b), pairs, matches_);
+    const std::vector<SightAcross> sights =
+        FindSightsAcross(PointsOf(a), PointsOf(b), pairs, matches_);
     return EstimatePartJoin(sights,
                             ModelFromRotations(a, images) *
                                 ModelFromRotations(b, images).conjugate());

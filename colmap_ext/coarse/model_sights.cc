@@ -19,10 +19,9 @@ using Sights = std::map<std::pair<int, TrackElement>, SightAcross>;
 
 // Adds an observation of the point of `from` with keypoint `seen`, by the
 // matched `keypoint` of the other model.
-void AddSight(const CoarseStructureOptions& options, const ModelPoints& from,
-              const TrackElement& seen, const ModelPoints& by,
-              const TrackElement& keypoint, bool is_point_of_a,
-              Sights* sights) {
+void AddSight(const ModelPoints& from, const TrackElement& seen,
+              const ModelPoints& by, const TrackElement& keypoint,
+              bool is_point_of_a, Sights* sights) {
   const auto point = from.point_of.find(seen);
   if (point == from.point_of.end()) return;
   const Rigid3d& pose = by.cams_from_world.at(keypoint.image_id);
@@ -34,8 +33,8 @@ void AddSight(const CoarseStructureOptions& options, const ModelPoints& from,
   sight.point = from.points[point->second];
   sight.center = pose.TargetOriginInSource();
   sight.ray = pose.rotation.conjugate() * bearing.direction;
-  sight.max_angle_rad = kMaxErrorFactor * options.final_max_reproj_error_px *
-                        bearing.jacobian.col(0).norm();
+  sight.max_angle_rad =
+      kMaxErrorFactor * kFinalMaxReprojErrorPx * bearing.jacobian.col(0).norm();
   sights->insert({{sight.point_id, keypoint}, sight});
 }
 
@@ -48,12 +47,12 @@ ModelPoints TriangulateModel(
   points.cams_from_world = CamsFromWorld(model.reconstruction);
   TrackTriangulationOptions triangulation = options.triangulation;
   triangulation.min_triangulation_angle_deg = kMinAngleDeg;
-  triangulation.max_reproj_error_px = options.final_max_reproj_error_px;
+  triangulation.max_reproj_error_px = kFinalMaxReprojErrorPx;
   points.bearings =
       ComputeModelBearings(model.reconstruction, triangulation.num_threads);
   for (const TriangulatedTrack& track :
        TriangulateTracks(triangulation, points.cams_from_world, points.bearings,
-                         BuildTracks(options.tracks, matches))) {
+                         BuildTracks(matches))) {
     for (const TrackElement& element : track.track) {
       points.point_of[element] = static_cast<int>(points.points.size());
     }
@@ -63,8 +62,8 @@ ModelPoints TriangulateModel(
 }
 
 std::vector<SightAcross> FindSightsAcross(
-    const CoarseStructureOptions& options, const ModelPoints& a,
-    const ModelPoints& b, const std::vector<ImagePair>& pairs,
+    const ModelPoints& a, const ModelPoints& b,
+    const std::vector<ImagePair>& pairs,
     const std::map<ImagePair, std::vector<FeatureMatch>>& matches) {
   Sights sights;
   for (const ImagePair& pair : pairs) {
@@ -72,8 +71,8 @@ std::vector<SightAcross> FindSightsAcross(
       TrackElement of_a{pair.image_id1, match.point2D_idx1};
       TrackElement of_b{pair.image_id2, match.point2D_idx2};
       if (a.cams_from_world.count(pair.image_id1) == 0) std::swap(of_a, of_b);
-      AddSight(options, a, of_a, b, of_b, true, &sights);
-      AddSight(options, b, of_b, a, of_a, false, &sights);
+      AddSight(a, of_a, b, of_b, true, &sights);
+      AddSight(b, of_b, a, of_a, false, &sights);
     }
   }
   std::vector<SightAcross> list;

@@ -29,8 +29,8 @@ ModelPoints TriangulateModel(
 // Observations of points of one model by images of the other, in both ways,
 // from matches of these pairs, each between an image of a and one of b.
 std::vector<SightAcross> FindSightsAcross(
-    const CoarseStructureOptions& options, const ModelPoints& a,
-    const ModelPoints& b, const std::vector<ImagePair>& pairs,
+    const ModelPoints& a, const ModelPoints& b,
+    const std::vector<ImagePair>& pairs,
     const std::map<ImagePair, std::vector<FeatureMatch>>& matches);
 
 }  // namespace adasfm

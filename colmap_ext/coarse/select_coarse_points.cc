@@ -25,7 +25,7 @@ std::vector<TriangulatedTrack> SelectCoarsePoints(
         std::any_of(point.track.begin(), point.track.end(),
                     [&](const TrackElement& element) {
                       return num_points[element.image_id] <
-                             options.min_num_points_per_image;
+                             kMinNumPointsPerImage;
                     });
     if (!selected[i]) continue;
     *min_angle_deg = std::min(*min_angle_deg, point.angle_deg);

@@ -8,6 +8,10 @@
 
 namespace adasfm {
 
+// Motion straight ahead leaves some images without points of a wide angle.
+// Images with fewer points than this get those with the next smaller angles.
+inline constexpr int kMinNumPointsPerImage = 40;
+
 // Selects the points of the coarse model: all tracks of the wanted angle, then,
 // widest first, those in an image with too few points. min_angle_deg receives
 // the smallest angle that was taken. The order is kept.

@@ -31,7 +31,7 @@ Status RunAdasfmPairGenerator(int argc, char** argv) {
       "empty, the times that adasfm_prior_importer stored in the database, "
       "else the order of the image names");
   AddPairOptions(&options, &command);
-  command.AddDefault("num_threads", &options.descriptors.num_threads,
+  command.AddDefault("num_threads", &options.num_threads,
                      "number of threads; -1: all of the machine");
   const Status parsed = command.Parse(argc, argv);
   if (!parsed.ok() || command.HelpShown()) return parsed;

@@ -38,11 +38,6 @@ Status RunAdasfmReporter(int argc, char** argv) {
   command.AddDefault(
       "max_time_gap_s", &options.ground_truth.max_time_gap_s,
       "largest gap between trajectory poses that is interpolated [s]");
-  command.AddDefault("max_num_points", &options.max_num_points,
-                     "largest number of points in the 3D view");
-  command.AddDefault("max_num_examples", &options.max_num_examples,
-                     "largest number of pairs shown with photos, for removed "
-                     "and for kept pairs; each pair adds about 60 kB");
   const Status parsed = command.Parse(argc, argv);
   if (!parsed.ok() || command.HelpShown()) return parsed;
   Status valid = CheckOptions(options);

@@ -16,7 +16,6 @@ class GlobalOptionAdder {
   void AddRotations();
   void AddCameraImuRotation();
   void AddLoops();
-  void AddPositions();
   void AddStructure();
   void AddMatches();
   void AddAblations();
@@ -61,24 +60,11 @@ void GlobalOptionAdder::AddPaper() {
 void GlobalOptionAdder::AddRotations() {
   Add("min_num_inliers", &stage_->poses.min_num_inliers,
       "pairs with fewer verified matches are not used");
-  Add("num_rotation_rounds", &stage_->poses.num_rotation_rounds,
-      "rounds of relative poses and rotation averaging if pairs have no "
-      "odometry");
 }
 
 void GlobalOptionAdder::AddCameraImuRotation() {
-  CameraImuRotationOptions* camera_imu = &stage_->poses.camera_imu_rotation;
-  Add("camera_imu_max_num_steps", &camera_imu->max_num_steps,
-      "pairs at most this many images apart are used to estimate the "
-      "camera-IMU rotation");
-  Add("camera_imu_sigma_deg", &camera_imu->sigma_deg,
+  Add("camera_imu_sigma_deg", &stage_->poses.camera_imu_rotation.sigma_deg,
       "prior 1 sigma of the rotation error of T_cam_imu, per axis [deg]");
-  Add("camera_imu_min_sigma_deg", &camera_imu->min_sigma_deg,
-      "1 sigma added to the estimated rotation error of T_cam_imu, per axis "
-      "[deg]");
-  Add("camera_imu_min_num_sigmas", &camera_imu->min_num_sigmas,
-      "priors are corrected if the error of T_cam_imu exceeds this many "
-      "sigmas");
 }
 
 void GlobalOptionAdder::AddLoops() {
@@ -87,65 +73,20 @@ void GlobalOptionAdder::AddLoops() {
   Add("gyro_bias_sigma_rad_s", &stage_->poses.chain.gyro_bias_sigma_rad_s,
       "1 sigma of the remaining gyroscope bias, per axis, if the import does "
       "not state it [rad/s]");
-  Add("visual_odometry_length_error",
-      &stage_->poses.visual_odometry.length_error_ratio,
-      "1 sigma of the drift of lengths of visual odometry, as a ratio");
   LoopClosureOptions* loops = &stage_->poses.loops;
   Add("loop_significance", &loops->significance,
       "probability that a consistency check (odometry or loop closures) "
       "rejects a true pair");
-  Add("loop_pair_angle_sigma_deg", &loops->pair_angle_sigma_deg,
-      "1 sigma added to a pair's rotation and direction in consistency checks "
-      "[deg]");
-  Add("loop_pair_length_log_sigma", &loops->pair_length_log_sigma,
-      "1 sigma added to a pair's log baseline length in consistency checks");
-  Add("loop_unit_log_sigma", &loops->unit_log_sigma,
-      "1 sigma of the log scale ratio of two trajectory segments that are not "
-      "both metric");
   Add("max_sequence_gap", &loops->max_sequence_gap,
       "pairs of images more than this many images apart in the order of "
       "capture are loop closures");
-  Add("closure_min_turn_deg", &loops->min_turn_deg,
-      "two trajectory segments are joined only by loop closures before and "
-      "after a turn by this angle [deg]");
-}
-
-void GlobalOptionAdder::AddPositions() {
-  Add("max_num_position_iterations",
-      &stage_->poses.positions.max_num_iterations,
-      "largest number of iterations of the translation averaging");
 }
 
 void GlobalOptionAdder::AddStructure() {
-  Add("min_angle_floor_deg", &stage_->structure.min_angle_floor_deg,
-      "smallest triangulation angle in images with few points [deg]");
-  Add("min_num_points_per_image", &stage_->structure.min_num_points_per_image,
-      "images with fewer points also get points of smaller triangulation "
-      "angles");
-  Add("min_track_length", &stage_->structure.tracks.min_track_length,
-      "smallest number of images of a track");
-  Add("max_track_length", &stage_->structure.tracks.max_track_length,
+  Add("max_track_length", &stage_->structure.max_track_length,
       "longer tracks are reduced to this many images, evenly spread");
-  Add("min_num_tracks_per_image",
-      &stage_->structure.tracks.min_num_tracks_per_image,
-      "tracks are added until each image has this many, if possible");
-  Add("num_rounds", &stage_->structure.num_rounds,
-      "rounds of triangulation and bundle adjustment");
-  Add("final_max_reproj_error_px", &stage_->structure.final_max_reproj_error_px,
-      "largest reprojection error in the last round [px]; four sigmas of the "
-      "keypoint noise where that is more");
-  Add("early_function_tolerance", &stage_->structure.early_function_tolerance,
-      "relative change of the cost at which rounds before the last converge");
-  Add("keyframe_min_num_images", &stage_->structure.keyframes.min_num_images,
-      "components with fewer images use points in all images in all rounds");
-  Add("keyframe_stride", &stage_->structure.keyframes.stride,
-      "n: rounds before the last use points in about every n-th image "
-      "(keyframes); 1: all");
   Add("ba_keypoint_sigma_px", &stage_->structure.bundle.keypoint_sigma_px,
       "1 sigma of a keypoint, to weight vision against sensor priors [px]");
-  Add("ba_estimate_keypoint_sigma",
-      &stage_->structure.balance.estimate_keypoint_sigma,
-      "estimate the keypoint sigma from the residuals in the last round");
   Add("ba_refine_focal_length", &stage_->structure.bundle.refine_focal_length,
       "refine focal lengths in the bundle adjustment");
   Add("calibrate_focal_lengths", &stage_->focal_lengths.enabled,
@@ -173,7 +114,7 @@ void GlobalOptionAdder::AddAblations() {
       &stage_->poses.loops.split_unconfirmed_closures,
       "trajectory segments (with sensor priors, or images in order) joined "
       "only by loop closures at one place become separate models");
-  Add("use_visual_odometry", &stage_->poses.visual_odometry.enabled,
+  Add("use_visual_odometry", &stage_->poses.use_visual_odometry,
       "use visual odometry for the consistency check of loop closures where "
       "sensors have no translation (0 or 1)");
   Add("refine_relative_poses", &stage_->poses.relative_poses.enabled,
@@ -205,20 +146,14 @@ void AddGlobalOptions(GlobalStageOptions* stage, CommandOptions* command) {
   adder.AddRotations();
   adder.AddCameraImuRotation();
   adder.AddLoops();
-  adder.AddPositions();
   adder.AddStructure();
   adder.AddMatches();
   adder.AddAblations();
   // Earlier names.
   const std::pair<const char*, const char*> old_names[] = {
-      {"camera_mount_max_num_steps", "camera_imu_max_num_steps"},
       {"camera_mount_sigma_deg", "camera_imu_sigma_deg"},
-      {"camera_mount_min_sigma_deg", "camera_imu_min_sigma_deg"},
-      {"camera_mount_min_num_sigmas", "camera_imu_min_num_sigmas"},
       {"correct_camera_mount", "correct_camera_imu_rotation"},
-      {"visual_step_length_error", "visual_odometry_length_error"},
       {"use_visual_steps", "use_visual_odometry"},
-      {"join_min_turn_deg", "closure_min_turn_deg"},
       {"split_unverified_joins", "split_unconfirmed_closures"}};
   for (const auto& [old_name, name] : old_names) {
     command->AddOldName(std::string("AdaSfmGlobal.") + old_name,

@@ -26,26 +26,6 @@ void AddFusionOptions(OdometryFusionOptions* fusion, CommandOptions* command) {
   add("driving_direction_sigma_deg", &fusion->driving_direction_sigma_deg,
       "prior 1 sigma of the driving direction relative to T_imu_wheel [deg]; "
       "0: fixed");
-  add("wheel_delay_sigma_s", &fusion->wheel_delay_sigma_s,
-      "prior 1 sigma of the delay of wheel readings behind the motion [s]");
-  add("lateral_speed_noise_m_s_sqrt_hz", &fusion->lateral_speed_noise,
-      "noise of the lateral speed of the wheel frame [m/s/sqrt(Hz)]");
-  add("vertical_speed_noise_m_s_sqrt_hz", &fusion->vertical_speed_noise,
-      "noise of the vertical speed of the wheel frame [m/s/sqrt(Hz)]");
-  add("planar_rotation_noise_rad_sqrt_s", &fusion->planar_rotation_noise,
-      "noise of roll and pitch of a machine without IMU [rad/sqrt(s)]");
-  add("slip_threshold_sigma", &fusion->slip_threshold_sigma,
-      "wheel readings that differ more from the IMU are downweighted [sigma]");
-  add("slip_min_speed_m_s", &fusion->slip_min_speed_m_s,
-      "smallest speed error that is reported as wheel slip [m/s]");
-  add("standstill_speed_sigma_m_s", &fusion->standstill_speed_sigma,
-      "speed of a machine at rest, 1 sigma [m/s]");
-  add("standstill_rate_sigma_rad_s", &fusion->standstill_rate_sigma,
-      "angular rate of a machine at rest, 1 sigma [rad/s]");
-  add("unaided_speed_sigma_m_s", &fusion->unaided_speed_sigma,
-      "speed of an IMU without wheels, 1 sigma [m/s]");
-  add("max_num_iterations", &fusion->max_num_iterations,
-      "largest number of iterations of the smoother");
 }
 
 void AddOldNames(CommandOptions* command) {
@@ -56,12 +36,7 @@ void AddOldNames(CommandOptions* command) {
       {"wheel_curvature_sigma", "wheel_curvature_sigma_per_m"},
       {"wheel_mount_sigma_deg", "driving_direction_sigma_deg"},
       {"lateral_speed_noise", "lateral_speed_noise_m_s_sqrt_hz"},
-      {"vertical_speed_noise", "vertical_speed_noise_m_s_sqrt_hz"},
-      {"planar_rotation_noise", "planar_rotation_noise_rad_sqrt_s"},
-      {"standstill_speed_sigma", "standstill_speed_sigma_m_s"},
-      {"standstill_rate_sigma", "standstill_rate_sigma_rad_s"},
-      {"unaided_speed_sigma", "unaided_speed_sigma_m_s"},
-      {"visual_bias_sigma", "visual_bias_sigma_rad_s"}};
+      {"vertical_speed_noise", "vertical_speed_noise_m_s_sqrt_hz"}};
   for (const auto& [old_name, name] : old_names) {
     command->AddOldName(std::string("AdaSfmPriors.") + old_name,
                         std::string("AdaSfmPriors.") + name);
@@ -89,9 +64,6 @@ void AddOtherSources(PriorImportOptions* options, CommandOptions* command) {
   PositionPriorOptions* positions = &options->positions;
   command->AddDefault("AdaSfmGnss.max_fix_gap_s", &positions->max_fix_gap_s,
                       "longest gap of the GNSS positions to interpolate [s]");
-  command->AddDefault("AdaSfmGnss.max_image_gap_s", &positions->max_image_gap_s,
-                      "a GNSS position between two images at most this far "
-                      "apart constrains both [s]");
   command->AddDefault("AdaSfmGnss.correlation_time_s",
                       &positions->correlation_time_s,
                       "correlation time of the errors of GNSS positions [s]; "
@@ -105,21 +77,18 @@ void AddImporterOptions(PriorImportOptions* options, CommandOptions* command) {
   const auto add = [command](const char* name, auto* value, const char* help) {
     command->AddDefault(std::string("AdaSfmPriors.") + name, value, help);
   };
-  add("max_imu_gap_s", &estimation->max_imu_gap_s,
+  OdometryLinkOptions* links = &estimation->links;
+  add("max_imu_gap_s", &links->max_imu_gap_s,
       "longest gap of the IMU log to bridge [s]");
-  add("max_wheel_gap_s", &estimation->max_wheel_gap_s,
+  add("max_wheel_gap_s", &links->max_wheel_gap_s,
       "longest gap of the wheel log to bridge [s]");
-  add("max_link_s", &estimation->max_link_s,
-      "longest interval between two states of the smoother [s]");
-  add("max_lead_s", &estimation->max_lead_s,
-      "logs are used up to this time before the first and after the last image "
-      "[s]");
+  add("lateral_speed_noise_m_s_sqrt_hz", &links->lateral_speed_noise,
+      "noise of the lateral speed of the wheel frame [m/s/sqrt(Hz)]");
+  add("vertical_speed_noise_m_s_sqrt_hz", &links->vertical_speed_noise,
+      "noise of the vertical speed of the wheel frame [m/s/sqrt(Hz)]");
   add("use_visual_rotations", &estimation->use_visual_rotations,
       "use two-view rotations to estimate the gyroscope bias and, without an "
       "IMU, to detect wheel slip (0 or 1)");
-  add("visual_bias_sigma_rad_s", &estimation->visual_bias_sigma,
-      "common error of all two-view rotations, as a rotation rate, 1 sigma "
-      "[rad/s]");
   add("estimate_time_shift", &estimation->estimate_time_shift,
       "add the estimated time shift between vision and gyroscope to "
       "timeshift_cam_imu: 0, 1, or -1: if significant and at most 0.15 s");
@@ -132,9 +101,6 @@ void AddImporterOptions(PriorImportOptions* options, CommandOptions* command) {
   add("max_memory_gb", &options->max_memory_gb,
       "memory limit; an import that may need more stops at the start [GB]; -1: "
       "only a warning if it may need more than is free");
-  add("max_visual_gap", &options->max_visual_gap,
-      "two-view rotations are used between images at most this many images "
-      "apart");
   AddFusionOptions(&estimation->fusion, command);
   AddOtherSources(options, command);
   AddOldNames(command);

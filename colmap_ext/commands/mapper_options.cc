@@ -15,8 +15,7 @@ void AddPartitionOptions(MapperStageOptions* options, CommandOptions* command) {
                       &partition.cut.min_part_size,
                       "parts with fewer images are joined to a neighbour");
   command->AddDefault(
-      "AdaSfmPartition.min_overlap_ratio",
-      &partition.flood_fill.min_overlap_ratio,
+      "AdaSfmPartition.min_overlap_ratio", &partition.min_overlap_ratio,
       "tau_ot: smallest share of a part that other parts contain too");
   command->AddDefault("AdaSfmPartition.max_num_images_undivided",
                       &partition.max_num_images_undivided,
@@ -34,17 +33,12 @@ void AddAlignOptions(AlignSimilarityOptions* align, CommandOptions* command) {
   command->AddDefault(
       "AdaSfmAlign.threshold_decrease", &align->threshold_decrease,
       "alpha_dec: step of lowering the inlier threshold [as tau_init]");
-  command->AddDefault("AdaSfmAlign.min_threshold", &align->min_threshold,
-                      "smallest inlier threshold [as tau_init]");
   command->AddDefault(
       "AdaSfmAlign.min_inlier_ratio", &align->min_inlier_ratio,
       "r_min: parts with a smaller inlier ratio are not merged");
   command->AddDefault(
       "AdaSfmAlign.max_inlier_ratio", &align->max_inlier_ratio,
       "r_max: inlier ratio from which the inlier threshold is lowered");
-  command->AddDefault("AdaSfmAlign.max_num_iterations",
-                      &align->max_num_iterations,
-                      "largest number of inlier thresholds tried");
   command->AddDefault(
       "AdaSfmAlign.adapt_threshold", &align->adapt_threshold,
       "adapt the inlier threshold to the inlier ratio; 0: always use tau_init");
@@ -79,18 +73,11 @@ void AddMapperOptions(MapOptions* options, CommandOptions* command) {
   add("balance_priors", &local.balance.enabled,
       "raise the keypoint sigma until the priors agree within their "
       "covariance");
-  add("max_prior_chi2", &local.balance.max_mean_square,
-      "largest mean squared whitened residual of the priors (balance_priors)");
-  add("max_keypoint_sigma_factor", &local.balance.max_sigma_factor,
-      "largest factor by which balance_priors raises the keypoint sigma");
   add("filter_max_reproj_error_px", &local.filter_max_reproj_error_px,
       "observations with an error above this, and above four noise sigmas, are "
       "removed [px]");
   add("min_triangulation_angle_deg", &local.min_triangulation_angle_deg,
       "smallest triangulation angle of a point [deg]");
-  add("global_adjustment_growth", &local.global_adjustment_growth,
-      "all images of a part are adjusted each time that the part has grown by "
-      "this factor");
   add("refine_focal_length", &options->refine_focal_length,
       "refine focal lengths at the end: 0, 1, or -1: if not marked as known in "
       "the database");

@@ -10,7 +10,6 @@ void AddPairOptions(PairSelectionOptions* options, CommandOptions* command) {
                              const std::string& help) {
     command->AddDefault("AdaSfmPairs." + name, value, help);
   };
-  GlobalDescriptorOptions* descriptors = &options->descriptors;
   add("num_temporal_neighbors", &options->num_temporal_neighbors,
       "number of next images in time to match each image with");
   add("num_similar_images", &options->num_similar_images,
@@ -26,20 +25,6 @@ void AddPairOptions(PairSelectionOptions* options, CommandOptions* command) {
   add("descriptors_path", &options->descriptors_path,
       "file of external global descriptors, lines `image_name v1 v2 ... vn`; "
       "when empty, computed from the features in the database");
-  add("num_words", &descriptors->vocabulary.num_words,
-      "number of visual words of the vocabulary");
-  add("max_num_iterations", &descriptors->vocabulary.max_num_iterations,
-      "largest number of iterations of k-means");
-  add("seed", &descriptors->vocabulary.seed,
-      "equal seeds give equal vocabularies");
-  add("max_num_training_descriptors",
-      &descriptors->max_num_training_descriptors,
-      "largest number of features to train the vocabulary on");
-  add("num_dimensions", &descriptors->num_dimensions,
-      "dimension of the global descriptors after a principal component "
-      "analysis; 0: no reduction");
-  add("max_num_pca_images", &descriptors->max_num_pca_images,
-      "largest number of images for the principal component analysis");
 }
 
 }  // namespace adasfm

@@ -91,8 +91,7 @@ void AssignSharedErrorWindows(const SharedErrorOptions& options,
                               std::vector<PosePriorEdge>* edges) {
   AssignWindows(options.gyroscope_window_s, &SharedErrorWindows::gyroscope,
                 edges);
-  AssignWindows(options.direction_window_s, &SharedErrorWindows::direction,
-                edges);
+  AssignWindows(kDirectionWindowS, &SharedErrorWindows::direction, edges);
   std::set<int> drives;
   for (const PosePriorEdge& edge : *edges) {
     if (edge.MeasuresLength()) drives.insert(edge.windows.drive);

@@ -9,16 +9,13 @@ namespace adasfm {
 bool SharedErrorOptions::IsValid(std::string* error) const {
   return OptionChecker(error)
       .NotNegative(
-          {{"gyroscope_bias_sigma_rad_s", gyroscope_bias_sigma_rad_s},
-           {"gyroscope_random_walk_rad_s_sqrt_s",
+          {{"gyroscope_random_walk_rad_s_sqrt_s",
             gyroscope_random_walk_rad_s_sqrt_s},
            {"extrinsic_rotation_sigma_rad", extrinsic_rotation_sigma_rad},
            {"driving_direction_sigma_rad", driving_direction_sigma_rad},
            {"direction_drift_time_s", direction_drift_time_s},
-           {"length_drift_ratio", length_drift_ratio},
-           {"length_scale_sigma", length_scale_sigma}})
-      .Positive({{"gyroscope_window_s", gyroscope_window_s},
-                 {"direction_window_s", direction_window_s}})
+           {"length_drift_ratio", length_drift_ratio}})
+      .Positive("gyroscope_window_s", gyroscope_window_s)
       .AllHold();
 }
 

@@ -15,9 +15,8 @@ namespace adasfm {
 // estimates the errors together with the poses; a sigma of 0 holds one at zero.
 struct SharedErrorOptions {
   bool enabled = true;
-  // 1 sigma, per axis, of the gyroscope bias that the import left, and of its
-  // random walk.
-  double gyroscope_bias_sigma_rad_s = 1e-3;
+  // 1 sigma, per axis, of the random walk of the gyroscope bias that the import
+  // left.
   double gyroscope_random_walk_rad_s_sqrt_s = 2e-5;
   // Length of the windows with one bias each.
   double gyroscope_window_s = 20.0;
@@ -28,20 +27,20 @@ struct SharedErrorOptions {
   double driving_direction_sigma_rad = 0.035;
   // Within the drive the direction drifts with errors of the smoother's tilt
   // and velocity: a Gauss-Markov process of this correlation time, with one
-  // value for each window and the median sigma that the motions state.
+  // value for each window (kDirectionWindowS) and the median sigma that the
+  // motions state. 0: no drift.
   // docs/reference/math.md has measurements.
   double direction_drift_time_s = 3.0;
-  double direction_window_s = 2.0;
   // Relative 1 sigma of the same process in lengths: the smoother's velocity
   // also errs along the motion, as where wheels slip for seconds. The import
   // states it; 0 leaves lengths independent.
   double length_drift_ratio = 0.0;
-  // Relative 1 sigma of the scale of a drive's lengths, in an adjustment of
-  // several drives with lengths.
-  double length_scale_sigma = 0.01;
 
   bool IsValid(std::string* error) const;
 };
+
+// Length of the windows with one direction drift each.
+inline constexpr double kDirectionWindowS = 2.0;
 
 // Selects the values of the errors that apply to a motion.
 struct SharedErrorWindows {

@@ -25,8 +25,7 @@ PairPoses FindPairPoses(const SceneData& scene) {
   }
   PairPoses poses;
   for (const ViewGraphEdge& edge :
-       BuildInitialViewGraph(TwoViewPoseOptions(), scene, bearings)
-           .graph.edges) {
+       BuildInitialViewGraph(scene, bearings).graph.edges) {
     poses[edge.Pair()] = edge.cam2_from_cam1;
   }
   return poses;

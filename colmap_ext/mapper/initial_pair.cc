@@ -81,8 +81,8 @@ struct Candidate {
 
 class CandidateBuilder {
  public:
-  CandidateBuilder(const InitialPairOptions& options, const MapperScene& scene)
-      : options_(options), scene_(scene) {}
+  CandidateBuilder(double max_epipolar_error_px, const MapperScene& scene)
+      : max_epipolar_error_px_(max_epipolar_error_px), scene_(scene) {}
 
   // False when the coarse model lacks one of the images.
   bool Build(const ScenePair& pair, Candidate* candidate) {
@@ -118,7 +118,7 @@ class CandidateBuilder {
         scene_.data->cameras.at(camera_id).MeanFocalLength();
     return ComputeParallaxes(pair, DirectionsOf(pair.image_id1),
                              DirectionsOf(pair.image_id2), cam2_from_cam1,
-                             options_.max_epipolar_error_px / focal_px);
+                             max_epipolar_error_px_ / focal_px);
   }
 
   const Directions& DirectionsOf(image_t image_id) {
@@ -127,17 +127,17 @@ class CandidateBuilder {
     return directions_[image_id] = ComputeDirections(*scene_.data, image_id);
   }
 
-  const InitialPairOptions& options_;
+  const double max_epipolar_error_px_;
   const MapperScene& scene_;
   std::map<image_t, Directions> directions_;
 };
 
 }  // namespace
 
-std::vector<InitialPair> FindInitialPairs(const InitialPairOptions& options,
+std::vector<InitialPair> FindInitialPairs(double max_epipolar_error_px,
                                           const MapperScene& scene,
                                           size_t max_num_pairs) {
-  CandidateBuilder builder(options, scene);
+  CandidateBuilder builder(max_epipolar_error_px, scene);
   std::vector<Candidate> candidates;
   std::set<image_t> free_images;
   for (const image_t image_id : scene.images) {
@@ -146,7 +146,7 @@ std::vector<InitialPair> FindInitialPairs(const InitialPairOptions& options,
     }
   }
   for (const ScenePair* pair : FindPairsAmong(*scene.data, free_images)) {
-    if (pair->inlier_matches.size() < InitialPairOptions::kMinNumPoints) {
+    if (pair->inlier_matches.size() < kMinNumInitialMatches) {
       continue;
     }
     Candidate candidate;
@@ -159,7 +159,7 @@ std::vector<InitialPair> FindInitialPairs(const InitialPairOptions& options,
     for (Candidate& candidate : candidates) {
       candidate.pair.num_points =
           CountAbove(candidate.parallaxes, DegToRad(min_parallax_deg));
-      if (candidate.pair.num_points >= InitialPairOptions::kMinNumPoints) {
+      if (candidate.pair.num_points >= kMinNumInitialMatches) {
         pairs.push_back(candidate.pair);
       }
     }

@@ -19,18 +19,14 @@ struct InitialPair {
   int num_points = 0;
 };
 
-struct InitialPairOptions {
-  // A pair needs this many matches with the parallax asked for.
-  static constexpr int kMinNumPoints = 30;
-  // Largest distance of a match to its epipolar line under the poses.
-  double max_epipolar_error_px = 4.0;
-};
+// A pair needs this many matches with the parallax asked for.
+inline constexpr int kMinNumInitialMatches = 30;
 
 // The best pairs among the images of the scene that are not registered yet,
 // best first, at most max_num_pairs. The relative pose is the coarse one or the
 // pair's own two-view geometry with the coarse length, whichever explains more
-// matches.
-std::vector<InitialPair> FindInitialPairs(const InitialPairOptions& options,
+// matches, within max_epipolar_error_px of their epipolar lines.
+std::vector<InitialPair> FindInitialPairs(double max_epipolar_error_px,
                                           const MapperScene& scene,
                                           size_t max_num_pairs);
 

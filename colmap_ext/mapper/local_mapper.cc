@@ -22,6 +22,10 @@ constexpr size_t kMaxNumInitialTrials = 5;
 // adjustment has seen.
 constexpr double kMaxBatchRatio = 0.5;
 constexpr size_t kMinBatchSize = 8;
+// The whole part is adjusted when it has grown by this factor since the last
+// time. The coarse poses keep drift small in between, so this is seldom
+// (COLMAP: 1.1 and every 500 images).
+constexpr double kGlobalAdjustmentGrowth = 1.5;
 
 class LocalMapper {
  public:
@@ -61,8 +65,9 @@ class LocalMapper {
   }
 
   bool RegisterInitialPair() {
-    for (const InitialPair& pair : FindInitialPairs(
-             options_.initial_pair, *scene_, kMaxNumInitialTrials)) {
+    for (const InitialPair& pair :
+         FindInitialPairs(options_.initial_max_epipolar_error_px, *scene_,
+                          kMaxNumInitialTrials)) {
       const Rigid3d local_from_coarse = FindLocalFromCoarse(pair.image_id1);
       scene_->mapper.Register(
           pair.image_id1, pair.cam1_from_world * local_from_coarse.Inverse());
@@ -132,7 +137,7 @@ class LocalMapper {
 
   void AdjustAsGrown() {
     if (reconstruction_.NumRegImages() >=
-        options_.global_adjustment_growth * num_registered_at_adjustment_) {
+        kGlobalAdjustmentGrowth * num_registered_at_adjustment_) {
       adjuster_.AdjustAll(10);
       num_registered_at_adjustment_ = reconstruction_.NumRegImages();
     } else {
@@ -175,8 +180,7 @@ class LocalMapper {
           coarse1 != scene_->coarse->end() &&
           coarse2 != scene_->coarse->end() &&
           IsSupportedByPrior(
-              {}, prior,
-              ComputeCam2FromCam1(coarse1->second, coarse2->second))) {
+              prior, ComputeCam2FromCam1(coarse1->second, coarse2->second))) {
         return true;
       }
     }
@@ -214,18 +218,12 @@ class LocalMapper {
 
 bool LocalMapperOptions::IsValid(std::string* error) const {
   return OptionChecker("AdaSfmMapper", error)
-             .AtLeast(4, "min_num_visible_points",
-                      registration.min_num_visible_points)
-             .Positive("max_reproj_error_px", registration.max_reproj_error_px)
-             .Positive("filter_max_reproj_error_px", filter_max_reproj_error_px)
-             .Positive("min_triangulation_angle_deg",
-                       min_triangulation_angle_deg)
-             .Require(global_adjustment_growth > 1.0,
-                      "global_adjustment_growth", global_adjustment_growth,
-                      "must be above 1")
-             .Positive("keypoint_sigma_px", keypoint_sigma_px)
-             .AllHold() &&
-         balance.IsValid(error);
+      .AtLeast(4, "min_num_visible_points", registration.min_num_visible_points)
+      .Positive("max_reproj_error_px", registration.max_reproj_error_px)
+      .Positive("filter_max_reproj_error_px", filter_max_reproj_error_px)
+      .Positive("min_triangulation_angle_deg", min_triangulation_angle_deg)
+      .Positive("keypoint_sigma_px", keypoint_sigma_px)
+      .AllHold();
 }
 
 LocalMapResult ReconstructLocally(const LocalMapperOptions& options,

@@ -14,8 +14,9 @@
 namespace adasfm {
 
 struct LocalMapperOptions {
+  // Largest distance of an initial pair's match to its epipolar line.
+  double initial_max_epipolar_error_px = 4.0;
   RegisterImageOptions registration;
-  InitialPairOptions initial_pair;
   // Whether sensor priors take part in the adjustments.
   bool use_priors_in_adjustment = true;
   // The coarse motion of every pair of the augmented view graph as a term of a
@@ -28,10 +29,6 @@ struct LocalMapperOptions {
   // does not adapt to the noise, as it would join neighbouring points.
   double filter_max_reproj_error_px = 4.0;
   double min_triangulation_angle_deg = 1.5;
-  // The whole part is adjusted when it has grown by this factor since the last
-  // time. The coarse poses keep drift small in between, so this is seldom
-  // (COLMAP: 1.1 and every 500 images).
-  double global_adjustment_growth = 1.5;
   // 1 sigma of a keypoint's position, which weighs priors against keypoints.
   double keypoint_sigma_px = 0.5;
   // How vision is weighed against the priors.

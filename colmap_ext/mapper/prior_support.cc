@@ -12,25 +12,31 @@ namespace {
 
 constexpr double kNumSigmas = 4.0;
 
+struct Tolerances {
+  double rotation_rad;
+  // Over the prior's length; the tolerance is at least translation_m.
+  double translation_ratio;
+  double translation_m;
+};
+constexpr Tolerances kSupport = {0.05, 0.2, 0.1};
+constexpr Tolerances kViolation = {0.1, 0.5, 0.5};
+
 // The largest standard deviation of a 3x3 block's diagonal.
 double MaxSigma(const Eigen::Matrix<double, 6, 6>& covariance, int begin) {
   return std::sqrt(
       std::max(0.0, covariance.diagonal().segment<3>(begin).maxCoeff()));
 }
 
-}  // namespace
-
-bool IsSupportedByPrior(const PriorSupportOptions& options,
-                        const RelativePosePrior& prior,
-                        const Rigid3d& cam2_from_cam1) {
+bool IsWithin(const Tolerances& tolerances, const RelativePosePrior& prior,
+              const Rigid3d& cam2_from_cam1) {
   if (!prior.HasRotation() && !prior.HasDirection() && !prior.HasLength()) {
     return false;
   }
   if (prior.HasRotation()) {
     const double angle_rad =
         AngleBetweenRad(cam2_from_cam1.rotation, prior.cam2_from_cam1.rotation);
-    if (angle_rad > options.rotation_tolerance_rad +
-                        kNumSigmas * MaxSigma(prior.covariance, 0)) {
+    if (angle_rad >
+        tolerances.rotation_rad + kNumSigmas * MaxSigma(prior.covariance, 0)) {
       return false;
     }
   }
@@ -38,14 +44,21 @@ bool IsSupportedByPrior(const PriorSupportOptions& options,
   const double length = cam2_from_cam1.translation.norm();
   if (!prior.HasLength()) return true;
   const double tolerance_m =
-      std::max(options.translation_tolerance_m,
-               options.translation_tolerance_ratio * prior_length) +
+      std::max(tolerances.translation_m,
+               tolerances.translation_ratio * prior_length) +
       kNumSigmas * MaxSigma(prior.covariance, 3);
   if (!prior.HasDirection()) {
     return std::abs(length - prior_length) <= tolerance_m;
   }
   return (cam2_from_cam1.translation - prior.cam2_from_cam1.translation)
              .norm() <= tolerance_m;
+}
+
+}  // namespace
+
+bool IsSupportedByPrior(const RelativePosePrior& prior,
+                        const Rigid3d& cam2_from_cam1) {
+  return IsWithin(kSupport, prior, cam2_from_cam1);
 }
 
 std::optional<bool> IsViolated(const RelativePosePrior& prior,
@@ -58,12 +71,8 @@ std::optional<bool> IsViolated(const RelativePosePrior& prior,
       !has(prior.image_id1) || !has(prior.image_id2)) {
     return std::nullopt;
   }
-  PriorSupportOptions options;
-  options.rotation_tolerance_rad = 0.1;
-  options.translation_tolerance_ratio = 0.5;
-  options.translation_tolerance_m = 0.5;
-  return !IsSupportedByPrior(
-      options, prior,
+  return !IsWithin(
+      kViolation, prior,
       ComputeCam2FromCam1(CamFromWorld(model.Image(prior.image_id1)),
                           CamFromWorld(model.Image(prior.image_id2))));
 }

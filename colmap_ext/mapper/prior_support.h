@@ -10,16 +10,10 @@
 namespace adasfm {
 
 // Whether a motion agrees with what a prior's sensors observed: within four
-// sigmas and the given tolerances, which cover errors that the covariance does
-// not include (calibration, the coarse model's own noise).
-struct PriorSupportOptions {
-  double rotation_tolerance_rad = 0.05;
-  // Over the prior's length; the tolerance is at least translation_tolerance_m.
-  double translation_tolerance_ratio = 0.2;
-  double translation_tolerance_m = 0.1;
-};
-bool IsSupportedByPrior(const PriorSupportOptions& options,
-                        const RelativePosePrior& prior,
+// sigmas and tolerances for errors that the covariance does not include
+// (calibration, the coarse model's own noise): 0.05 rad; 20 % of the length and
+// at least 0.1 m.
+bool IsSupportedByPrior(const RelativePosePrior& prior,
                         const Rigid3d& cam2_from_cam1);
 
 // Whether the model violates the prior by more than any error of vision or of

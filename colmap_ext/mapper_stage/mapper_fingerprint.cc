@@ -114,29 +114,24 @@ void AddVarianceComponents(const VarianceComponentOptions& balance,
   hash->Add(balance.enabled);
   hash->Add(balance.estimate_keypoint_sigma);
   hash->Add(balance.estimate_prior_sigmas);
-  hash->Add(balance.max_mean_square);
   hash->Add(balance.max_sigma_factor);
 }
 
 void AddPartitionOptions(const PartitionPlanOptions& partition, Hash* hash) {
   hash->Add(partition.cut.max_part_size);
   hash->Add(partition.cut.min_part_size);
-  hash->Add(partition.cut.seed);
-  hash->Add(partition.flood_fill.min_overlap_ratio);
+  hash->Add(partition.min_overlap_ratio);
   hash->Add(partition.max_num_images_undivided);
 }
 
 void AddLocalOptions(const LocalMapperOptions& local, Hash* hash) {
   hash->Add(local.registration.min_num_visible_points);
   hash->Add(local.registration.max_reproj_error_px);
-  hash->Add(local.registration.min_inlier_ratio);
   hash->Add(local.registration.use_global_candidate);
-  hash->Add(local.initial_pair.max_epipolar_error_px);
   hash->Add(local.use_priors_in_adjustment);
   hash->Add(local.use_coarse_motions_in_parts);
   hash->Add(local.filter_max_reproj_error_px);
   hash->Add(local.min_triangulation_angle_deg);
-  hash->Add(local.global_adjustment_growth);
   hash->Add(local.keypoint_sigma_px);
   AddVarianceComponents(local.balance, hash);
 }
@@ -147,10 +142,6 @@ void AddAlignOptions(const AlignSimilarityOptions& align, Hash* hash) {
   hash->Add(align.threshold_decrease);
   hash->Add(align.min_inlier_ratio);
   hash->Add(align.max_inlier_ratio);
-  hash->Add(align.max_num_iterations);
-  hash->Add(align.min_threshold);
-  hash->Add(align.max_threshold_to_extent);
-  hash->Add(align.max_rotation_error_deg);
   hash->Add(align.adapt_threshold);
 }
 

@@ -37,7 +37,7 @@ LocalMapperOptions StricterOptions(LocalMapperOptions options) {
   options.registration.min_inlier_ratio =
       std::max(0.5, options.registration.min_inlier_ratio);
   options.registration.max_reproj_error_px *= 0.5;
-  options.initial_pair.max_epipolar_error_px *= 0.5;
+  options.initial_max_epipolar_error_px *= 0.5;
   return options;
 }
 

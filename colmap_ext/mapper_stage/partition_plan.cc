@@ -4,6 +4,7 @@
 #include <nlohmann/json.hpp>
 
 #include "core/option_checker.h"
+#include "partition/flood_fill.h"
 
 namespace adasfm {
 namespace {
@@ -17,8 +18,11 @@ constexpr double kPriorWeight = 30.0;
 bool PartitionPlanOptions::IsValid(std::string* error) const {
   return OptionChecker("AdaSfmPartition", error)
              .AtLeast(2, "max_num_images_undivided", max_num_images_undivided)
+             .Require(min_overlap_ratio >= 0.0 && min_overlap_ratio < 1.0,
+                      "min_overlap_ratio", min_overlap_ratio,
+                      "must be in [0, 1)")
              .AllHold() &&
-         cut.IsValid(error) && flood_fill.IsValid(error);
+         cut.IsValid(error);
 }
 
 ImageGraph BuildImageGraph(const SceneData& data, const CoarsePoseMap& coarse) {
@@ -55,7 +59,7 @@ PartitionPlan BuildPartitionPlan(const PartitionPlanOptions& options,
   if (num_images <= options.max_num_images_undivided) {
     plan.parts.emplace_back(graph.images.begin(), graph.images.end());
   } else {
-    plan.parts = ExpandByFloodFill(options.flood_fill, graph,
+    plan.parts = ExpandByFloodFill(options.min_overlap_ratio, graph,
                                    ComputeNormalizedCut(options.cut, graph));
   }
   plan.overlap_ratios = ComputeOverlapRatios(plan.parts);

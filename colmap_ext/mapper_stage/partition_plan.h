@@ -9,7 +9,6 @@
 #include "colmap_ext/scene/scene_data.h"
 #include "core/status.h"
 #include "core/types.h"
-#include "partition/flood_fill.h"
 #include "partition/image_graph.h"
 #include "partition/normalized_cut.h"
 
@@ -17,7 +16,8 @@ namespace adasfm {
 
 struct PartitionPlanOptions {
   NormalizedCutOptions cut;
-  FloodFillOptions flood_fill;
+  // tau_ot of the flood fill; the paper's value.
+  double min_overlap_ratio = 0.3;
   // Up to this many images the scene stays one part.
   int max_num_images_undivided = 200;
 

@@ -14,6 +14,12 @@ namespace {
 
 // Allowed error of the prediction, in sigmas.
 constexpr double kNumSigmas = 3.0;
+// Distance from the epipolar line due to keypoints and calibration, in addition
+// to the prediction's error [px]: COLMAP's limit for inliers.
+constexpr double kMaxErrorPx = 4.0;
+// Largest ratio of candidates to all pairs of keypoints. Above it, the search
+// by the prediction is not faster.
+constexpr double kMaxShare = 0.1;
 constexpr double kMinDepthM = 0.5;
 // Smallest ratio of a ray's z to its length for a point in front of the camera.
 constexpr double kMinForward = 0.05;
@@ -34,11 +40,10 @@ struct Band {
 
 class BandFinder {
  public:
-  BandFinder(const CandidateOptions& options, const PredictedMotion& prediction,
-             double pixel_size)
+  BandFinder(const PredictedMotion& prediction, double pixel_size)
       : prediction_(prediction),
         rotation_(prediction.cam2_from_cam1.rotation.toRotationMatrix()),
-        min_error_(options.max_error_px * pixel_size),
+        min_error_(kMaxErrorPx * pixel_size),
         greatest_inverse_depth_(
             1.0 / std::max(kMinDepthM,
                            prediction.cam2_from_cam1.translation.norm())) {}
@@ -198,14 +203,13 @@ class KeypointBlocks {
 
 }  // namespace
 
-bool FindCandidates(const CandidateOptions& options,
-                    const PredictedMotion& prediction,
+bool FindCandidates(const PredictedMotion& prediction,
                     const PlaneKeypoints& keypoints1,
                     const PlaneKeypoints& keypoints2,
                     MatchCandidates* candidates) {
   *candidates = MatchCandidates();
   const std::vector<Eigen::Vector2d>& points1 = keypoints1.points;
-  const BandFinder finder(options, prediction, keypoints2.pixel_size);
+  const BandFinder finder(prediction, keypoints2.pixel_size);
   std::vector<Band> bands(points1.size());
   std::vector<char> has_band(points1.size());
   size_t num_bands = 0;
@@ -217,7 +221,7 @@ bool FindCandidates(const CandidateOptions& options,
 
   const KeypointBlocks blocks(keypoints2.points);
   const double max_num_candidates =
-      options.max_share * points1.size() * keypoints2.points.size();
+      kMaxShare * points1.size() * keypoints2.points.size();
   candidates->begins.push_back(0);
   for (size_t i = 0; i < points1.size(); ++i) {
     if (has_band[i]) blocks.AppendInside(bands[i], &candidates->indices);

@@ -22,15 +22,6 @@ struct MatchCandidates {
   std::vector<int> indices;
 };
 
-struct CandidateOptions {
-  // Distance from the epipolar line due to keypoints and calibration, in
-  // addition to the prediction's error [px]: COLMAP's limit for inliers.
-  double max_error_px = 4.0;
-  // Largest ratio of candidates to all pairs of keypoints. Above it, the search
-  // by the prediction is not faster.
-  double max_share = 0.1;
-};
-
 // Finds where the predicted motion puts the points of image 1 in image 2: near
 // their epipolar lines, between the image of a point at infinity and that of a
 // point at a distance of the baseline length, but at least half a metre. SIFT
@@ -40,10 +31,10 @@ struct CandidateOptions {
 // that of the translation's error grows in proportion to the distance from
 // infinity; so the band widens linearly. The keypoints of image 2 are compared
 // with the band in blocks of neighbours.
-// False where the prediction does not help: with more candidates than
-// max_share, or when more than half of the keypoints would lie behind camera 2.
-bool FindCandidates(const CandidateOptions& options,
-                    const PredictedMotion& prediction,
+// False where the prediction does not help: when more than a tenth of all pairs
+// of keypoints are candidates, or when more than half of the keypoints would
+// lie behind camera 2.
+bool FindCandidates(const PredictedMotion& prediction,
                     const PlaneKeypoints& keypoints1,
                     const PlaneKeypoints& keypoints2,
                     MatchCandidates* candidates);

@@ -2,7 +2,6 @@
 #include "colmap_ext/pairs/global_descriptors.h"
 
 #include <algorithm>
-#include <stdexcept>
 #include <utility>
 
 #include "colmap_ext/host/database.h"
@@ -15,6 +14,17 @@ namespace {
 
 // Images per block that all threads process together.
 constexpr size_t kBlockSize = 64;
+// Number of cells of the descriptor space. More words distinguish places better
+// but make the vectors longer: 64 x 128 numbers for SIFT.
+constexpr int kNumWords = 64;
+constexpr uint64_t kSeed = 1;
+// Number of local descriptors that the vocabulary is trained on, drawn equally
+// from all images; bounds the memory at 512 bytes each.
+constexpr int kMaxNumTrainingDescriptors = 100000;
+// VLAD vectors are reduced to this many principal components, which are learned
+// from at most kMaxNumPcaImages vectors: their Gram matrix takes 8 MB.
+constexpr int kNumDimensions = 512;
+constexpr int kMaxNumPcaImages = 1000;
 
 int CountImages(SqliteConnection* database) {
   SqliteStatement statement(database,
@@ -24,15 +34,13 @@ int CountImages(SqliteConnection* database) {
 }
 
 // Draws equally many descriptors of every image at random.
-RowMatrixXf SampleDescriptors(const GlobalDescriptorOptions& options,
-                              int num_images, SqliteConnection* database) {
+RowMatrixXf SampleDescriptors(int num_images, SqliteConnection* database) {
   const int num_per_image =
-      std::max(1, options.max_num_training_descriptors / num_images);
+      std::max(1, kMaxNumTrainingDescriptors / num_images);
   // With more images than descriptors, every k-th image gives one descriptor.
-  const int stride =
-      std::max(1, (num_images + options.max_num_training_descriptors - 1) /
-                      options.max_num_training_descriptors);
-  Random random(options.vocabulary.seed);
+  const int stride = std::max(1, (num_images + kMaxNumTrainingDescriptors - 1) /
+                                     kMaxNumTrainingDescriptors);
+  Random random(kSeed);
   std::vector<RowMatrixXf> samples;
   Eigen::Index num_rows = 0;
   int index = 0;
@@ -89,37 +97,33 @@ void ForEachVlad(
   flush();
 }
 
-PcaBasis LearnPca(const GlobalDescriptorOptions& options,
-                  const RowMatrixXf& vocabulary, int num_images,
-                  SqliteConnection* database) {
-  const int stride = (num_images + options.max_num_pca_images - 1) /
-                     options.max_num_pca_images;
+PcaBasis LearnPca(const RowMatrixXf& vocabulary, int num_images,
+                  int num_threads, SqliteConnection* database) {
+  const int stride = (num_images + kMaxNumPcaImages - 1) / kMaxNumPcaImages;
   RowMatrixXf rows((num_images + stride - 1) / stride, vocabulary.size());
-  ForEachVlad(vocabulary, stride, options.num_threads, database,
+  ForEachVlad(vocabulary, stride, num_threads, database,
               [&rows](int index, image_t, const Eigen::RowVectorXf& vlad) {
                 rows.row(index) = vlad;
               });
-  return ComputePca(rows, options.num_dimensions);
+  return ComputePca(rows, kNumDimensions);
 }
 
-GlobalDescriptors DescribeImages(const GlobalDescriptorOptions& options,
-                                 int num_images, SqliteConnection* database,
+GlobalDescriptors DescribeImages(int num_images, int num_threads,
+                                 SqliteConnection* database,
                                  const ProgressCallback& progress) {
   if (progress) progress("training the vocabulary", 0.0);
   const RowMatrixXf vocabulary = TrainVocabulary(
-      options.vocabulary, SampleDescriptors(options, num_images, database));
-  const bool reduce = options.num_dimensions > 0 &&
-                      options.num_dimensions < vocabulary.size() &&
-                      num_images > 2;
+      kNumWords, kSeed, SampleDescriptors(num_images, database));
+  const bool reduce = kNumDimensions < vocabulary.size() && num_images > 2;
   PcaBasis basis;
   if (reduce) {
     if (progress) progress("learning the principal components", 0.3);
-    basis = LearnPca(options, vocabulary, num_images, database);
+    basis = LearnPca(vocabulary, num_images, num_threads, database);
   }
   GlobalDescriptors result;
   result.vectors.resize(num_images,
                         reduce ? basis.axes.cols() : vocabulary.size());
-  ForEachVlad(vocabulary, 1, options.num_threads, database,
+  ForEachVlad(vocabulary, 1, num_threads, database,
               [&](int index, image_t image_id, const Eigen::RowVectorXf& vlad) {
                 result.image_ids.push_back(image_id);
                 result.vectors.row(index) =
@@ -134,29 +138,9 @@ GlobalDescriptors DescribeImages(const GlobalDescriptorOptions& options,
 
 }  // namespace
 
-bool GlobalDescriptorOptions::IsValid(std::string* error) const {
-  const std::pair<const char*, int> positive[] = {
-      {"max_num_training_descriptors", max_num_training_descriptors},
-      {"max_num_pca_images", max_num_pca_images}};
-  for (const auto& [name, value] : positive) {
-    if (value >= 1) continue;
-    *error = std::string("AdaSfmPairs.") + name + " = " +
-             std::to_string(value) + " must be positive";
-    return false;
-  }
-  if (num_dimensions < 0) {
-    *error = "AdaSfmPairs.num_dimensions = " + std::to_string(num_dimensions) +
-             " must not be negative";
-    return false;
-  }
-  return vocabulary.IsValid(error);
-}
-
 StatusOr<GlobalDescriptors> ComputeGlobalDescriptors(
-    const GlobalDescriptorOptions& options, const std::string& database_path,
+    const std::string& database_path, int num_threads,
     const ProgressCallback& progress) {
-  std::string error;
-  if (!options.IsValid(&error)) throw std::invalid_argument(error);
   try {
     SqliteConnection database(database_path, SqliteConnection::Mode::kRead);
     const int num_images = CountImages(&database);
@@ -166,7 +150,7 @@ StatusOr<GlobalDescriptors> ComputeGlobalDescriptors(
                            "feature_extractor, or give --descriptors_path");
     }
     GlobalDescriptors result =
-        DescribeImages(options, num_images, &database, progress);
+        DescribeImages(num_images, num_threads, &database, progress);
     if (result.vectors.cols() == 0) {
       result.warnings.push_back(
           "the local descriptors of all images are the same: no images are "

@@ -18,28 +18,14 @@ struct GlobalDescriptors {
   std::vector<std::string> warnings;
 };
 
-struct GlobalDescriptorOptions {
-  VocabularyOptions vocabulary;
-  // Number of local descriptors that the vocabulary is trained on, drawn
-  // equally from all images; bounds the memory at 512 bytes each.
-  int max_num_training_descriptors = 100000;
-  // VLAD vectors are reduced to this many principal components, which are
-  // learned from max_num_pca_images vectors; 0: no reduction.
-  int num_dimensions = 512;
-  int max_num_pca_images = 1000;
-  // -1: all threads of the machine.
-  int num_threads = -1;
-
-  bool IsValid(std::string* error) const;
-};
-
 // Computes VLAD vectors over a vocabulary trained on the database's own local
-// descriptors; needs no download. Images without descriptors are skipped, with
-// a warning. Memory: the training sample and num_dimensions floats per image.
-// An error when no image has descriptors. The result does not depend on the
-// threads.
+// descriptors, and reduces them to 512 principal components; needs no download.
+// Images without descriptors are skipped, with a warning. Memory: the training
+// sample (50 MB) and 512 floats per image. An error when no image has
+// descriptors. num_threads: -1: all of the machine; the result does not depend
+// on it.
 StatusOr<GlobalDescriptors> ComputeGlobalDescriptors(
-    const GlobalDescriptorOptions& options, const std::string& database_path,
+    const std::string& database_path, int num_threads,
     const ProgressCallback& progress = {});
 
 // Reads vectors of other programs (HFNet, NetVLAD, ...) from a text file with

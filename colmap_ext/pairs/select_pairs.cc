@@ -68,7 +68,7 @@ StatusOr<GlobalDescriptors> GetDescriptors(const PairSelectionOptions& options,
     return ReadGlobalDescriptors(options.descriptors_path, database_path);
   }
   return ComputeGlobalDescriptors(
-      options.descriptors, database_path,
+      database_path, options.num_threads,
       [&progress](const std::string& what, double share_done) {
         if (progress) progress(what, 0.7 * share_done);
       });
@@ -89,7 +89,7 @@ OdometryPairs PredictPairs(const PairSelectionOptions& options,
   const size_t num_images = image_ids.size();
   std::vector<std::vector<std::pair<double, image_t>>> partners(num_images);
   std::vector<char> has_unsure(num_images, false);
-  ParallelFor(options.descriptors.num_threads, num_images, [&](size_t i) {
+  ParallelFor(options.num_threads, num_images, [&](size_t i) {
     for (const image_t image_id : image_ids) {
       const ImagePair pair(image_ids[i], image_id);
       if (image_id == image_ids[i] || neighbors.count(pair) > 0) continue;
@@ -129,8 +129,7 @@ Status AddSimilarPairs(
                              descriptors->warnings.end());
   const std::vector<image_t>& ids = descriptors->image_ids;
   const std::vector<std::vector<int>> nearest = FindNearestRows(
-      descriptors->vectors, options.num_similar_images,
-      options.descriptors.num_threads,
+      descriptors->vectors, options.num_similar_images, options.num_threads,
       [&](int i, int k) { return may_be_chosen(ImagePair(ids[i], ids[k])); },
       [&progress](const std::string& what, double share_done) {
         if (progress) progress(what, 0.7 + 0.3 * share_done);
@@ -193,7 +192,7 @@ bool PairSelectionOptions::IsValid(std::string* error) const {
         "0; one of them must be positive";
     return false;
   }
-  return descriptors.IsValid(error) && odometry.IsValid(error);
+  return odometry.IsValid(error);
 }
 
 StatusOr<std::vector<image_t>> OrderImages(const std::string& database_path,

@@ -26,9 +26,10 @@ struct PairSelectionOptions {
   // Times of the images (sensors/io/read_image_times.h); empty: those that
   // adasfm_prior_importer left in the database.
   std::string image_times_path;
-  GlobalDescriptorOptions descriptors;
   // Vectors from elsewhere (ReadGlobalDescriptors); empty: VLAD.
   std::string descriptors_path;
+  // -1: all threads of the machine.
+  int num_threads = -1;
 
   bool IsValid(std::string* error) const;
 };

@@ -6,9 +6,13 @@
 #include <cmath>
 #include <opencv2/core.hpp>
 #include <stdexcept>
+#include <string>
 
 namespace adasfm {
 namespace {
+
+// k-means has long converged by then.
+constexpr int kMaxNumIterations = 30;
 
 // A zero vector stays zero.
 template <typename Vector>
@@ -19,36 +23,19 @@ void ScaleToUnitLength(Vector&& vector) {
 
 }  // namespace
 
-bool VocabularyOptions::IsValid(std::string* error) const {
-  if (num_words < 1 || num_words > 4096) {
-    *error = "AdaSfmPairs.num_words = " + std::to_string(num_words) +
-             " must be between 1 and 4096";
-    return false;
-  }
-  if (max_num_iterations < 1) {
-    *error = "AdaSfmPairs.max_num_iterations = " +
-             std::to_string(max_num_iterations) + " must be positive";
-    return false;
-  }
-  return true;
-}
-
-RowMatrixXf TrainVocabulary(const VocabularyOptions& options,
+RowMatrixXf TrainVocabulary(int num_words, uint64_t seed,
                             const RowMatrixXf& descriptors) {
-  std::string error;
-  if (!options.IsValid(&error)) throw std::invalid_argument(error);
-  if (descriptors.rows() == 0) {
-    throw std::invalid_argument("TrainVocabulary: no descriptors");
+  if (num_words < 1 || descriptors.rows() == 0) {
+    throw std::invalid_argument("TrainVocabulary: no words or no descriptors");
   }
-  const int num_words =
-      std::min<Eigen::Index>(options.num_words, descriptors.rows());
+  num_words = std::min<Eigen::Index>(num_words, descriptors.rows());
   const cv::Mat samples(descriptors.rows(), descriptors.cols(), CV_32F,
                         const_cast<float*>(descriptors.data()));
   cv::Mat labels, centers;
-  cv::theRNG().state = options.seed;
+  cv::theRNG().state = seed;
   cv::kmeans(samples, num_words, labels,
              cv::TermCriteria(cv::TermCriteria::COUNT | cv::TermCriteria::EPS,
-                              options.max_num_iterations, 1e-3),
+                              kMaxNumIterations, 1e-3),
              /*attempts=*/1, cv::KMEANS_PP_CENTERS, centers);
   return Eigen::Map<const RowMatrixXf>(centers.ptr<float>(), centers.rows,
                                        centers.cols);

@@ -3,7 +3,6 @@
 
 #include <Eigen/Core>
 #include <cstdint>
-#include <string>
 
 namespace adasfm {
 
@@ -11,21 +10,10 @@ namespace adasfm {
 using RowMatrixXf =
     Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
-struct VocabularyOptions {
-  // Number of cells of the descriptor space. More words distinguish places
-  // better but make the vectors longer: 64 x 128 numbers for SIFT.
-  int num_words = 64;
-  // k-means has long converged by then.
-  int max_num_iterations = 30;
-  uint64_t seed = 1;
-
-  bool IsValid(std::string* error) const;
-};
-
 // Words x dimensions: the centres of k-means (with k-means++ start) over the
-// rows. Fewer rows than words give fewer words. The same rows and seed give the
-// same vocabulary. Throws std::invalid_argument without rows.
-RowMatrixXf TrainVocabulary(const VocabularyOptions& options,
+// rows. Fewer rows than num_words give fewer words. The same rows and seed give
+// the same vocabulary. Throws std::invalid_argument without rows or words.
+RowMatrixXf TrainVocabulary(int num_words, uint64_t seed,
                             const RowMatrixXf& descriptors);
 
 // The vector of locally aggregated descriptors of one image (Jegou et al.

@@ -23,12 +23,17 @@
 #include "core/median.h"
 #include "core/option_checker.h"
 #include "core/stopwatch.h"
+#include "global/two_view/minimize_epipolar_distances.h"
 #include "global/two_view/refine_relative_poses.h"
 #include "sensors/bags/bag_reader.h"
 #include "sensors/io/read_wheel.h"
 
 namespace adasfm {
 namespace {
+
+// Two-view rotations are used between images at most this many images apart:
+// rotations grow with the gap, but so does the probability of a wrong pair.
+constexpr int kMaxVisualGap = 3;
 
 // Adds the cameras of the calibration's rig to the import's tables. Without
 // such a rig the host's rig is used, whose reference camera is then cam0.
@@ -95,7 +100,7 @@ Status UseBag(const SensorCalibration& calibration, PriorImportPaths* paths) {
                        "of the wheels that the calibration has");
 }
 
-void KeepNearPairs(const std::vector<ImageStamp>& stamps, int max_gap,
+void KeepNearPairs(const std::vector<ImageStamp>& stamps,
                    std::vector<ScenePair>* pairs) {
   std::map<image_t, int> ranks;
   for (size_t i = 0; i < stamps.size(); ++i) ranks[stamps[i].image_id] = i;
@@ -103,7 +108,7 @@ void KeepNearPairs(const std::vector<ImageStamp>& stamps, int max_gap,
     const auto rank1 = ranks.find(pair.image_id1);
     const auto rank2 = ranks.find(pair.image_id2);
     return rank1 == ranks.end() || rank2 == ranks.end() ||
-           std::abs(rank1->second - rank2->second) > max_gap;
+           std::abs(rank1->second - rank2->second) > kMaxVisualGap;
   };
   pairs->erase(std::remove_if(pairs->begin(), pairs->end(), is_far),
                pairs->end());
@@ -132,9 +137,8 @@ std::vector<VisualRotation> ComputeVisualRotations(SceneData scene) {
     correspondences.bearings[image_id] =
         ComputeBearings(scene.cameras.at(image.camera_id), image.keypoints);
   }
-  ViewGraph graph = BuildInitialViewGraph(TwoViewPoseOptions(), scene,
-                                          correspondences.bearings)
-                        .graph;
+  ViewGraph graph =
+      BuildInitialViewGraph(scene, correspondences.bearings).graph;
   for (ScenePair& pair : scene.pairs) {
     correspondences.matches[ImagePair(pair.image_id1, pair.image_id2)] =
         std::move(pair.inlier_matches);
@@ -146,7 +150,7 @@ std::vector<VisualRotation> ComputeVisualRotations(SceneData scene) {
   // rotations around three images close four times better.
   RelativePoseRefinementOptions refinement;
   refinement.max_num_matches = 1000;
-  refinement.loss_scale_px = refinement.keypoint_sigma_px;
+  refinement.loss_scale_px = kMinKeypointSigmaPx;
   refinement.max_num_iterations = 12;
   RefineRelativePoses(refinement, correspondences, {}, &graph);
   std::vector<VisualRotation> rotations;
@@ -347,12 +351,10 @@ StatusOr<PriorImport> ImportTrajectory(const PriorImportPaths& paths,
 
 bool PriorImportOptions::IsValid(std::string* error) const {
   return OptionChecker("AdaSfmPriors", error)
-             .AtLeast(1, "max_visual_gap", max_visual_gap)
              .PositiveOrMinusOne("max_memory_gb", max_memory_gb)
              .AllHold() &&
-         focal_lengths.IsValid(error) && rig.IsValid(error) &&
-         estimation.IsValid(error) && trajectory.IsValid(error) &&
-         positions.IsValid(error);
+         rig.IsValid(error) && estimation.IsValid(error) &&
+         trajectory.IsValid(error) && positions.IsValid(error);
 }
 
 StatusOr<PriorImport> ComputePriorImport(const PriorImportPaths& given_paths,
@@ -405,7 +407,7 @@ StatusOr<PriorImport> ComputePriorImport(const PriorImportPaths& given_paths,
        CalibrateFocalLengths(options.focal_lengths, &*scene)) {
     import.warnings.push_back(DescribeFocalLength(calibrated));
   }
-  KeepNearPairs(*stamps, options.max_visual_gap, &scene->pairs);
+  KeepNearPairs(*stamps, &scene->pairs);
   const std::vector<VisualRotation> rotations =
       ComputeVisualRotations(std::move(scene).value());
   import.num_visual_rotations = rotations.size();

@@ -41,9 +41,6 @@ struct PriorImportOptions {
   TrajectoryPriorOptions trajectory;
   PositionPriorOptions positions;
   RigOptions rig;
-  // Two-view rotations are used between images at most this many images apart:
-  // rotations grow with the gap, but so does the probability of a wrong pair.
-  int max_visual_gap = 3;
   // In GB (1e9 bytes); -1: no bound. ImportPriors returns an error before work
   // whose estimated memory exceeds the bound.
   double max_memory_gb = -1.0;

@@ -21,6 +21,9 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr int kGapPx = 6;
+// Width of a shown photo: wide enough to recognise a wrong match on a phone and
+// on paper, at about 30 kB per photo.
+constexpr int kPhotoWidthPx = 520;
 constexpr int kJpegQuality = 70;
 // Lines drawn for each of kept and dropped matches, evenly sampled.
 constexpr size_t kMaxNumLines = 60;
@@ -167,10 +170,10 @@ std::string FormatFigure(const cv::Mat& picture, const std::string& title,
 // Reads the data of a figure from the database and the photos.
 class ExampleReader {
  public:
-  ExampleReader(const ReportScene& scene, const PhotoOptions& options,
+  ExampleReader(const ReportScene& scene, const std::string& image_path,
                 SqliteConnection* database)
       : scene_(scene),
-        options_(options),
+        image_path_(image_path),
         database_(database),
         cameras_(ReadCameras(database)) {
     for (const DatabaseImage& image : ReadImages(database)) {
@@ -209,13 +212,13 @@ class ExampleReader {
     if (camera == cameras_.end()) return std::nullopt;
     // Two tall photos share the width.
     const bool is_tall = HeightOf(camera->second) > WidthOf(camera->second);
-    return ReadPhoto((fs::path(options_.image_path) / image.name).string(),
+    return ReadPhoto((fs::path(image_path_) / image.name).string(),
                      camera->second,
-                     is_tall ? options_.width_px / 2 : options_.width_px);
+                     is_tall ? kPhotoWidthPx / 2 : kPhotoWidthPx);
   }
 
   const ReportScene& scene_;
-  const PhotoOptions& options_;
+  const std::string& image_path_;
   SqliteConnection* database_;
   std::map<camera_t, colmap::Camera> cameras_;
   std::map<image_t, camera_t> camera_ids_;
@@ -225,10 +228,10 @@ class ExampleReader {
 
 std::string FormatExamples(const std::vector<ReportPair>& pairs,
                            const ReportScene& scene,
-                           const PhotoOptions& options,
+                           const std::string& image_path,
                            SqliteConnection* database, int* num_unreadable) {
   *num_unreadable = 0;
-  const ExampleReader reader(scene, options, database);
+  const ExampleReader reader(scene, image_path, database);
   std::string html;
   for (const ReportPair& pair : pairs) {
     const std::optional<std::string> figure = reader.FormatExample(pair);

@@ -18,13 +18,9 @@ struct ReportOptions {
   std::string database_path;
   std::string ground_truth_path;
   GroundTruthOptions ground_truth;
-  // Largest number of points in the 3D view: more points make the file large
-  // and the view slow, without showing more.
-  int max_num_points = 20000;
-  // Number of pairs shown with their matches on the photos, for each of removed
-  // and kept pairs; each adds about 60 kB. Needs image_path.
+  // The folder of the photos, for pairs with their matches; needs
+  // database_path.
   std::string image_path;
-  int max_num_examples = 4;
 
   bool IsValid(std::string* error) const;
 };

@@ -25,21 +25,14 @@ std::vector<ReportPair> SelectKeptExamples(const ReportPairs& pairs,
                                            size_t num_images,
                                            size_t max_num_pairs);
 
-struct PhotoOptions {
-  // The folder that image names are relative to.
-  std::string image_path;
-  // Width of a shown photo: wide enough to recognise a wrong match on a phone
-  // and on paper, at about 30 kB per photo.
-  int width_px = 520;
-};
-
 // A <figure> for each pair: both photos as one embedded JPEG, with matches as
-// lines over it. A kept pair shows its present inliers and the other raw
-// matches, a removed pair its former inliers. A pair with a photo that cannot
-// be read is left out and counted in num_unreadable. Throws SqliteError.
+// lines over it. image_path: the folder that image names are relative to. A
+// kept pair shows its present inliers and the other raw matches, a removed pair
+// its former inliers. A pair with a photo that cannot be read is left out and
+// counted in num_unreadable. Throws SqliteError.
 std::string FormatExamples(const std::vector<ReportPair>& pairs,
                            const ReportScene& scene,
-                           const PhotoOptions& options,
+                           const std::string& image_path,
                            SqliteConnection* database, int* num_unreadable);
 
 }  // namespace adasfm

@@ -15,6 +15,10 @@ namespace {
 
 namespace fs = std::filesystem;
 
+// Pairs shown with their matches on the photos, for each of removed, kept and
+// weak ones; each adds about 60 kB.
+constexpr size_t kMaxNumExamples = 4;
+
 // The largest model, and the parent of its folder, which has the summary.
 StatusOr<colmap::Reconstruction> ReadLargest(const std::string& path,
                                              std::string* parent) {
@@ -62,8 +66,7 @@ Status ReadPairs(const std::string& path, ReportInput* input) {
 }
 
 // The pairs that represent weak places, as far as the database has them.
-std::vector<ReportPair> FindWeakPairs(const ReportOptions& options,
-                                      const ReportInput& input) {
+std::vector<ReportPair> FindWeakPairs(const ReportInput& input) {
   std::vector<ReportPair> weak;
   for (const ReportPlace& place : FindWeakPlaces(input.summaries)) {
     const auto image1 = input.scene.index_of_name.find(place.name1);
@@ -80,7 +83,7 @@ std::vector<ReportPair> FindWeakPairs(const ReportOptions& options,
                               candidate.index2 == indices.second;
                      });
     if (pair != input.pairs->pairs.end()) weak.push_back(*pair);
-    if (static_cast<int>(weak.size()) == options.max_num_examples) break;
+    if (weak.size() == kMaxNumExamples) break;
   }
   return weak;
 }
@@ -90,25 +93,26 @@ Status ReadExamples(const ReportOptions& options, ReportInput* input) {
     return Status::Error("there is no folder " + options.image_path +
                          "; check --image_path");
   }
-  PhotoOptions photos;
-  photos.image_path = options.image_path;
   const size_t num_images = input->scene.images.size();
-  const std::vector<ReportPair> removed = SelectRemovedExamples(
-      *input->pairs, num_images, options.max_num_examples);
+  const std::vector<ReportPair> removed =
+      SelectRemovedExamples(*input->pairs, num_images, kMaxNumExamples);
   const std::vector<ReportPair> kept =
-      SelectKeptExamples(*input->pairs, num_images, options.max_num_examples);
-  const std::vector<ReportPair> weak = FindWeakPairs(options, *input);
+      SelectKeptExamples(*input->pairs, num_images, kMaxNumExamples);
+  const std::vector<ReportPair> weak = FindWeakPairs(*input);
   int num_removed_unreadable = 0, num_kept_unreadable = 0;
   int num_weak_unreadable = 0;
   try {
     SqliteConnection database(options.database_path,
                               SqliteConnection::Mode::kRead);
-    input->removed_examples = FormatExamples(
-        removed, input->scene, photos, &database, &num_removed_unreadable);
-    input->kept_examples = FormatExamples(kept, input->scene, photos, &database,
-                                          &num_kept_unreadable);
-    input->weak_examples = FormatExamples(weak, input->scene, photos, &database,
-                                          &num_weak_unreadable);
+    input->removed_examples =
+        FormatExamples(removed, input->scene, options.image_path, &database,
+                       &num_removed_unreadable);
+    input->kept_examples =
+        FormatExamples(kept, input->scene, options.image_path, &database,
+                       &num_kept_unreadable);
+    input->weak_examples =
+        FormatExamples(weak, input->scene, options.image_path, &database,
+                       &num_weak_unreadable);
   } catch (const SqliteError& error) {
     return Status::Error(error.what());
   }

@@ -13,7 +13,6 @@
 #include "colmap_ext/host/camera_models.h"
 #include "colmap_ext/host/two_view.h"
 #include "colmap_ext/scene/two_view_poses.h"
-#include "core/option_checker.h"
 #include "core/parallel.h"
 #include "global/two_view/minimize_epipolar_distances.h"
 
@@ -157,8 +156,7 @@ std::vector<PairPoints> SelectPairs(const SceneData& scene,
 }
 
 // The pair's least cost under this camera, in variances of the noise.
-double ComputeCost(const FocalLengthCalibrationOptions& options,
-                   const PairPoints& pair, const colmap::Camera& camera) {
+double ComputeCost(const PairPoints& pair, const colmap::Camera& camera) {
   const std::vector<Bearing> bearings1 = ComputeBearings(camera, pair.points1);
   const std::vector<Bearing> bearings2 = ComputeBearings(camera, pair.points2);
   std::vector<FeatureMatch> matches;
@@ -178,7 +176,7 @@ double ComputeCost(const FocalLengthCalibrationOptions& options,
       SelectEdgeBearings(bearings1, bearings2, matches,
                          static_cast<int>(matches.size())),
       {start.rotation.toRotationMatrix(), start.translation});
-  return minimum.cost / std::pow(options.keypoint_sigma_px, 2);
+  return minimum.cost / std::pow(kMinKeypointSigmaPx, 2);
 }
 
 // least_costs: least cost of each pair over all lenses tried so far; bounded
@@ -192,8 +190,7 @@ std::vector<CostCurve> ComputeCurves(
   least_costs->resize(pairs.size(), std::numeric_limits<double>::infinity());
   ParallelFor(options.num_threads, pairs.size(), [&](size_t i) {
     for (const Lens& lens : grid) {
-      curves[i].push_back(
-          ComputeCost(options, pairs[i], WithLens(camera, lens)));
+      curves[i].push_back(ComputeCost(pairs[i], WithLens(camera, lens)));
     }
     double& least = (*least_costs)[i];
     for (const double cost : curves[i]) least = std::min(least, cost);
@@ -357,12 +354,6 @@ std::optional<Minimum> FindFocalLength(
 }
 
 }  // namespace
-
-bool FocalLengthCalibrationOptions::IsValid(std::string* error) const {
-  return OptionChecker(error)
-      .Positive("keypoint_sigma_px", keypoint_sigma_px)
-      .AllHold();
-}
 
 std::vector<CalibratedFocalLength> CalibrateFocalLengths(
     const FocalLengthCalibrationOptions& options, SceneData* scene) {

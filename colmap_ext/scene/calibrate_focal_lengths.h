@@ -11,11 +11,7 @@ namespace adasfm {
 
 struct FocalLengthCalibrationOptions {
   bool enabled = true;
-  // 1 sigma of a keypoint [px].
-  double keypoint_sigma_px = 0.5;
   int num_threads = -1;
-
-  bool IsValid(std::string* error) const;
 };
 
 struct CalibratedFocalLength {

@@ -6,7 +6,6 @@
 
 #include "colmap_ext/host/two_view.h"
 #include "colmap_ext/scene/capture_order.h"
-#include "core/option_checker.h"
 #include "core/parallel.h"
 #include "global/view_graph/epipolar.h"
 
@@ -16,23 +15,27 @@ namespace {
 // Matches used to choose among the four decompositions and to test a pose.
 constexpr int kMaxNumTestedMatches = 100;
 
+// A stored pose or essential matrix is used when at least this share of the
+// pair's matches agrees with it, within this epipolar distance [px]. Otherwise
+// the pose is estimated anew from the matches.
+constexpr double kMinAgreeingRatio = 0.6;
+constexpr double kMaxErrorPx = 4.0;
+
 enum class PoseOrigin { kNone, kStored, kDecomposed, kReestimated };
 
-double InlierRatio(double max_error_px, const Rigid3d& pose,
-                   const EdgeBearings& selected) {
+double InlierRatio(const Rigid3d& pose, const EdgeBearings& selected) {
   const Eigen::Matrix3d rotation = pose.rotation.toRotationMatrix();
   int num_inliers = 0;
   for (size_t k = 0; k < selected.bearings1.size(); ++k) {
     const EpipolarResidual residual =
         ComputeEpipolarResidual(*selected.bearings1[k], *selected.bearings2[k],
                                 rotation, pose.translation);
-    if (std::abs(residual.distance_px) <= max_error_px) ++num_inliers;
+    if (std::abs(residual.distance_px) <= kMaxErrorPx) ++num_inliers;
   }
   return num_inliers / std::max<double>(1.0, selected.bearings1.size());
 }
 
-std::optional<Rigid3d> EstimateFromMatches(const TwoViewPoseOptions& options,
-                                           const SceneData& scene,
+std::optional<Rigid3d> EstimateFromMatches(const SceneData& scene,
                                            const ScenePair& pair) {
   const SceneImage& image1 = scene.images.at(pair.image_id1);
   const SceneImage& image2 = scene.images.at(pair.image_id2);
@@ -50,13 +53,13 @@ std::optional<Rigid3d> EstimateFromMatches(const TwoViewPoseOptions& options,
   }
   if (points1.size() < 8) return std::nullopt;
   const double max_error =
-      0.5 * options.max_error_px *
+      0.5 * kMaxErrorPx *
       (1.0 / camera1.MeanFocalLength() + 1.0 / camera2.MeanFocalLength()) / 2.0;
   return EstimateRelativePose(points1, points2, max_error,
                               pair.image_id1 * 40503u + pair.image_id2);
 }
 
-PoseOrigin FindPose(const TwoViewPoseOptions& options, const SceneData& scene,
+PoseOrigin FindPose(const SceneData& scene,
                     const std::vector<Bearing>& bearings1,
                     const std::vector<Bearing>& bearings2,
                     const ScenePair& pair, Rigid3d* cam2_from_cam1) {
@@ -66,8 +69,7 @@ PoseOrigin FindPose(const TwoViewPoseOptions& options, const SceneData& scene,
   const auto is_supported = [&] {
     return cam2_from_cam1->translation.allFinite() &&
            cam2_from_cam1->rotation.coeffs().allFinite() &&
-           InlierRatio(options.max_error_px, *cam2_from_cam1, selected) >=
-               options.min_inlier_ratio;
+           InlierRatio(*cam2_from_cam1, selected) >= kMinAgreeingRatio;
   };
   if (pair.cam2_from_cam1.has_value()) {
     *cam2_from_cam1 = *pair.cam2_from_cam1;
@@ -78,21 +80,13 @@ PoseOrigin FindPose(const TwoViewPoseOptions& options, const SceneData& scene,
                                          bearings2, pair.inlier_matches);
     if (is_supported()) return PoseOrigin::kDecomposed;
   }
-  const std::optional<Rigid3d> estimated =
-      EstimateFromMatches(options, scene, pair);
+  const std::optional<Rigid3d> estimated = EstimateFromMatches(scene, pair);
   if (!estimated.has_value()) return PoseOrigin::kNone;
   *cam2_from_cam1 = *estimated;
   return PoseOrigin::kReestimated;
 }
 
 }  // namespace
-
-bool TwoViewPoseOptions::IsValid(std::string* error) const {
-  return OptionChecker(error)
-      .Within(0, 1, "min_inlier_ratio", min_inlier_ratio)
-      .Positive({{"max_error_px", max_error_px}})
-      .AllHold();
-}
 
 Rigid3d DecomposeEssential(const Eigen::Matrix3d& essential_matrix,
                            const std::vector<Bearing>& bearings1,
@@ -124,8 +118,8 @@ Rigid3d DecomposeEssential(const Eigen::Matrix3d& essential_matrix,
 }
 
 InitialViewGraph BuildInitialViewGraph(
-    const TwoViewPoseOptions& options, const SceneData& scene,
-    const std::map<image_t, std::vector<Bearing>>& bearings) {
+    const SceneData& scene,
+    const std::map<image_t, std::vector<Bearing>>& bearings, int num_threads) {
   InitialViewGraph initial;
   std::vector<CapturedImage> captured;
   const std::map<uint32_t, image_t> leaders = FindFrameLeaders(scene.rigs);
@@ -146,9 +140,9 @@ InitialViewGraph BuildInitialViewGraph(
   }
   std::vector<PoseOrigin> origins(scene.pairs.size(), PoseOrigin::kNone);
   std::vector<Rigid3d> poses(scene.pairs.size());
-  ParallelFor(options.num_threads, scene.pairs.size(), [&](size_t i) {
+  ParallelFor(num_threads, scene.pairs.size(), [&](size_t i) {
     const ScenePair& pair = scene.pairs[i];
-    origins[i] = FindPose(options, scene, bearings.at(pair.image_id1),
+    origins[i] = FindPose(scene, bearings.at(pair.image_id1),
                           bearings.at(pair.image_id2), pair, &poses[i]);
   });
   for (size_t i = 0; i < scene.pairs.size(); ++i) {

@@ -10,18 +10,6 @@
 
 namespace adasfm {
 
-struct TwoViewPoseOptions {
-  // A stored pose or essential matrix is used when at least this share of the
-  // pair's matches agrees with it ...
-  double min_inlier_ratio = 0.6;
-  // ... within this epipolar distance in px; otherwise the pose is estimated
-  // anew from the matches.
-  double max_error_px = 4.0;
-  int num_threads = -1;
-
-  bool IsValid(std::string* error) const;
-};
-
 struct InitialViewGraph {
   // All images of the scene; the pairs that have a relative pose.
   ViewGraph graph;
@@ -38,8 +26,9 @@ struct InitialViewGraph {
 // the five-point solution of its inlier matches. Pairs are independent, each
 // with its own random seed, so that threads do not change the result.
 InitialViewGraph BuildInitialViewGraph(
-    const TwoViewPoseOptions& options, const SceneData& scene,
-    const std::map<image_t, std::vector<Bearing>>& bearings);
+    const SceneData& scene,
+    const std::map<image_t, std::vector<Bearing>>& bearings,
+    int num_threads = -1);
 
 // The pose (unit translation) from an essential matrix for which most points
 // lie in front of both cameras.

@@ -44,7 +44,7 @@ Status ApplyLayout(AutomaticReconstructionOptions* options,
     paths->image_times_path = layout->image_times_path;
   }
   // A gap of a log of 200 Hz may be a normal period of a log of 10 Hz.
-  double& max_gap_s = options->priors.estimation.max_imu_gap_s;
+  double& max_gap_s = options->priors.estimation.links.max_imu_gap_s;
   max_gap_s = std::max(max_gap_s, 2.5 * layout->imu_period_s);
   const auto write = [paths](const std::string& name, const std::string& text,
                              std::string* path) {
@@ -103,7 +103,7 @@ Status PrepareReconstruction(AutomaticReconstructionOptions* options,
   options->global.max_memory_gb = options->max_memory_gb;
   options->map.stage.max_memory_gb = options->max_memory_gb;
   options->features.num_threads = options->num_threads;
-  options->pairs.descriptors.num_threads = options->num_threads;
+  options->pairs.num_threads = options->num_threads;
   options->global.num_threads = options->num_threads;
   options->map.stage.num_threads = options->num_threads;
   // EXIF's focal length may be wrong by a third, and EXIF has no distortion. A

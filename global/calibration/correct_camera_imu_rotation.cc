@@ -200,11 +200,7 @@ SharedRotationErrors ToSharedErrors(const RotationErrors& errors,
 }  // namespace
 
 bool CameraImuRotationOptions::IsValid(std::string* error) const {
-  return OptionChecker(error)
-      .AtLeast(1, "max_num_steps", max_num_steps)
-      .Positive({{"sigma_deg", sigma_deg}, {"min_sigma_deg", min_sigma_deg}})
-      .NotNegative({{"min_num_sigmas", min_num_sigmas}})
-      .AllHold();
+  return OptionChecker(error).Positive({{"sigma_deg", sigma_deg}}).AllHold();
 }
 
 std::map<int, Eigen::Quaterniond> CameraImuCorrections(
@@ -223,8 +219,8 @@ CameraImuRotationReport CorrectCameraImuRotation(
   constexpr int kNumRounds = 4;
   constexpr double kSmallRotationRad = 1e-4;
   CameraImuRotationReport report;
-  const std::vector<ExtrinsicPair> pairs = CollectExtrinsicPairs(
-      options.max_num_steps, chain, graph, correspondences, *priors);
+  const std::vector<ExtrinsicPair> pairs =
+      CollectExtrinsicPairs(chain, graph, correspondences, *priors);
   report.num_pairs = pairs.size();
   if (!options.enabled || CountSpans(pairs) < kMinNumSpans) return report;
   Eigen::Quaterniond rotation = Eigen::Quaterniond::Identity();
@@ -238,7 +234,7 @@ CameraImuRotationReport CorrectCameraImuRotation(
   }
   report.rotation_rad = LogSo3(rotation);
   report.residual_variance = solution.residual_variance;
-  const double floor_rad = DegToRad(options.min_sigma_deg);
+  const double floor_rad = DegToRad(kMinCameraImuSigmaDeg);
   const RotationCovariance covariance =
       solution.covariance +
       floor_rad * floor_rad * RotationCovariance::Identity();
@@ -254,8 +250,8 @@ CameraImuRotationReport CorrectCameraImuRotation(
   }
   // Where the rotation's part does not clearly exceed the floor, the error is
   // in the direction of driving, which is an unknown of the adjustments.
-  if (report.chi2 < options.min_num_sigmas * options.min_num_sigmas ||
-      known.norm() < options.min_num_sigmas * floor_rad) {
+  if (report.chi2 < kMinNumCameraImuSigmas * kMinNumCameraImuSigmas ||
+      known.norm() < kMinNumCameraImuSigmas * floor_rad) {
     return report;
   }
   report.rotation_rad = known;

@@ -15,19 +15,18 @@
 
 namespace adasfm {
 
+// 1 sigma per axis, added to the estimate's covariance: the principal point and
+// the wheels' axis of a good calibration are off by as much.
+inline constexpr double kMinCameraImuSigmaDeg = 0.05;
+// Priors are corrected when the errors are at least this many sigmas (chi2),
+// and the rotation at least this many times kMinCameraImuSigmaDeg.
+inline constexpr double kMinNumCameraImuSigmas = 5.0;
+
 struct CameraImuRotationOptions {
   bool enabled = true;
-  // Pairs at most this many steps of the chain apart are used.
-  int max_num_steps = 10;
   // 1 sigma of the calibration's error, per axis. Keeps axes that a drive does
   // not observe (the roll of a straight one) at zero.
   double sigma_deg = 5.0;
-  // 1 sigma per axis, added to the estimate's covariance: the principal point
-  // and the wheels' axis of a good calibration are off by as much.
-  double min_sigma_deg = 0.05;
-  // Priors are corrected when the errors are at least this many sigmas (chi2),
-  // and the rotation at least this many times min_sigma_deg.
-  double min_num_sigmas = 5.0;
   int num_threads = -1;
 
   bool IsValid(std::string* error) const;

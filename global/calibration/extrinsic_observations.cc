@@ -24,7 +24,6 @@ constexpr int kMaxNumMatches = 150;
 // errors.
 constexpr int kSpanSteps = 10;
 constexpr double kLossScalePx = 1.5;
-constexpr double kKeypointSigmaPx = 0.5;
 // Least sigma of a rotation, of vision or sensors.
 constexpr double kMinRotationSigmaRad = 5e-4;
 // Sensors observe no direction of shorter motions.
@@ -108,14 +107,14 @@ ExtrinsicObservation ObserveRotation(const ExtrinsicPair& pair,
       motion.rotation_covariance + sigma * sigma * Eigen::Matrix3d::Identity());
 }
 
-bool ObservesExtrinsics(int max_num_steps, const OdometryChain& chain,
+bool ObservesExtrinsics(const OdometryChain& chain,
                         const GlobalCorrespondences& correspondences,
                         const ViewGraphEdge& edge) {
   return edge.IsKept() && edge.has_rotation &&
          edge.source != EdgeSource::kSensor &&
          chain.IsConnected(edge.image_id1, edge.image_id2) &&
          std::abs(chain.NumSteps(edge.image_id1, edge.image_id2)) <=
-             max_num_steps &&
+             kMaxNumExtrinsicSteps &&
          chain.Motion(edge.image_id1, edge.image_id2).has_rotation &&
          correspondences.matches.count(edge.Pair()) > 0;
 }
@@ -162,12 +161,12 @@ ExtrinsicPair CreatePair(const OdometryChain& chain,
 }  // namespace
 
 std::vector<ExtrinsicPair> CollectExtrinsicPairs(
-    int max_num_steps, const OdometryChain& chain, const ViewGraph& graph,
+    const OdometryChain& chain, const ViewGraph& graph,
     const GlobalCorrespondences& correspondences,
     const std::vector<RelativePosePrior>& priors) {
   std::vector<const ViewGraphEdge*> edges;
   for (const ViewGraphEdge& edge : graph.edges) {
-    if (ObservesExtrinsics(max_num_steps, chain, correspondences, edge)) {
+    if (ObservesExtrinsics(chain, correspondences, edge)) {
       edges.push_back(&edge);
     }
   }
@@ -204,9 +203,9 @@ std::vector<ExtrinsicObservation> ObserveExtrinsics(
       !(direction.norm() > 0.5)) {
     return observations;
   }
-  const EpipolarInformation information = ComputeEpipolarInformation(
-      {kLossScalePx, kKeypointSigmaPx, kNumDirectionUnknowns}, pair.bearings,
-      {motion.rotation, direction});
+  const EpipolarInformation information =
+      ComputeEpipolarInformation({kLossScalePx, kNumDirectionUnknowns},
+                                 pair.bearings, {motion.rotation, direction});
   const Eigen::Matrix<double, 3, 2>& basis = information.basis;
   const Eigen::LLT<Eigen::Matrix2d> solver(
       information.matrix.bottomRightCorner<2, 2>());

@@ -20,6 +20,8 @@ namespace adasfm {
 constexpr int kNumExtrinsicUnknowns = 12;
 constexpr int kDrivingDirectionUnknown = 3;
 constexpr int kRateUnknown = 6;
+// Pairs at most this many steps of the chain apart are used.
+constexpr int kMaxNumExtrinsicSteps = 10;
 
 // One pair's rotation or direction, whitened: residual = jacobian * unknowns.
 // Rows that a term does not have are zero.
@@ -46,9 +48,10 @@ struct ExtrinsicPair {
 };
 
 // The pairs that observe the camera-IMU rotation: pairs with matches, at most
-// max_num_steps steps of the chain apart. Of very many pairs, an even subset.
+// kMaxNumExtrinsicSteps steps of the chain apart. Of very many pairs, an even
+// subset.
 std::vector<ExtrinsicPair> CollectExtrinsicPairs(
-    int max_num_steps, const OdometryChain& chain, const ViewGraph& graph,
+    const OdometryChain& chain, const ViewGraph& graph,
     const GlobalCorrespondences& correspondences,
     const std::vector<RelativePosePrior>& priors);
 

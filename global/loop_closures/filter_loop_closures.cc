@@ -21,6 +21,10 @@ namespace {
 // heaviest first: two million cycles, some seconds. Others are not confirmed.
 constexpr size_t kMaxNumClusters = 2000;
 
+// 1 sigma of the log ratio of two segments' units, unless sensors give both
+// metres: the scene is as deep there as elsewhere, within a factor of two.
+constexpr double kUnitLogSigma = 0.35;
+
 // A pair from image i to image j, indices of ViewGraph::images; i lies in the
 // segment of the smaller index or, within a segment, earlier.
 struct Closure {
@@ -94,8 +98,7 @@ class LoopClosureFilter {
                           edge.source != EdgeSource::kSensor);
       pairs_.emplace_back();
       if (!has_pair_[e]) continue;
-      pairs_[e] =
-          MeasurePair(options_, edge, odometry_.lengths[e], odometry_.unit);
+      pairs_[e] = MeasurePair(edge, odometry_.lengths[e], odometry_.unit);
       const ChiSquare pose = TestByOdometry(odometry_.chain, edge, pairs_[e]);
       report_.num_tested += pose.dof > 0;
       if (pose.Probability() >= options_.significance) continue;
@@ -214,7 +217,7 @@ class LoopClosureFilter {
     return segments_.is_metric[segments.first] &&
                    segments_.is_metric[segments.second]
                ? 0.0
-               : options_.unit_log_sigma;
+               : kUnitLogSigma;
   }
 
   // All clusters where they are not to be split, such as photos in any order,
@@ -321,10 +324,6 @@ bool LoopClosureOptions::IsValid(std::string* error) const {
   return OptionChecker(error)
       .Require(significance > 0.0 && significance < 1.0, "significance",
                significance, "must be between 0 and 1")
-      .Positive({{"pair_angle_sigma_deg", pair_angle_sigma_deg},
-                 {"pair_length_log_sigma", pair_length_log_sigma},
-                 {"min_turn_deg", min_turn_deg}})
-      .NotNegative({{"unit_log_sigma", unit_log_sigma}})
       .AtLeast(1, "max_sequence_gap", max_sequence_gap)
       .AllHold();
 }

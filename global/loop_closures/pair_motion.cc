@@ -49,13 +49,12 @@ PairMotion PairMotion::Inverse() const {
   return {motion.Inverse(), translation};
 }
 
-PairMotion MeasurePair(const LoopClosureOptions& options,
-                       const ViewGraphEdge& edge,
+PairMotion MeasurePair(const ViewGraphEdge& edge,
                        const std::optional<EdgeLength>& length, double unit) {
   // 1 sigma of a position, as a ratio of `unit`; closer centres look like one.
   constexpr double kPositionSigmaRatio = 0.06;
   const double floor = kPositionSigmaRatio * unit;
-  const double angle = DegToRad(options.pair_angle_sigma_deg);
+  const double angle = DegToRad(kPairAngleSigmaDeg);
   PairMotion pair;
   pair.motion.cam2_from_cam1.rotation = edge.cam2_from_cam1.rotation;
   const double rotation_sigma = std::hypot(edge.rotation_sigma_rad, angle);
@@ -78,9 +77,9 @@ PairMotion MeasurePair(const LoopClosureOptions& options,
   pair.motion.cam2_from_cam1.translation = length->length * direction;
   translation_covariance = CovarianceAlong(
       direction,
-      std::hypot(length->length * std::hypot(options.pair_length_log_sigma,
-                                             length->log_sigma),
-                 floor),
+      std::hypot(
+          length->length * std::hypot(kPairLengthLogSigma, length->log_sigma),
+          floor),
       std::hypot(length->length * across, floor));
   return pair;
 }

@@ -3,7 +3,6 @@
 
 #include <optional>
 
-#include "global/loop_closures/loop_closure_options.h"
 #include "global/odometry/edge_lengths.h"
 #include "global/odometry/odometry_chain.h"
 #include "global/odometry/uncertain_motion.h"
@@ -19,8 +18,14 @@ struct ChiSquare {
   double Probability() const;
 };
 
+// 1 sigma of the errors added to those of a pair's own pose: of its rotation
+// and direction, and of the logarithm of its length (docs/reference/math.md,
+// Loop closures).
+inline constexpr double kPairAngleSigmaDeg = 0.5;
+inline constexpr double kPairLengthLogSigma = 0.03;
+
 // The relative pose that a pair measures, with its covariance: the sigmas of
-// its edge combined with those of the options.
+// its edge combined with those above.
 struct PairMotion {
   enum class Translation {
     kNone,       // rotation only; the value is 0
@@ -35,8 +40,7 @@ struct PairMotion {
 
 // edge: with a rotation. length: in the unit of the odometry; none: not known.
 // unit: a typical length in it, such as 1 m.
-PairMotion MeasurePair(const LoopClosureOptions& options,
-                       const ViewGraphEdge& edge,
+PairMotion MeasurePair(const ViewGraphEdge& edge,
                        const std::optional<EdgeLength>& length, double unit);
 
 // Tests the difference of a pair and its prediction, with the covariances of

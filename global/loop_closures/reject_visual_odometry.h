@@ -15,11 +15,10 @@ namespace adasfm {
 // order keeps its chain. steps->priors from num_sensor_priors on are by vision
 // alone.
 // A run is a sequence of consecutive visual odometry edges. It is rejected when
-// more than options.max_contradicting_ratio of the pairs within it, 2 to
-// options.max_num_steps edges long, fail the chi-square test against the chain.
-// Returns the number of odometry edges rejected.
-int RejectVisualOdometry(const VisualOdometryOptions& options,
-                         const LoopClosureOptions& loop_options,
+// more than 5 % of the pairs within it, 2 to kMaxNumVisualSteps edges long,
+// fail the chi-square test against the chain. Returns the number of odometry
+// edges rejected.
+int RejectVisualOdometry(const LoopClosureOptions& loop_options,
                          const OdometryChainOptions& chain_options,
                          const ViewGraph& graph, size_t num_sensor_priors,
                          VisualOdometryEdges* steps);

@@ -11,6 +11,10 @@
 namespace adasfm {
 namespace {
 
+// Two closures between segments confirm each other only if the heading changes
+// by this much between them: a long straight street can look alike all along.
+constexpr double kMinTurnDeg = 30.0;
+
 bool IsVisual(const ViewGraphEdge& edge) {
   return edge.IsKept() && edge.source != EdgeSource::kSensor;
 }
@@ -36,8 +40,7 @@ void JoinSmallSegments(const ViewGraph& graph, DisjointSets* sets) {
   }
 }
 
-std::vector<int> CountHeadings(const LoopClosureOptions& options,
-                               const OdometryChain& chain,
+std::vector<int> CountHeadings(const OdometryChain& chain,
                                const ViewGraph& graph) {
   std::vector<int> heading_of(graph.images.size(), 0);
   std::vector<std::pair<int, int>> order;  // index in the chain, image
@@ -53,7 +56,7 @@ std::vector<int> CountHeadings(const LoopClosureOptions& options,
     const Eigen::Quaterniond rotation =
         chain.CamFromStart(graph.images[i]).rotation;
     if (chain.Piece(graph.images[i]) != piece ||
-        rotation.angularDistance(begin) > DegToRad(options.min_turn_deg)) {
+        rotation.angularDistance(begin) > DegToRad(kMinTurnDeg)) {
       ++heading;
       begin = rotation;
       piece = chain.Piece(graph.images[i]);
@@ -96,7 +99,7 @@ TrajectorySegments FindTrajectorySegments(
   for (const int i : metric_images) {
     segments.is_metric[segments.segment_of[i]] = true;
   }
-  segments.heading_of = CountHeadings(options, chain, graph);
+  segments.heading_of = CountHeadings(chain, graph);
   return segments;
 }
 

@@ -28,8 +28,7 @@ struct TrajectorySegments {
   // ViewGraph::CaptureRank.
   std::vector<int64_t> rank_of;
   // Number of the image's heading in the odometry: a new heading begins where
-  // the rotation exceeds min_turn_deg since the last one began, and with each
-  // piece.
+  // the rotation exceeds 30 deg since the last one began, and with each piece.
   std::vector<int> heading_of;
 };
 

@@ -5,7 +5,6 @@
 #include <cmath>
 #include <numeric>
 
-#include "core/option_checker.h"
 #include "global/odometry/length_propagation.h"
 
 namespace adasfm {
@@ -14,6 +13,9 @@ namespace {
 // Edges that share at least this many keypoints come first; without metres,
 // images that these edges do not reach start a part with a unit of its own.
 constexpr int kNumSharedReliable = 20;
+// Matches used per edge, those with the largest parallax. Bounds the time and
+// the memory of an edge.
+constexpr int kMaxNumMatches = 150;
 // Passes over all edges after the first.
 constexpr int kNumSweeps = 3;
 
@@ -36,17 +38,12 @@ void SeedParts(const ViewGraph& graph, LengthPropagation* propagation) {
 
 }  // namespace
 
-bool EdgeLengthOptions::IsValid(std::string* error) const {
-  return OptionChecker(error)
-      .AtLeast(1, "max_num_matches", max_num_matches)
-      .AllHold();
-}
-
 EdgeLengths EstimateEdgeLengths(
-    const EdgeLengthOptions& options, const ViewGraph& graph,
+    int num_threads, const ViewGraph& graph,
     const std::map<ImagePair, double>& known_lengths_m,
     const GlobalCorrespondences& correspondences, const EdgeLengths& start) {
-  LengthPropagation propagation(options, graph, correspondences);
+  LengthPropagation propagation(kMaxNumMatches, num_threads, graph,
+                                correspondences);
   EdgeLengths result;
   const size_t num_edges = graph.edges.size();
   for (size_t e = 0; e < num_edges; ++e) {

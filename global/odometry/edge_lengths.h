@@ -4,21 +4,12 @@
 #include <Eigen/Core>
 #include <map>
 #include <optional>
-#include <string>
 #include <vector>
 
 #include "global/view_graph/correspondences.h"
 #include "global/view_graph/view_graph.h"
 
 namespace adasfm {
-
-struct EdgeLengthOptions {
-  // Matches used per edge, those with the largest parallax.
-  int max_num_matches = 150;
-  int num_threads = -1;
-
-  bool IsValid(std::string* error) const;
-};
 
 struct EdgeLength {
   // Distance of the centres: metres when metric, else in the unit of the
@@ -46,7 +37,7 @@ struct EdgeLengths {
 // known_lengths_m: of sensor edges. start: lengths found before, of the same
 // graph's edges, or none.
 EdgeLengths EstimateEdgeLengths(
-    const EdgeLengthOptions& options, const ViewGraph& graph,
+    int num_threads, const ViewGraph& graph,
     const std::map<ImagePair, double>& known_lengths_m,
     const GlobalCorrespondences& correspondences,
     const EdgeLengths& start = EdgeLengths());

@@ -23,15 +23,13 @@ constexpr double kMaxLogSigma = 0.2;
 constexpr size_t kNumEdgesAtATime = 1000;
 
 // Upper bound.
-size_t CountObservations(const EdgeLengthOptions& options,
-                         const ViewGraph& graph,
+size_t CountObservations(int max_num_matches, const ViewGraph& graph,
                          const GlobalCorrespondences& correspondences) {
   size_t count = 0;
   for (const ViewGraphEdge& edge : graph.edges) {
     const auto matches = correspondences.matches.find(edge.Pair());
     if (!edge.IsKept() || matches == correspondences.matches.end()) continue;
-    count +=
-        2 * std::min<size_t>(options.max_num_matches, matches->second.size());
+    count += 2 * std::min<size_t>(max_num_matches, matches->second.size());
   }
   return count;
 }
@@ -39,9 +37,11 @@ size_t CountObservations(const EdgeLengthOptions& options,
 }  // namespace
 
 LengthPropagation::LengthPropagation(
-    const EdgeLengthOptions& options, const ViewGraph& graph,
+    int max_num_matches, int num_threads, const ViewGraph& graph,
     const GlobalCorrespondences& correspondences)
-    : options_(options), graph_(graph) {
+    : max_num_matches_(max_num_matches),
+      num_threads_(num_threads),
+      graph_(graph) {
   keypoint_begin_.assign(graph.images.size() + 1, 0);
   for (size_t i = 0; i < graph.images.size(); ++i) {
     const auto it = correspondences.bearings.find(graph.images[i]);
@@ -51,11 +51,12 @@ LengthPropagation::LengthPropagation(
   }
   const size_t num_edges = graph.edges.size();
   edge_begin_.assign(num_edges + 1, 0);
-  observations_.reserve(CountObservations(options, graph, correspondences));
+  observations_.reserve(
+      CountObservations(max_num_matches, graph, correspondences));
   std::vector<std::vector<Observation>> by_edge(kNumEdgesAtATime);
   for (size_t begin = 0; begin < num_edges; begin += kNumEdgesAtATime) {
     const size_t count = std::min(kNumEdgesAtATime, num_edges - begin);
-    ParallelFor(options.num_threads, count, [&](size_t i) {
+    ParallelFor(num_threads, count, [&](size_t i) {
       by_edge[i] = ObserveEdge(graph.edges[begin + i], correspondences);
     });
     for (size_t i = 0; i < count; ++i) {
@@ -115,8 +116,8 @@ std::vector<LengthPropagation::Observation> LengthPropagation::ObserveEdge(
                    [](const Candidate& a, const Candidate& b) {
                      return a.first.weight > b.first.weight;
                    });
-  if (static_cast<int>(candidates.size()) > options_.max_num_matches) {
-    candidates.resize(options_.max_num_matches);
+  if (static_cast<int>(candidates.size()) > max_num_matches_) {
+    candidates.resize(max_num_matches_);
   }
   std::vector<Observation> observations;
   observations.reserve(2 * candidates.size());
@@ -202,9 +203,9 @@ EdgeLength LengthPropagation::Get(int edge) const {
 }
 
 void LengthPropagation::Sweep() {
-  ParallelFor(options_.num_threads, num_known_.size(),
+  ParallelFor(num_threads_, num_known_.size(),
               [this](size_t keypoint) { PredictDepths(keypoint); });
-  ParallelFor(options_.num_threads, graph_.edges.size(), [this](size_t e) {
+  ParallelFor(num_threads_, graph_.edges.size(), [this](size_t e) {
     if (!is_known_[e] || is_fixed_[e]) return;
     std::vector<WeightedValue> values;
     for (size_t o = edge_begin_[e]; o < edge_begin_[e + 1]; ++o) {

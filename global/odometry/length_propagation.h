@@ -20,7 +20,9 @@ class LengthPropagation {
   // Keypoints with known depth that an edge must share.
   static constexpr int kMinNumShared = 5;
 
-  LengthPropagation(const EdgeLengthOptions& options, const ViewGraph& graph,
+  // max_num_matches: used per edge, those with the largest parallax.
+  LengthPropagation(int max_num_matches, int num_threads,
+                    const ViewGraph& graph,
                     const GlobalCorrespondences& correspondences);
 
   // Sets a length that stays fixed.
@@ -78,7 +80,8 @@ class LengthPropagation {
   bool LearnLength(std::vector<WeightedValue>* values,
                    EdgeLength* log_length) const;
 
-  const EdgeLengthOptions& options_;
+  const int max_num_matches_;
+  const int num_threads_;
   const ViewGraph& graph_;
   std::vector<int> keypoint_begin_;  // by image
   // By edge; those of one edge follow each other.

@@ -162,13 +162,12 @@ std::vector<int> NameByFirstImage(const std::vector<int>& part_of) {
 }  // namespace
 
 std::vector<int> FindLengthUnits(
-    const EdgeLengthOptions& options, const ViewGraph& graph,
+    int num_threads, const ViewGraph& graph,
     const std::map<ImagePair, double>& known_lengths_m,
     const GlobalCorrespondences& correspondences, const EdgeLengths& lengths) {
   // All matches: the best of each pair need not be those that pairs share.
-  EdgeLengthOptions unit_options = options;
-  unit_options.max_num_matches = std::numeric_limits<int>::max();
-  LengthPropagation propagation(unit_options, graph, correspondences);
+  LengthPropagation propagation(std::numeric_limits<int>::max(), num_threads,
+                                graph, correspondences);
   for (size_t e = 0; e < lengths.lengths.size(); ++e) {
     if (!lengths.lengths[e]) continue;
     const EdgeLength& length = *lengths.lengths[e];

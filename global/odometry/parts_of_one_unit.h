@@ -16,7 +16,7 @@ namespace adasfm {
 // different units are comparable only by the depth of the scene. lengths: as
 // EstimateEdgeLengths found them for this graph with the same metres.
 std::vector<int> FindLengthUnits(
-    const EdgeLengthOptions& options, const ViewGraph& graph,
+    int num_threads, const ViewGraph& graph,
     const std::map<ImagePair, double>& known_lengths_m,
     const GlobalCorrespondences& correspondences, const EdgeLengths& lengths);
 

@@ -8,7 +8,6 @@
 #include <utility>
 
 #include "core/median.h"
-#include "core/option_checker.h"
 #include "core/so3.h"
 #include "global/odometry/uncertain_motion.h"
 
@@ -72,13 +71,13 @@ std::vector<RelativePosePrior> ContinueChain(
 
 // Keeps only the pairs of images that follow each other closely: aliased pairs
 // must not influence the lengths of the steps.
-ViewGraph SequenceGraph(const ViewGraph& graph, const OdometryChain& chain,
-                        int max_num_steps) {
+ViewGraph SequenceGraph(const ViewGraph& graph, const OdometryChain& chain) {
   ViewGraph sequence = graph;
   for (ViewGraphEdge& edge : sequence.edges) {
-    const bool is_near = chain.IsConnected(edge.image_id1, edge.image_id2) &&
-                         std::abs(chain.NumSteps(
-                             edge.image_id1, edge.image_id2)) <= max_num_steps;
+    const bool is_near =
+        chain.IsConnected(edge.image_id1, edge.image_id2) &&
+        std::abs(chain.NumSteps(edge.image_id1, edge.image_id2)) <=
+            kMaxNumVisualSteps;
     if (!is_near) edge.removal = EdgeRemoval::kDisconnected;
   }
   return sequence;
@@ -111,16 +110,15 @@ void FillRotation(const ViewGraphEdge& edge, RelativePosePrior* prior) {
   prior->flags |= kPriorRotation;
 }
 
-void FillPosition(const VisualOdometryOptions& options,
-                  const ViewGraphEdge& edge, const EdgeLength& length,
+void FillPosition(const ViewGraphEdge& edge, const EdgeLength& length,
                   RelativePosePrior* prior) {
   const Eigen::Vector3d direction =
       VisualMotion(edge, *prior).translation.normalized();
   const double along =
-      length.length * std::hypot(length.log_sigma, options.length_error_ratio);
+      length.length * std::hypot(length.log_sigma, kVisualLengthErrorRatio);
   const double across =
-      length.length * std::hypot(edge.direction_sigma_rad,
-                                 DegToRad(options.direction_error_deg));
+      length.length *
+      std::hypot(edge.direction_sigma_rad, DegToRad(kVisualDirectionErrorDeg));
   SetTranslation(length.length * direction,
                  CovarianceAlong(direction, along, across), prior);
 }
@@ -136,19 +134,8 @@ double MedianLength(const std::vector<RelativePosePrior>& priors) {
 
 }  // namespace
 
-bool VisualOdometryOptions::IsValid(std::string* error) const {
-  return OptionChecker(error)
-      .AtLeast(1, "max_num_steps", max_num_steps)
-      .Positive({{"length_error_ratio", length_error_ratio},
-                 {"direction_error_deg", direction_error_deg}})
-      .NotNegative({{"scale_drift_ratio", scale_drift_ratio}})
-      .Within(0, 1, "max_contradicting_ratio", max_contradicting_ratio)
-      .AllHold();
-}
-
 VisualOdometryEdges AddVisualOdometry(
-    const VisualOdometryOptions& options,
-    const EdgeLengthOptions& length_options, const ViewGraph& graph,
+    int num_threads, const ViewGraph& graph,
     const GlobalCorrespondences& correspondences,
     const std::map<ImagePair, double>& known_lengths_m,
     const std::vector<RelativePosePrior>& priors,
@@ -156,9 +143,9 @@ VisualOdometryEdges AddVisualOdometry(
   VisualOdometryEdges steps;
   steps.priors = ContinueChain(graph, priors, frame_priors);
   const OdometryChain chain(steps.priors, OdometryChainOptions(), frame_priors);
-  const EdgeLengths lengths = EstimateEdgeLengths(
-      length_options, SequenceGraph(graph, chain, options.max_num_steps),
-      known_lengths_m, correspondences);
+  const EdgeLengths lengths =
+      EstimateEdgeLengths(num_threads, SequenceGraph(graph, chain),
+                          known_lengths_m, correspondences);
 
   // Steps that vision observes; a standstill's sigma depends on the other
   // lengths.
@@ -175,19 +162,19 @@ VisualOdometryEdges AddVisualOdometry(
       continue;
     }
     if (!graph.edges[e].has_translation || !lengths.lengths[e]) continue;
-    FillPosition(options, graph.edges[e], *lengths.lengths[e], &prior);
+    FillPosition(graph.edges[e], *lengths.lengths[e], &prior);
     known_lengths[pair] = lengths.lengths[e]->length;
     ++steps.num_by_vision;
   }
-  const double sigma = options.length_error_ratio * MedianLength(steps.priors);
+  const double sigma = kVisualLengthErrorRatio * MedianLength(steps.priors);
   for (RelativePosePrior* prior : standstills) {
     SetTranslation(Eigen::Vector3d::Zero(),
                    sigma * sigma * Eigen::Matrix3d::Identity(), prior);
     ++steps.num_by_vision;
   }
   if (!lengths.metric) steps.unit_m = MedianLength(steps.priors);
-  steps.lengths = EstimateEdgeLengths(length_options, graph, known_lengths,
-                                      correspondences);
+  steps.lengths =
+      EstimateEdgeLengths(num_threads, graph, known_lengths, correspondences);
   return steps;
 }
 

@@ -2,7 +2,6 @@
 #pragma once
 
 #include <map>
-#include <string>
 #include <vector>
 
 #include "core/relative_pose_prior.h"
@@ -15,23 +14,17 @@ namespace adasfm {
 
 // Sigmas describe the drift of visual odometry, not the noise of one pair: the
 // chain lets errors persist over all steps.
-struct VisualOdometryOptions {
-  bool enabled = true;
-  // Pairs at most this many steps apart determine the lengths of steps, and are
-  // tested by RejectVisualOdometry.
-  int max_num_steps = 10;
-  // 1 sigma of a visual step's length, as a ratio, and of its direction.
-  double length_error_ratio = 0.1;
-  double direction_error_deg = 1.0;
-  // 1 sigma of the change of scale at each step where no priors constrain the
-  // scale (OdometryChainOptions::scale_drift_ratio).
-  double scale_drift_ratio = 0.01;
-  // RejectVisualOdometry: the share of the pairs within a run of visual
-  // odometry that may contradict the chain.
-  double max_contradicting_ratio = 0.05;
 
-  bool IsValid(std::string* error) const;
-};
+// Pairs at most this many steps apart determine the lengths of steps, and are
+// tested by RejectVisualOdometry.
+inline constexpr int kMaxNumVisualSteps = 10;
+// 1 sigma of a visual step's length, as a ratio, and of its direction.
+inline constexpr double kVisualLengthErrorRatio = 0.1;
+inline constexpr double kVisualDirectionErrorDeg = 1.0;
+// 1 sigma of the change of scale at each step where no priors constrain the
+// scale (OdometryChainOptions::scale_drift_ratio). With 1.5 % a drive of 1,000
+// images with aliased places folds.
+inline constexpr double kVisualScaleDriftRatio = 0.01;
 
 struct VisualOdometryEdges {
   // The priors given, completed by vision, and then visual odometry edges where
@@ -55,8 +48,7 @@ struct VisualOdometryEdges {
 // EstimateEdgeLengths. frame_priors: as for OdometryChain; followers get no
 // steps.
 VisualOdometryEdges AddVisualOdometry(
-    const VisualOdometryOptions& options,
-    const EdgeLengthOptions& length_options, const ViewGraph& graph,
+    int num_threads, const ViewGraph& graph,
     const GlobalCorrespondences& correspondences,
     const std::map<ImagePair, double>& known_lengths_m,
     const std::vector<RelativePosePrior>& priors,

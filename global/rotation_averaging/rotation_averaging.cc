@@ -5,7 +5,6 @@
 #include <cmath>
 #include <vector>
 
-#include "core/option_checker.h"
 #include "core/so3.h"
 #include "global/rotation_averaging/rotation_sdp.h"
 #include "global/rotation_averaging/rotation_spanning_tree.h"
@@ -43,11 +42,10 @@ Eigen::Vector3d Residual(const RotationEdge& edge, const Rotations& rotations) {
 }
 
 // Where the robust loss takes over for an edge.
-double LossScale(const RotationAveragingOptions& options,
-                 const RotationEdge& edge) {
+double LossScale(const RotationEdge& edge) {
+  constexpr double kMinScaleRad = DegToRad(2.0);
   constexpr double kNumSigmas = 3.0;
-  return std::max(DegToRad(options.loss_scale_deg),
-                  kNumSigmas * edge.sigma_rad);
+  return std::max(kMinScaleRad, kNumSigmas * edge.sigma_rad);
 }
 
 // Needs no loss scale, so that starts far from the optimum compare too.
@@ -67,30 +65,27 @@ struct Loss {
   double scale_factor = 1.0;
 };
 
-double Weight(const RotationAveragingOptions& options, const Loss& loss,
-              const RotationEdge& edge, double residual) {
+double Weight(const Loss& loss, const RotationEdge& edge, double residual) {
   if (loss.is_l1) {
     // Residuals below this weigh alike, which keeps the system well
     // conditioned.
     constexpr double kMinResidualRad = 1e-4;
     return 1.0 / (edge.sigma_rad * std::max(residual, kMinResidualRad));
   }
-  const double squared_scale =
-      std::pow(loss.scale_factor * LossScale(options, edge), 2);
+  const double squared_scale = std::pow(loss.scale_factor * LossScale(edge), 2);
   return std::pow(squared_scale / (squared_scale + residual * residual), 2) /
          (edge.sigma_rad * edge.sigma_rad);
 }
 
 // One iteration; returns the mean change in radians, or a negative number when
 // the system cannot be solved.
-double Iterate(const RotationAveragingOptions& options, const Loss& loss,
-               const std::vector<RotationEdge>& edges, LaplacianSolver* solver,
-               Rotations* rotations) {
+double Iterate(const Loss& loss, const std::vector<RotationEdge>& edges,
+               LaplacianSolver* solver, Rotations* rotations) {
   LaplacianSolver::Vectors residuals(edges.size(), 3);
   std::vector<double> weights(edges.size());
   for (size_t e = 0; e < edges.size(); ++e) {
     residuals.row(e) = Residual(edges[e], *rotations).transpose();
-    weights[e] = Weight(options, loss, edges[e], residuals.row(e).norm());
+    weights[e] = Weight(loss, edges[e], residuals.row(e).norm());
   }
   LaplacianSolver::Vectors changes;
   if (!solver->Solve(weights, residuals, &changes)) return -1.0;
@@ -116,8 +111,7 @@ void StartFromSdp(const std::vector<RotationEdge>& edges, Rotations* rotations,
 }
 
 // The cost of a node's edges when it has this rotation.
-double NodeCost(const RotationAveragingOptions& options,
-                const std::vector<RotationEdge>& edges,
+double NodeCost(const std::vector<RotationEdge>& edges,
                 const std::vector<int>& node_edges, int node,
                 const Eigen::Matrix3d& rotation, const Rotations& rotations) {
   double cost = 0.0;
@@ -130,7 +124,7 @@ double NodeCost(const RotationAveragingOptions& options,
     const double squared = LogSo3(Eigen::Quaterniond(Eigen::Matrix3d(
                                       rotation.transpose() * predicted)))
                                .squaredNorm();
-    const double squared_scale = std::pow(LossScale(options, edge), 2);
+    const double squared_scale = std::pow(LossScale(edge), 2);
     cost += squared * squared_scale / (squared_scale + squared) /
             (edge.sigma_rad * edge.sigma_rad);
   }
@@ -139,13 +133,12 @@ double NodeCost(const RotationAveragingOptions& options,
 
 // Nodes that most of their edges contradict may be in a wrong optimum: each
 // takes the rotation that one of its edges predicts, when that costs less.
-void RepairNodes(const RotationAveragingOptions& options,
-                 const std::vector<RotationEdge>& edges, Rotations* rotations) {
+void RepairNodes(const std::vector<RotationEdge>& edges, Rotations* rotations) {
   std::vector<std::vector<int>> edges_of(rotations->size());
   std::vector<int> num_contradicting(rotations->size(), 0);
   for (size_t e = 0; e < edges.size(); ++e) {
     const bool contradicts =
-        Residual(edges[e], *rotations).norm() > LossScale(options, edges[e]);
+        Residual(edges[e], *rotations).norm() > LossScale(edges[e]);
     for (const int node : {edges[e].i, edges[e].j}) {
       edges_of[node].push_back(e);
       num_contradicting[node] += contradicts;
@@ -155,8 +148,8 @@ void RepairNodes(const RotationAveragingOptions& options,
   for (int node = 0; node < num_nodes; ++node) {
     const int num_edges = static_cast<int>(edges_of[node].size());
     if (2 * num_contradicting[node] <= num_edges) continue;
-    double best_cost = NodeCost(options, edges, edges_of[node], node,
-                                (*rotations)[node], *rotations);
+    double best_cost =
+        NodeCost(edges, edges_of[node], node, (*rotations)[node], *rotations);
     for (const int e : edges_of[node]) {
       const RotationEdge& edge = edges[e];
       Eigen::Matrix3d candidate = edge.rotation * (*rotations)[edge.i];
@@ -164,7 +157,7 @@ void RepairNodes(const RotationAveragingOptions& options,
         candidate = edge.rotation.transpose() * (*rotations)[edge.j];
       }
       const double cost =
-          NodeCost(options, edges, edges_of[node], node, candidate, *rotations);
+          NodeCost(edges, edges_of[node], node, candidate, *rotations);
       if (cost < best_cost) {
         best_cost = cost;
         (*rotations)[node] = candidate;
@@ -175,13 +168,12 @@ void RepairNodes(const RotationAveragingOptions& options,
 
 // L1 steps, then Geman-McClure with a scale that narrows to the loss scale:
 // this converges from far away without being misled by wrong edges.
-void RunIterations(const RotationAveragingOptions& options,
-                   const std::vector<RotationEdge>& edges,
+void RunIterations(const std::vector<RotationEdge>& edges,
                    LaplacianSolver* solver, Rotations* rotations,
                    GlobalRotations* result) {
   Loss loss;
   for (int k = 0; k < kMaxNumL1Iterations; ++k) {
-    const double change = Iterate(options, loss, edges, solver, rotations);
+    const double change = Iterate(loss, edges, solver, rotations);
     ++result->num_iterations;
     if (change < kConvergenceRad) break;
   }
@@ -191,11 +183,11 @@ void RunIterations(const RotationAveragingOptions& options,
   loss.scale_factor = kWidestFactor;
   bool was_repaired = false;
   for (int k = 0; k < kMaxNumIrlsIterations; ++k) {
-    const double change = Iterate(options, loss, edges, solver, rotations);
+    const double change = Iterate(loss, edges, solver, rotations);
     ++result->num_iterations;
     if (change < 0.0) return;
     if (loss.scale_factor == 1.0 && !was_repaired) {
-      RepairNodes(options, edges, rotations);
+      RepairNodes(edges, rotations);
       was_repaired = true;
     } else if (loss.scale_factor == 1.0 && change < kConvergenceRad) {
       result->converged = true;
@@ -206,12 +198,6 @@ void RunIterations(const RotationAveragingOptions& options,
 }
 
 }  // namespace
-
-bool RotationAveragingOptions::IsValid(std::string* error) const {
-  return OptionChecker(error)
-      .Positive({{"loss_scale_deg", loss_scale_deg}})
-      .AllHold();
-}
 
 GlobalRotations EstimateGlobalRotations(const RotationAveragingOptions& options,
                                         const ViewGraph& graph) {
@@ -230,7 +216,7 @@ GlobalRotations EstimateGlobalRotations(const RotationAveragingOptions& options,
     node_pairs.emplace_back(edge.i, edge.j);
   }
   LaplacianSolver solver(num_nodes, std::move(node_pairs));
-  RunIterations(options, edges, &solver, &rotations, &result);
+  RunIterations(edges, &solver, &rotations, &result);
 
   const Eigen::Quaterniond first(rotations.front());
   for (size_t i = 0; i < num_nodes; ++i) {

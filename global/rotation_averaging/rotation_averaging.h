@@ -3,7 +3,6 @@
 
 #include <Eigen/Geometry>
 #include <map>
-#include <string>
 
 #include "core/types.h"
 #include "global/view_graph/view_graph.h"
@@ -15,10 +14,6 @@ struct RotationAveragingOptions {
   // instead of the maximum spanning tree alone. Off: on 28 sets, up to 60 % of
   // wrong rotations without sensors among them, it changed no model.
   bool use_sdp_start = false;
-  // Where the robust loss takes over, degrees; never below three sigmas.
-  double loss_scale_deg = 2.0;
-
-  bool IsValid(std::string* error) const;
 };
 
 struct GlobalRotations {

@@ -4,8 +4,6 @@
 #include <algorithm>
 #include <map>
 
-#include "core/option_checker.h"
-
 namespace adasfm {
 namespace {
 
@@ -72,21 +70,11 @@ class SharedTracks {
 
 }  // namespace
 
-bool KeyframeOptions::IsValid(std::string* error) const {
-  return OptionChecker("AdaSfmGlobal", error)
-      .AtLeast(1, "keyframe_min_num_images", min_num_images)
-      .AtLeast(1, "keyframe_stride", stride)
-      .AllHold();
-}
-
-std::set<image_t> SelectKeyframes(
-    const KeyframeOptions& options, const std::set<image_t>& images,
-    const std::vector<Track>& tracks,
-    const std::vector<RelativePosePrior>& priors) {
-  if (options.stride == 1 ||
-      images.size() < static_cast<size_t>(options.min_num_images)) {
-    return images;
-  }
+std::set<image_t> SelectKeyframes(const std::set<image_t>& images,
+                                  const std::vector<Track>& tracks,
+                                  const std::vector<RelativePosePrior>& priors,
+                                  size_t min_num_images) {
+  if (images.size() < min_num_images) return images;
   const Chain chain(images, priors);
   const SharedTracks shared(tracks);
   // Starts with all images: a ring of priors has no first image and stays as it
@@ -100,7 +88,7 @@ std::set<image_t> SelectKeyframes(
       const image_t next = chain.Next(id);
       const bool is_passed_over =
           id != first && next != kInvalidImageId &&
-          num_passed_over + 1 < options.stride &&
+          num_passed_over + 1 < kKeyframeStride &&
           shared.Count(last_keyframe, next) >= kMinNumSharedTracks;
       if (is_passed_over) {
         keyframes.erase(id);

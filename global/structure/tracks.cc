@@ -5,7 +5,6 @@
 #include <utility>
 
 #include "core/disjoint_sets.h"
-#include "core/option_checker.h"
 
 namespace adasfm {
 namespace {
@@ -140,8 +139,9 @@ Track Shorten(const Track& track, size_t max_length) {
 }
 
 // Longest first; a track is kept while one of its images still needs it.
-std::vector<Track> SelectNeededTracks(const TrackOptions& options,
-                                      std::vector<Track> tracks) {
+std::vector<Track> SelectNeededTracks(std::vector<Track> tracks) {
+  // Tracks that an image needs.
+  constexpr int kMinNumTracksPerImage = 120;
   std::stable_sort(
       tracks.begin(), tracks.end(),
       [](const Track& a, const Track& b) { return a.size() > b.size(); });
@@ -150,8 +150,7 @@ std::vector<Track> SelectNeededTracks(const TrackOptions& options,
   for (Track& track : tracks) {
     const bool is_needed = std::any_of(
         track.begin(), track.end(), [&](const TrackElement& element) {
-          return num_tracks[element.image_id] <
-                 options.min_num_tracks_per_image;
+          return num_tracks[element.image_id] < kMinNumTracksPerImage;
         });
     if (!is_needed) continue;
     for (const TrackElement& element : track) ++num_tracks[element.image_id];
@@ -161,16 +160,6 @@ std::vector<Track> SelectNeededTracks(const TrackOptions& options,
 }
 
 }  // namespace
-
-bool TrackOptions::IsValid(std::string* error) const {
-  return OptionChecker(error)
-      .AtLeast(2, "min_track_length", min_track_length)
-      .Require(max_track_length >= std::max(3, min_track_length),
-               "max_track_length", max_track_length,
-               "must be at least 3, and at least min_track_length")
-      .AtLeast(1, "min_num_tracks_per_image", min_num_tracks_per_image)
-      .AllHold();
-}
 
 size_t EstimateTrackBytes(const Matches& matches) {
   // malloc rounds up to 32 bytes a block.
@@ -203,8 +192,7 @@ size_t EstimateTrackBytes(const Matches& matches) {
   return numbering + num_keypoints * per_keypoint;
 }
 
-std::vector<Track> BuildTracks(const TrackOptions& options,
-                               const Matches& matches) {
+std::vector<Track> BuildTracks(const Matches& matches) {
   const MatchedKeypoints keypoints(matches);
   KeypointSets sets(keypoints);
   std::vector<const Matches::value_type*> pairs;
@@ -223,19 +211,16 @@ std::vector<Track> BuildTracks(const TrackOptions& options,
                             numbers2[match.point2D_idx2]);
     }
   }
-  return sets.Collect(options.min_track_length);
+  return sets.Collect(kMinNumTrackImages);
 }
 
-std::vector<Track> SelectTracks(const TrackOptions& options,
+std::vector<Track> SelectTracks(int max_track_length,
                                 std::vector<Track> tracks) {
-  for (Track& track : tracks) {
-    track = Shorten(track, options.max_track_length);
-  }
-  return SelectNeededTracks(options, std::move(tracks));
+  for (Track& track : tracks) track = Shorten(track, max_track_length);
+  return SelectNeededTracks(std::move(tracks));
 }
 
-std::vector<Track> RestrictTracks(const TrackOptions& options,
-                                  const std::vector<Track>& tracks,
+std::vector<Track> RestrictTracks(const std::vector<Track>& tracks,
                                   const std::set<image_t>& images) {
   std::vector<Track> restricted;
   for (const Track& track : tracks) {
@@ -243,7 +228,7 @@ std::vector<Track> RestrictTracks(const TrackOptions& options,
     for (const TrackElement& element : track) {
       if (images.count(element.image_id)) rest.push_back(element);
     }
-    if (rest.size() >= static_cast<size_t>(options.min_track_length)) {
+    if (rest.size() >= static_cast<size_t>(kMinNumTrackImages)) {
       restricted.push_back(std::move(rest));
     }
   }

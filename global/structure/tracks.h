@@ -3,7 +3,6 @@
 
 #include <map>
 #include <set>
-#include <string>
 #include <tuple>
 #include <vector>
 
@@ -27,39 +26,29 @@ struct TrackElement {
 // Sorted by image; every image at most once.
 using Track = std::vector<TrackElement>;
 
-struct TrackOptions {
-  int min_track_length = 3;
-  // Longer tracks keep this many images, spread evenly from the first to the
-  // last: the adjustment's cost grows with the square of a track's length, and
-  // many short tracks constrain an image as well as few long ones.
-  int max_track_length = 12;
-  // Tracks are selected, longest first, while one of their images has fewer
-  // tracks than this.
-  int min_num_tracks_per_image = 120;
-
-  bool IsValid(std::string* error) const;
-};
+// Smallest number of images of a track: two rays meet in many wrong matches, a
+// third one tests them.
+inline constexpr int kMinNumTrackImages = 3;
 
 // Upper bound of the bytes that BuildTracks takes at its peak, from the number
 // of matches alone.
 size_t EstimateTrackBytes(
     const std::map<ImagePair, std::vector<FeatureMatch>>& matches);
 
-// Tracks of matched keypoints (union-find), of at least min_track_length. Where
-// matches would join two keypoints of one image, the later match (pairs by
-// number of matches, most first) is left out, so one wrong match does not cost
-// the whole track.
+// Tracks of matched keypoints (union-find), of at least kMinNumTrackImages.
+// Where matches would join two keypoints of one image, the later match (pairs
+// by number of matches, most first) is left out, so one wrong match does not
+// cost the whole track.
 std::vector<Track> BuildTracks(
-    const TrackOptions& options,
     const std::map<ImagePair, std::vector<FeatureMatch>>& matches);
 
-// Shortens the tracks and keeps those that an image needs, by the options.
-std::vector<Track> SelectTracks(const TrackOptions& options,
+// Shortens tracks to max_track_length (at least 3) images, spread evenly from
+// the first to the last, and keeps those that an image needs, longest first.
+std::vector<Track> SelectTracks(int max_track_length,
                                 std::vector<Track> tracks);
 
-// The tracks restricted to these images, if min_track_length elements remain.
-std::vector<Track> RestrictTracks(const TrackOptions& options,
-                                  const std::vector<Track>& tracks,
+// The tracks restricted to these images, if kMinNumTrackImages elements remain.
+std::vector<Track> RestrictTracks(const std::vector<Track>& tracks,
                                   const std::set<image_t>& images);
 
 }  // namespace adasfm

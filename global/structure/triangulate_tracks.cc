@@ -149,8 +149,8 @@ std::optional<Eigen::Vector3d> RefinePoint(const std::vector<Ray>& rays,
 
 std::optional<TriangulatedTrack> TriangulateTrack(
     const TrackTriangulationOptions& options, const std::vector<Ray>& rays) {
-  const auto is_short = [&options](size_t length) {
-    return static_cast<int>(length) < options.min_track_length;
+  const auto is_short = [](size_t length) {
+    return static_cast<int>(length) < kMinNumTrackImages;
   };
   if (is_short(rays.size())) return std::nullopt;
   std::vector<int> agreeing = FindConsensus(rays, options.max_reproj_error_px);
@@ -180,7 +180,6 @@ bool TrackTriangulationOptions::IsValid(std::string* error) const {
       .NotNegative(
           {{"min_triangulation_angle_deg", min_triangulation_angle_deg}})
       .Positive({{"max_reproj_error_px", max_reproj_error_px}})
-      .AtLeast(2, "min_track_length", min_track_length)
       .AllHold();
 }
 

@@ -17,8 +17,6 @@ struct TrackTriangulationOptions {
   double min_triangulation_angle_deg = 5.0;
   // Largest reprojection error; generous, the poses are coarse.
   double max_reproj_error_px = 16.0;
-  // Observations that must agree.
-  int min_track_length = 3;
   int num_threads = -1;
 
   bool IsValid(std::string* error) const;
@@ -32,8 +30,9 @@ struct TriangulatedTrack {
 };
 
 // Points of tracks under known poses: midpoint of the pair of rays that most
-// others agree with, refined over all agreeing rays. Errors are in px, through
-// the bearings' Jacobians. Tracks that fail are left out; order is kept.
+// others agree with, refined over all agreeing rays, at least
+// kMinNumTrackImages. Errors are in px, through the bearings' Jacobians. Tracks
+// that fail are left out; order is kept.
 std::vector<TriangulatedTrack> TriangulateTracks(
     const TrackTriangulationOptions& options,
     const std::map<image_t, Rigid3d>& cams_from_world,

@@ -7,7 +7,6 @@
 
 #include "core/disjoint_sets.h"
 #include "core/median.h"
-#include "core/option_checker.h"
 #include "core/so3.h"
 #include "global/translation_averaging/refine_positions.h"
 #include "global/view_graph/laplacian_solver.h"
@@ -22,6 +21,7 @@ constexpr double kMinResidual = 1e-3;
 // neighbouring edges share points, so their errors are not independent.
 constexpr double kMinSoftLengthSigma = 0.05;
 
+constexpr int kMaxNumIterations = 100;
 // The reweighted iterations end at this mean relative movement of the ends of
 // an edge, in median edge lengths; with the second number where the refinement,
 // which moves the centres further, follows.
@@ -125,7 +125,7 @@ class PositionSolver {
     const double max_change =
         options_.refine ? kMaxChangeBeforeRefinement : kMaxChange;
     result->converged = false;
-    for (int k = 0; k < options_.max_num_iterations; ++k) {
+    for (int k = 0; k < kMaxNumIterations; ++k) {
       Vectors next;
       if (!Iterate(hold_soft, *centers, &next)) return false;
       result->last_change =
@@ -207,12 +207,6 @@ void NormalizeScale(const std::vector<PositionEdge>& edges, Vectors* centers) {
 }
 
 }  // namespace
-
-bool TranslationAveragingOptions::IsValid(std::string* error) const {
-  return OptionChecker(error)
-      .AtLeast(1, "max_num_iterations", max_num_iterations)
-      .AllHold();
-}
 
 GlobalPositions EstimateGlobalPositions(
     const TranslationAveragingOptions& options, const ViewGraph& graph,

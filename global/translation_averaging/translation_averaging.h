@@ -5,7 +5,6 @@
 #include <Eigen/Geometry>
 #include <map>
 #include <optional>
-#include <string>
 #include <vector>
 
 #include "core/types.h"
@@ -15,12 +14,9 @@
 namespace adasfm {
 
 struct TranslationAveragingOptions {
-  int max_num_iterations = 100;
   // Second stage: directions across and lengths along the edge weigh by their
   // own sigmas, with a Cauchy loss.
   bool refine = true;
-
-  bool IsValid(std::string* error) const;
 };
 
 struct GlobalPositions {

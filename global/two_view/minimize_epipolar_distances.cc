@@ -155,7 +155,7 @@ EpipolarInformation ComputeEpipolarInformation(const EpipolarNoise& noise,
   EpipolarInformation information;
   information.basis = TangentBasis(pose.translation);
   information.cost_variance =
-      std::max(NormalCostVariance(noise.keypoint_sigma_px, noise.loss_scale_px),
+      std::max(NormalCostVariance(kMinKeypointSigmaPx, noise.loss_scale_px),
                sums.squares / sums.slopes * sums.weights /
                    std::max(1.0, sums.weights - noise.num_unknowns));
   const Projection projection = TangentProjection(information.basis);

@@ -9,6 +9,9 @@ namespace adasfm {
 
 using Matrix5d = Eigen::Matrix<double, 5, 5>;
 
+// 1 sigma of a keypoint, the least noise that is assumed, px.
+inline constexpr double kMinKeypointSigmaPx = 0.5;
+
 // x2 ~ rotation * x1 + translation, |translation| = 1.
 struct TwoViewPose {
   Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();
@@ -49,8 +52,6 @@ constexpr int kNumDirectionUnknowns = 2;
 struct EpipolarNoise {
   // Of the loss under which the pose was found, px.
   double loss_scale_px = 1.5;
-  // 1 sigma of a keypoint, the least that is assumed, px.
-  double keypoint_sigma_px = 0.5;
   // Unknowns that were fit to the matches: kNumDirectionUnknowns with the
   // rotation held.
   int num_unknowns = kNumPoseUnknowns;

@@ -51,9 +51,8 @@ void RefineEdge(const RelativePoseRefinementOptions& options,
                 const std::optional<RotationPrediction>& prediction,
                 ViewGraphEdge* edge) {
   const auto compute_information = [&](const TwoViewPose& pose) {
-    return ComputeEpipolarInformation(
-        {options.loss_scale_px, options.keypoint_sigma_px, kNumPoseUnknowns},
-        bearings, pose);
+    return ComputeEpipolarInformation({options.loss_scale_px, kNumPoseUnknowns},
+                                      bearings, pose);
   };
   EpipolarMinimization minimization;
   minimization.max_num_iterations = options.max_num_iterations;
@@ -90,7 +89,7 @@ void RefineEdge(const RelativePoseRefinementOptions& options,
   }
   edge->cam2_from_cam1 = Rigid3d(pose.rotation, pose.translation);
   edge->has_baseline = DetectBaseline(bearings, pose.rotation, pose.translation,
-                                      options.keypoint_sigma_px);
+                                      kMinKeypointSigmaPx);
   SetSigmas(information.matrix, edge);
 }
 
@@ -100,8 +99,7 @@ bool RelativePoseRefinementOptions::IsValid(std::string* error) const {
   return OptionChecker(error)
       .AtLeast(1, "max_num_iterations", max_num_iterations)
       .AtLeast(8, "max_num_matches", max_num_matches)
-      .Positive({{"keypoint_sigma_px", keypoint_sigma_px},
-                 {"loss_scale_px", loss_scale_px}})
+      .Positive({{"loss_scale_px", loss_scale_px}})
       .AllHold();
 }
 

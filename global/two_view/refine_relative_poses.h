@@ -16,8 +16,6 @@ struct RelativePoseRefinementOptions {
   int max_num_iterations = 8;
   // Matches beyond this many add nothing; an even subset is taken.
   int max_num_matches = 150;
-  // 1 sigma of a keypoint: the least noise assumed, px.
-  double keypoint_sigma_px = 0.5;
   // Where the Cauchy loss takes over, px of epipolar distance.
   double loss_scale_px = 1.5;
   int num_threads = -1;

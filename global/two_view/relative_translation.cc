@@ -16,13 +16,18 @@
 namespace adasfm {
 namespace {
 
+// Matches beyond this many add nothing; an even subset is taken.
+constexpr int kMaxNumMatches = 200;
+constexpr int kMaxNumIterations = 20;
+// Where the robust loss takes over: two sigmas of a keypoint, px.
+constexpr double kLossScalePx = 1.0;
+
 // 1 sigma along the larger axis of the direction's covariance, by the noise of
 // the keypoints and the errors of the rotation.
 double DirectionSigma(const RelativeTranslationOptions& options,
                       const EdgeBearings& bearings, const TwoViewPose& pose) {
   const EpipolarInformation information = ComputeEpipolarInformation(
-      {options.loss_scale_px, options.keypoint_sigma_px, kNumDirectionUnknowns},
-      bearings, pose);
+      {kLossScalePx, kNumDirectionUnknowns}, bearings, pose);
   // The identity as ridge limits undetermined directions to a sigma of a
   // radian.
   const Eigen::Matrix2d by_matches =
@@ -41,8 +46,8 @@ double DirectionSigma(const RelativeTranslationOptions& options,
 void RefineEdge(const RelativeTranslationOptions& options,
                 const TranslationProblem& problem, ViewGraphEdge* edge) {
   DirectionSearch search;
-  search.max_num_iterations = options.max_num_iterations;
-  search.loss_scale_px = options.loss_scale_px;
+  search.max_num_iterations = kMaxNumIterations;
+  search.loss_scale_px = kLossScalePx;
   const Eigen::Vector3d start = edge->has_translation
                                     ? edge->cam2_from_cam1.translation
                                     : Eigen::Vector3d::Zero().eval();
@@ -56,7 +61,7 @@ void RefineEdge(const RelativeTranslationOptions& options,
   edge->direction_sigma_rad =
       DirectionSigma(options, problem.bearings, {problem.rotation, direction});
   edge->has_baseline = DetectBaseline(problem.bearings, problem.rotation,
-                                      direction, options.keypoint_sigma_px);
+                                      direction, kMinKeypointSigmaPx);
   edge->has_translation =
       edge->has_baseline && edge->direction_sigma_rad < kMaxDirectionSigmaRad;
 }
@@ -65,10 +70,6 @@ void RefineEdge(const RelativeTranslationOptions& options,
 
 bool RelativeTranslationOptions::IsValid(std::string* error) const {
   return OptionChecker(error)
-      .AtLeast(1, "max_num_iterations", max_num_iterations)
-      .AtLeast(8, "max_num_matches", max_num_matches)
-      .Positive({{"keypoint_sigma_px", keypoint_sigma_px},
-                 {"loss_scale_px", loss_scale_px}})
       .NotNegative({{"rotation_sigma_deg", rotation_sigma_deg}})
       .AllHold();
 }
@@ -95,7 +96,7 @@ RelativeTranslationReport EstimateRelativeTranslations(
         BuildTranslationProblem(
             SelectEdgeBearings(correspondences.bearings.at(edge.image_id1),
                                correspondences.bearings.at(edge.image_id2),
-                               matches->second, options.max_num_matches),
+                               matches->second, kMaxNumMatches),
             rotation.toRotationMatrix()),
         &edge);
     is_refined[e] = 1;

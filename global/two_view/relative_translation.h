@@ -13,12 +13,6 @@ namespace adasfm {
 
 struct RelativeTranslationOptions {
   bool enabled = true;
-  int max_num_iterations = 20;
-  int max_num_matches = 200;
-  // Least noise of a keypoint, px.
-  double keypoint_sigma_px = 0.5;
-  // Where the robust loss takes over, px.
-  double loss_scale_px = 1.0;
   // 1 sigma of the global rotations' errors between two images, which rotate
   // directions by this times depth over baseline.
   double rotation_sigma_deg = 0.05;

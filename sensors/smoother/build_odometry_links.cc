@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "core/interpolate_pose.h"
+#include "core/option_checker.h"
 #include "core/sensor_log.h"
 #include "core/so3.h"
 #include "sensors/io/log_checks.h"
@@ -16,6 +17,12 @@ namespace {
 
 // Images further apart than this belong to different recordings.
 constexpr double kMaxFilledGapS = 600.0;
+// Links are no longer than this: images further apart get states between.
+constexpr double kMaxLinkS = 0.5;
+// Logs are used from this long before the first to this long after the last
+// image, since standstills there observe the biases.
+constexpr double kMaxLeadS = 20.0;
+
 template <typename Sample>
 double RateHz(const std::vector<Sample>& samples) {
   std::vector<timestamp_t> times;
@@ -104,11 +111,19 @@ WheelNoise ComputeWheelNoise(const SensorCalibration& calibration,
 
 }  // namespace
 
+bool OdometryLinkOptions::IsValid(std::string* error) const {
+  return OptionChecker("AdaSfmPriors", error)
+      .Positive({{"max_imu_gap_s", max_imu_gap_s},
+                 {"max_wheel_gap_s", max_wheel_gap_s},
+                 {"lateral_speed_noise_m_s_sqrt_hz", lateral_speed_noise},
+                 {"vertical_speed_noise_m_s_sqrt_hz", vertical_speed_noise}})
+      .AllHold();
+}
+
 OdometryTimeline BuildTimeline(const std::vector<timestamp_t>& times_ns,
-                               const MotionLogs& logs,
-                               const OdometryLinkOptions& options) {
-  const timestamp_t max_step = NsFromSeconds(options.max_link_s);
-  const timestamp_t lead = NsFromSeconds(options.max_lead_s);
+                               const MotionLogs& logs) {
+  const timestamp_t max_step = NsFromSeconds(kMaxLinkS);
+  const timestamp_t lead = NsFromSeconds(kMaxLeadS);
   OdometryTimeline timeline;
   std::vector<timestamp_t>& times = timeline.times_ns;
   times.push_back(std::max(logs.StartNs(), times_ns.front() - lead));

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <string>
 #include <vector>
 
 #include "core/sensor_log.h"
@@ -11,12 +12,16 @@
 namespace adasfm {
 
 struct OdometryLinkOptions {
+  // A link between two times needs samples at most this far apart: beyond it
+  // linear interpolation of a vehicle's motion is a guess.
   double max_imu_gap_s = 0.1;
   double max_wheel_gap_s = 0.25;
-  double max_link_s = 0.5;
-  double max_lead_s = 20.0;
-  double lateral_speed_noise = 0.05;  // m/s/sqrt(Hz)
-  double vertical_speed_noise = 0.2;  // m/s/sqrt(Hz)
+  // Noise of the lateral and vertical speed of the wheel frame, m/s/sqrt(Hz).
+  // Vertical is larger: springs, and slopes that T_imu_wheel does not follow.
+  double lateral_speed_noise = 0.05;
+  double vertical_speed_noise = 0.2;
+
+  bool IsValid(std::string* error) const;
 };
 
 // States in order of time; those of the images and others between.
@@ -27,10 +32,10 @@ struct OdometryTimeline {
 };
 
 // The times of the states: the given ones (in order, within the logs), and
-// others between and around them for max_link_s (not in gaps above 10 min).
+// others so that no link is longer than 0.5 s: between them (not in gaps above
+// 10 min) and up to 20 s before and after them.
 OdometryTimeline BuildTimeline(const std::vector<timestamp_t>& times_ns,
-                               const MotionLogs& logs,
-                               const OdometryLinkOptions& options);
+                               const MotionLogs& logs);
 
 // One link between each two successive times. bias is subtracted from the IMU.
 std::vector<OdometryLink> BuildOdometryLinks(

@@ -26,8 +26,7 @@ ChainGlobals::Vector ChainGlobals::PriorSigmas(
   const double driving = DegToRad(options.driving_direction_sigma_deg);
   Vector sigmas;
   sigmas << options.wheel_scale_sigma, options.wheel_track_sigma,
-      options.wheel_curvature_sigma, driving, driving,
-      options.wheel_delay_sigma_s;
+      options.wheel_curvature_sigma, driving, driving, kWheelDelaySigmaS;
   return sigmas.cwiseMax(kFixed);
 }
 

@@ -28,6 +28,11 @@ struct ChainState {
   void Retract(const Eigen::Matrix<double, kSize, 1>& delta);
 };
 
+// Prior sigma of the delay of the wheels' readings behind the motion: half of
+// the log's period where a speed is a difference of counts, and the time on a
+// bus.
+inline constexpr double kWheelDelaySigmaS = 0.03;
+
 // The unknowns that all states share.
 struct ChainGlobals {
   enum Offset {

@@ -3,6 +3,7 @@
 
 #include "core/so3.h"
 #include "sensors/smoother/chain_state.h"
+#include "sensors/smoother/odometry_factors.h"
 #include "sensors/smoother/wheel_equation.h"
 
 namespace adasfm {
@@ -54,9 +55,8 @@ Step StepByWheels(const OdometryFusionProblem& problem,
   return step;
 }
 
-Step StepAtRest(const OdometryFusionOptions& options,
-                const OdometryLink& link) {
-  const double sigma = options.standstill_speed_sigma * link.dt_s;
+Step StepAtRest(const OdometryLink& link) {
+  const double sigma = kStandstillSpeedSigma * link.dt_s;
   Step step;
   step.covariance = sigma * sigma * Eigen::Matrix3d::Identity();
   return step;
@@ -65,9 +65,8 @@ Step StepAtRest(const OdometryFusionOptions& options,
 }  // namespace
 
 std::optional<MeasuredTranslation> ComposeWheelTranslation(
-    const OdometryFusionProblem& problem, const OdometryFusionOptions& options,
-    const OdometryFusionResult& fused, size_t first, size_t last,
-    const Rigid3d& cam_from_imu) {
+    const OdometryFusionProblem& problem, const OdometryFusionResult& fused,
+    size_t first, size_t last, const Rigid3d& cam_from_imu) {
   const ChainGlobals globals = GlobalsOf(fused);
   Rigid3d body2_from_body1;
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
@@ -78,7 +77,7 @@ std::optional<MeasuredTranslation> ComposeWheelTranslation(
         (!is_at_rest && fused.motions[k].wheel_weight < kSlipWeight)) {
       return std::nullopt;
     }
-    const Step step = is_at_rest ? StepAtRest(options, link)
+    const Step step = is_at_rest ? StepAtRest(link)
                                  : StepByWheels(problem, fused, globals, k);
     const Eigen::Quaterniond& rotation =
         fused.motions[k].body2_from_body1.rotation;

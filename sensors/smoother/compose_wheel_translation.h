@@ -15,8 +15,7 @@ namespace adasfm {
 // shared parameters. A link at rest has zero translation. None where a link has
 // no wheels or its wheels slip.
 std::optional<MeasuredTranslation> ComposeWheelTranslation(
-    const OdometryFusionProblem& problem, const OdometryFusionOptions& options,
-    const OdometryFusionResult& fused, size_t first, size_t last,
-    const Rigid3d& cam_from_imu);
+    const OdometryFusionProblem& problem, const OdometryFusionResult& fused,
+    size_t first, size_t last, const Rigid3d& cam_from_imu);
 
 }  // namespace adasfm

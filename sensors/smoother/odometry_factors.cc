@@ -16,6 +16,11 @@ constexpr double kWeakStepSigma = 100.0;  // m
 constexpr double kWeakAngleSigma = 1.0;   // rad
 // Correlation time of an unaided machine's speed, s.
 constexpr double kSpeedMemoryS = 10.0;
+// Speed of an IMU without wheels, 1 sigma: its only bound.
+constexpr double kUnaidedSpeedSigma = 15.0;  // m/s
+// Angular rate of a machine at rest, 1 sigma. It is one unknown of a whole
+// standstill, so its sigma does not shrink with the duration.
+constexpr double kStandstillRateSigma = 1e-4;  // rad/s
 
 }  // namespace
 
@@ -93,23 +98,22 @@ void LinkBuilder::AddVision() {
 }
 
 void LinkBuilder::AddStandstill() {
-  const OdometryFusionOptions& options = *context_.options;
   const double dt = std::max(link_.dt_s, 1e-3);
   // The mean rate over all links of the standstill has the variance density^2 /
   // time + sigma^2. The second part is made a density, too.
   const Eigen::Array3d density =
       link_.standstill_rate_density.array().square() +
-      options.standstill_rate_sigma * options.standstill_rate_sigma *
+      kStandstillRateSigma * kStandstillRateSigma *
           std::max(link_.standstill_time_s, dt);
   AddRotationResidual(Eigen::Quaterniond::Identity(),
                       (dt * density).matrix().asDiagonal());
   if (link_.standstill != StandstillKind::kAtRest) return;
   AddVector(kSecond + ChainState::kStep, second_.step_in_previous,
-            options.standstill_speed_sigma * dt);
+            kStandstillSpeedSigma * dt);
   AddVector(kFirst + ChainState::kVelocity, first_.state.velocity_in_imu,
-            options.standstill_speed_sigma);
+            kStandstillSpeedSigma);
   AddVector(kSecond + ChainState::kVelocity, second_.state.velocity_in_imu,
-            options.standstill_speed_sigma);
+            kStandstillSpeedSigma);
 }
 
 void LinkBuilder::AddWeakPriors() {
@@ -122,8 +126,7 @@ void LinkBuilder::AddWeakPriors() {
     // over the correlation time.
     const double memory = 2.0 * kSpeedMemoryS / std::max(link_.dt_s, 1e-3);
     AddVector(kSecond + ChainState::kVelocity, velocity,
-              context_.options->unaided_speed_sigma *
-                  std::sqrt(std::max(1.0, memory)));
+              kUnaidedSpeedSigma * std::sqrt(std::max(1.0, memory)));
   }
   if (link_.has_imu || link_.has_wheel) {
     const bool has_rotation =

@@ -12,6 +12,9 @@ namespace adasfm {
 // Tangent coordinates of one link: (state k, state k + 1, globals).
 inline constexpr int kLinkSize = 2 * ChainState::kSize + ChainGlobals::kSize;
 
+// Speed of a machine at rest, 1 sigma.
+inline constexpr double kStandstillSpeedSigma = 0.005;  // m/s
+
 // Residuals of one link, each divided by its sigma, and their derivatives by
 // the link's tangent coordinates. With A = R_k^T R_k+1, G gravity in the world:
 //   IMU       Log(dR^T A), A v_k+1 - v_k - R_k^T G dt - dv,

@@ -22,6 +22,10 @@ constexpr double kConvergedStep = 0.01;
 // The threshold comes down once no unknown moves by more than this: rad for
 // rotations, m/s for velocities, m for positions.
 constexpr double kThresholdStep = 1e-2;
+// Weights of slipping wheels converge slowly; most drives take 15 iterations.
+constexpr int kMaxNumIterations = 100;
+// A slipping link is reported when its speed error also exceeds this.
+constexpr double kMinSlipSpeed = 0.2;  // m/s
 
 // 1 up to the threshold, then falling faster than the residual grows.
 double RobustWeight(double chi2, double threshold_sigma) {
@@ -46,7 +50,7 @@ class Smoother {
     double num_sigmas = 0.0;
   };
   Change Step();
-  // Thresholds are the options' times factor.
+  // The threshold is kSlipThresholdSigma times factor.
   void UpdateWeights(double factor);
   std::vector<std::pair<size_t, double>> FindSlippingLinks() const;
   void FillResult(OdometryFusionResult* result) const;
@@ -89,7 +93,7 @@ Smoother::Change Smoother::Step() {
 }
 
 void Smoother::UpdateWeights(double factor) {
-  const double wheel_threshold = factor * options_.slip_threshold_sigma;
+  const double wheel_threshold = factor * kSlipThresholdSigma;
   for (size_t k = 0; k < chain_.NumLinks(); ++k) {
     const OdometryLink& link = problem_.links[k];
     // Without the IMU the wheels have nothing to contradict.
@@ -106,7 +110,7 @@ std::vector<std::pair<size_t, double>> Smoother::FindSlippingLinks() const {
     if (!link.has_wheel || chain_.wheel_weights[k] > kSlipWeight) continue;
     const double speed_error = ComputeWheelSpeedError(
         problem_, k, chain_.states[k], chain_.states[k + 1], chain_.globals);
-    if (std::abs(speed_error) >= options_.slip_min_speed_m_s) {
+    if (std::abs(speed_error) >= kMinSlipSpeed) {
       links.emplace_back(k, speed_error);
     }
   }
@@ -133,7 +137,7 @@ OdometryFusionResult Smoother::Run() {
   for (const size_t k : FindOutlierWheels(problem_, options_.gravity_m_s2)) {
     chain_.wheel_weights[k] = kFirstSlipWeight;
   }
-  while (result.num_iterations < options_.max_num_iterations) {
+  while (result.num_iterations < kMaxNumIterations) {
     ++result.num_iterations;
     const Change change = Step();
     if (factor == 1.0 && change.num_sigmas < kConvergedStep) {

@@ -88,6 +88,9 @@ struct OdometryMotion {
   double wheel_weight = 1.0;  // < 1: the wheels contradicted the IMU
 };
 
+// A link whose wheels differ from the other sensors by more sigmas than this
+// loses weight.
+inline constexpr double kSlipThresholdSigma = 4.0;
 // Wheels with a smaller weight than this count as slipping.
 inline constexpr double kSlipWeight = 0.3;
 

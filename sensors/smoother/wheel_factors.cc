@@ -6,6 +6,12 @@
 #include "sensors/smoother/wheel_equation.h"
 
 namespace adasfm {
+namespace {
+
+// Roll and pitch of a machine without IMU.
+constexpr double kPlanarRotationNoise = 0.03;  // rad/sqrt(s)
+
+}  // namespace
 
 void LinkBuilder::AddWheel(double weight) {
   const WheelMotion& wheel = link_.wheel;
@@ -106,8 +112,8 @@ void LinkBuilder::AddPlanarRotation() {
   const Eigen::Matrix3d wheel_from_imu =
       context_.problem->imu_from_wheel.rotation.toRotationMatrix().transpose();
   const Eigen::Vector3d turn = LogSo3(a_rotation_);
-  const double sigma = context_.options->planar_rotation_noise *
-                       std::sqrt(std::max(link_.dt_s, 1e-6));
+  const double sigma =
+      kPlanarRotationNoise * std::sqrt(std::max(link_.dt_s, 1e-6));
   const Eigen::Matrix<double, 2, 3> by_rotation =
       wheel_from_imu.topRows<2>() * RightJacobianInverseSo3(turn) / sigma;
   values_.segment<2>(num_rows_) = wheel_from_imu.topRows<2>() * turn / sigma;

@@ -316,8 +316,8 @@ TEST_F(ImporterTest, SummaryThatCannotBeWritten) {
 TEST_F(ImporterTest, InvalidOptions) {
   ExpectRefused(Arguments() + " --AdaSfmPriors.max_imu_gap_s -1",
                 "AdaSfmPriors.max_imu_gap_s");
-  ExpectRefused(Arguments() + " --AdaSfmPriors.max_visual_gap 0",
-                "AdaSfmPriors.max_visual_gap");
+  ExpectRefused(Arguments() + " --AdaSfmPriors.estimate_time_shift 2",
+                "AdaSfmPriors.estimate_time_shift");
   ExpectRefused(Arguments() + " --AdaSfmPriors.max_imu_gap_s abc",
                 "AdaSfmPriors.max_imu_gap_s");
 }

@@ -163,7 +163,7 @@ TEST(EstimateCoarsePoses, VisionCompletesAnImuWithoutWheels) {
     CoarseProblem problem = BuildCoarseProblem(options);
     for (RelativePosePrior& prior : problem.priors) DropPosition(&prior);
     CoarsePoseOptions without;
-    without.visual_odometry.enabled = false;
+    without.use_visual_odometry = false;
     num_aliases_without +=
         CountKeptPairs(problem, EstimateCoarsePoses(without, problem.graph,
                                                     problem.correspondences,

@@ -37,10 +37,8 @@ Parts FigureParts() {
 
 TEST(FloodFill, TakesTheSecondLayerOfThePapersFigure) {
   // The second layer alone reaches this overlap.
-  FloodFillOptions options;
-  options.min_overlap_ratio = 0.01;
   const Parts expanded =
-      ExpandByFloodFill(options, BuildFigureGraph(), FigureParts());
+      ExpandByFloodFill(0.01, BuildFigureGraph(), FigureParts());
   Parts expected = FigureParts();
   const Parts layer = {{9, 20}, {8, 18}, {8, 16}};
   for (size_t k = 0; k < layer.size(); ++k) {
@@ -51,9 +49,7 @@ TEST(FloodFill, TakesTheSecondLayerOfThePapersFigure) {
 }
 
 TEST(FloodFill, ZeroRatioLeavesThePartsAlone) {
-  FloodFillOptions options;
-  options.min_overlap_ratio = 0.0;
-  EXPECT_EQ(ExpandByFloodFill(options, BuildFigureGraph(), FigureParts()),
+  EXPECT_EQ(ExpandByFloodFill(0.0, BuildFigureGraph(), FigureParts()),
             FigureParts());
 }
 
@@ -62,7 +58,7 @@ TEST(FloodFill, PrefersTheStrongestEdge) {
   ImageGraph graph;
   for (image_t i = 1; i < 6; ++i) AddEdge(i, i + 1, 10.0, &graph);
   AddEdge(3, 5, 11.0, &graph);
-  const Parts expanded = ExpandByFloodFill({}, graph, {{1, 2, 3}, {4, 5, 6}});
+  const Parts expanded = ExpandByFloodFill(0.3, graph, {{1, 2, 3}, {4, 5, 6}});
   EXPECT_EQ(expanded[0], (std::vector<image_t>{1, 2, 3, 5}));
 }
 
@@ -77,9 +73,7 @@ TEST(FloodFill, ThinChainReachesTheOverlap) {
     if (i > 0) AddEdge(i - 1, i, 50.0, &graph);
   }
   for (const double ratio : {0.1, 0.3, 0.5}) {
-    FloodFillOptions options;
-    options.min_overlap_ratio = ratio;
-    const Parts expanded = ExpandByFloodFill(options, graph, parts);
+    const Parts expanded = ExpandByFloodFill(ratio, graph, parts);
     for (const double part_ratio : ComputeOverlapRatios(expanded)) {
       EXPECT_GE(part_ratio, ratio);
     }
@@ -101,16 +95,7 @@ TEST(FloodFill, EndsWhenNothingIsAdjacent) {
   AddEdge(1, 2, 1.0, &graph);
   AddEdge(3, 4, 1.0, &graph);
   const Parts parts = {{1, 2}, {3, 4}};
-  EXPECT_EQ(ExpandByFloodFill({}, graph, parts), parts);
-}
-
-TEST(FloodFill, RatioOutOfRangeIsNamed) {
-  FloodFillOptions options;
-  options.min_overlap_ratio = 1.0;
-  std::string error;
-  EXPECT_FALSE(options.IsValid(&error));
-  EXPECT_NE(error.find("min_overlap_ratio"), std::string::npos);
-  EXPECT_THROW(ExpandByFloodFill(options, {}, {}), std::invalid_argument);
+  EXPECT_EQ(ExpandByFloodFill(0.3, graph, parts), parts);
 }
 
 }  // namespace

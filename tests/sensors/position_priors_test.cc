@@ -131,9 +131,9 @@ TEST(PositionPriors, OptionsAreChecked) {
   PositionPriorOptions options;
   std::string error;
   EXPECT_TRUE(options.IsValid(&error));
-  options.max_image_gap_s = -1.0;
+  options.max_fix_gap_s = -1.0;
   EXPECT_FALSE(options.IsValid(&error));
-  EXPECT_NE(error.find("AdaSfmGnss.max_image_gap_s"), std::string::npos);
+  EXPECT_NE(error.find("AdaSfmGnss.max_fix_gap_s"), std::string::npos);
 }
 
 }  // namespace

@@ -369,9 +369,9 @@ TEST(PriorEstimationOptions, BadValuesAreNamed) {
   PriorEstimationOptions options;
   std::string error;
   EXPECT_TRUE(options.IsValid(&error));
-  options.max_link_s = 0.0;
+  options.links.max_imu_gap_s = 0.0;
   EXPECT_FALSE(options.IsValid(&error));
-  EXPECT_NE(error.find("max_link_s"), std::string::npos);
+  EXPECT_NE(error.find("max_imu_gap_s"), std::string::npos);
   EXPECT_THROW(EstimatePriors({}, {}, {}, {}, options), std::invalid_argument);
 }
 

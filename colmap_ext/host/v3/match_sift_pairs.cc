@@ -114,8 +114,7 @@ std::optional<SiftPairMatcher::Result> SiftPairMatcher::MatchByPrediction(
   const PlaneKeypoints plane1 = KeypointsOnPlane(camera1, *keypoints1);
   const PlaneKeypoints plane2 = KeypointsOnPlane(camera2, *keypoints2);
   MatchCandidates candidates;
-  if (!FindCandidates(CandidateOptions(), *prediction, plane1, plane2,
-                      &candidates)) {
+  if (!FindCandidates(*prediction, plane1, plane2, &candidates)) {
     return std::nullopt;
   }
   const auto descriptors1 = cache_->GetDescriptors(pair.image_id1);

@@ -21,8 +21,8 @@ ceres::Solver::Summary SolveWithCeres(const MinimizeBundleOptions& options,
   ceres::Solver::Options solver;
   solver.max_num_iterations = options.max_num_iterations;
   solver.function_tolerance = options.function_tolerance;
-  solver.gradient_tolerance = options.tolerance;
-  solver.parameter_tolerance = options.tolerance;
+  solver.gradient_tolerance = kGradientAndStepTolerance;
+  solver.parameter_tolerance = kGradientAndStepTolerance;
   solver.initial_trust_region_radius = options.initial_radius;
   solver.linear_solver_type = ceres::DENSE_SCHUR;
   solver.linear_solver_ordering = bundle->Ordering();

@@ -73,9 +73,8 @@ TEST(BuildCoarseModelTest, KeyframesLeadToTheSameModel) {
     const CoarseModel all = BuildCoarseModel(structure, fixture.scene,
                                              fixture.bearings, fixture.input);
     EXPECT_EQ(all.num_keyframes, 40);
-    structure.keyframes.min_num_images = 10;
-    const CoarseModel model = BuildCoarseModel(structure, fixture.scene,
-                                               fixture.bearings, fixture.input);
+    const CoarseModel model = BuildCoarseModel(
+        structure, fixture.scene, fixture.bearings, fixture.input, 10);
     EXPECT_LT(model.num_keyframes, 30);
     EXPECT_LT(model.rounds[0].num_residuals, all.rounds[0].num_residuals);
     EXPECT_EQ(model.rounds[0].num_images, all.rounds[0].num_images);
@@ -129,12 +128,7 @@ TEST(BuildCoarseModelTest, LowersTheAngleWhereImagesNeedIt) {
   const CoarseModel model = BuildCoarseModel(structure, fixture.scene,
                                              fixture.bearings, fixture.input);
   EXPECT_LT(model.min_angle_deg, 30.0);
-  EXPECT_GE(model.min_angle_deg, structure.min_angle_floor_deg);
-  structure.min_num_points_per_image = 0;
-  const CoarseModel wide = BuildCoarseModel(structure, fixture.scene,
-                                            fixture.bearings, fixture.input);
-  EXPECT_EQ(wide.min_angle_deg, 30.0);
-  EXPECT_LT(wide.num_points, model.num_points);
+  EXPECT_GE(model.min_angle_deg, 1.0);
 }
 
 // With a fixed last threshold of 4 px, 3 px of noise would appear as 1.9 px,
@@ -160,28 +154,23 @@ TEST(BuildCoarseModelTest, OptionsChangeTheOutcome) {
   };
   const CoarseModel model = build(CoarseStructureOptions());
   CoarseStructureOptions options;
-  options.num_rounds = 1;
-  EXPECT_EQ(build(options).rounds.size(), 1);
-  options = CoarseStructureOptions();
   options.use_priors = false;
   EXPECT_LT(build(options).rounds[0].num_residuals,
             model.rounds[0].num_residuals);
   options = CoarseStructureOptions();
-  options.early_function_tolerance = 0.0;
-  EXPECT_GT(build(options).rounds[0].num_iterations,
-            model.rounds[0].num_iterations);
-  options = CoarseStructureOptions();
-  options.final_max_reproj_error_px = 1.0;
-  EXPECT_LT(build(options).num_observations, model.num_observations);
+  options.max_track_length = 3;
+  const CoarseModel short_tracks = build(options);
+  EXPECT_LE(short_tracks.num_observations, 3 * short_tracks.num_points);
+  EXPECT_GT(model.num_observations, 3 * model.num_points);
 }
 
 TEST(CoarseStructureOptionsTest, NamesTheBrokenRule) {
   std::string error;
   EXPECT_TRUE(CoarseStructureOptions().IsValid(&error));
   CoarseStructureOptions options;
-  options.num_rounds = 0;
+  options.max_track_length = 2;
   EXPECT_FALSE(options.IsValid(&error));
-  EXPECT_NE(error.find("num_rounds"), std::string::npos);
+  EXPECT_NE(error.find("max_track_length"), std::string::npos);
 }
 
 }  // namespace

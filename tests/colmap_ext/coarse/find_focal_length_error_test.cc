@@ -56,8 +56,7 @@ std::optional<FocalLengthError> FindError(const BundleWorldOptions& world,
   PriorBundleAdjustmentProblem problem = ProblemOfAll(reconstruction);
   problem.priors = TruePriors(world);
   problem.constant_cameras = {constant_camera};
-  return FindFocalLengthError(VarianceComponentOptions(),
-                              PriorBundleAdjustmentOptions(), problem,
+  return FindFocalLengthError(PriorBundleAdjustmentOptions(), problem,
                               reconstruction);
 }
 

@@ -21,7 +21,7 @@ struct Drive {
     const SyntheticWorld world = BuildSyntheticWorld(options);
     scene = BuildSyntheticScene(world, SyntheticPriorOptions());
     bearings = ComputeSceneBearings(scene, -1);
-    graph = BuildInitialViewGraph(TwoViewPoseOptions(), scene, bearings).graph;
+    graph = BuildInitialViewGraph(scene, bearings).graph;
     for (const SyntheticImage& image : world.images) {
       poses[image.image_id] = image.cam_from_world;
     }
@@ -84,7 +84,7 @@ TEST(MeasurePairAgreement, TellsFoldedWorlds) {
     no_priors.enabled = false;
     SceneData scene = BuildSyntheticScene(world, no_priors);
     GlobalStageOptions without;
-    without.poses.visual_odometry.enabled = false;
+    without.poses.use_visual_odometry = false;
     const StatusOr<GlobalStageResult> result = RunGlobalStage(without, &scene);
     ASSERT_TRUE(result.ok()) << result.status().message();
     const CoarseModel& model = result->models.front();

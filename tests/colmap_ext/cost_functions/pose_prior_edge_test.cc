@@ -61,7 +61,6 @@ TEST(AssignSharedErrorWindowsTest, AWindowEndsWithItsSpanOrTheChain) {
   coarse.image_id2 = 9;
   SharedErrorOptions options;
   options.gyroscope_window_s = 3.5;
-  options.direction_window_s = 1.5;
   AssignSharedErrorWindows(options, &edges);
   std::vector<int> gyroscope;
   std::vector<int> direction;
@@ -70,7 +69,7 @@ TEST(AssignSharedErrorWindowsTest, AWindowEndsWithItsSpanOrTheChain) {
     direction.push_back(edge.windows.direction);
   }
   EXPECT_EQ(gyroscope, (std::vector<int>{0, 0, 0, 0, 1, 1, 1, 1, 2, 2, 2, 0}));
-  EXPECT_EQ(direction, (std::vector<int>{0, 0, 1, 1, 2, 2, 3, 3, 4, 4, 5, 0}));
+  EXPECT_EQ(direction, (std::vector<int>{0, 0, 0, 1, 1, 1, 2, 2, 3, 3, 3, 0}));
 }
 
 }  // namespace

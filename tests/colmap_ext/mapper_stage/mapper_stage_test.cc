@@ -277,9 +277,9 @@ TEST_F(MapperStageTest, SummaryIsJsonWithEveryPart) {
 
 TEST_F(MapperStageTest, WrongOptionsAreNamed) {
   std::string error;
-  options_.local.global_adjustment_growth = 1.0;
+  options_.local.keypoint_sigma_px = 0.0;
   EXPECT_FALSE(options_.IsValid(&error));
-  EXPECT_EQ(error, "AdaSfmMapper.global_adjustment_growth = 1 must be above 1");
+  EXPECT_EQ(error, "AdaSfmMapper.keypoint_sigma_px = 0 must be positive");
   EXPECT_THROW(MapperStage(options_, {}, {}, folder_), std::invalid_argument);
 }
 

@@ -93,8 +93,7 @@ TEST_F(FindCandidatesTest, TrueMatchesAreAmongFewCandidates) {
           Predict(translation, 5e-4, 0.01 * translation.norm());
       const Views views = Look(prediction, 0.5);
       MatchCandidates candidates;
-      ASSERT_TRUE(FindCandidates(CandidateOptions(), prediction,
-                                 views.keypoints1, views.keypoints2,
+      ASSERT_TRUE(FindCandidates(prediction, views.keypoints1, views.keypoints2,
                                  &candidates));
       ASSERT_EQ(candidates.begins.size(), kNumPoints + 1);
       recall += Recall(candidates) / kNumDraws;
@@ -117,11 +116,10 @@ TEST_F(FindCandidatesTest, TheWrongSideOfInfinityIsNoCandidate) {
   PlaneKeypoints keypoints2 = keypoints1;
   keypoints1.points = {{0.1, 0.0}};
   keypoints2.points = {{0.15, 0.0}, {0.05, 0.0}, {0.15, 0.05}, {1.3, 0.0}};
-  CandidateOptions options;
-  options.max_share = 1.0;
+  // Others off the line, so that one candidate is not too large a share.
+  for (int k = 1; k <= 8; ++k) keypoints2.points.emplace_back(0.15, 0.1 * k);
   MatchCandidates candidates;
-  ASSERT_TRUE(
-      FindCandidates(options, prediction, keypoints1, keypoints2, &candidates));
+  ASSERT_TRUE(FindCandidates(prediction, keypoints1, keypoints2, &candidates));
   EXPECT_EQ(candidates.indices, std::vector<int>{0});
 }
 
@@ -131,8 +129,8 @@ TEST_F(FindCandidatesTest, APoorPredictionIsRefused) {
   const Views views =
       Look(Predict(Eigen::Vector3d(0.0, 0.0, -1.5), 0.0, 0.0), 0.5);
   MatchCandidates candidates;
-  EXPECT_FALSE(FindCandidates(CandidateOptions(), prediction, views.keypoints1,
-                              views.keypoints2, &candidates));
+  EXPECT_FALSE(FindCandidates(prediction, views.keypoints1, views.keypoints2,
+                              &candidates));
 }
 
 }  // namespace

@@ -117,7 +117,7 @@ TEST_F(SelectPairsTest, OdometryKeepsTruePairsAndSavesOthers) {
     EXPECT_GE(recall_with, recall_without - 0.01);
     EXPECT_LT(with.pairs.size(), 0.8 * without.pairs.size());
     if (seed != 1) continue;
-    pair_options.descriptors.num_threads = 3;
+    pair_options.num_threads = 3;
     EXPECT_EQ(Select(pair_options).pairs, with.pairs);
     pair_options.odometry.enabled = false;
     EXPECT_EQ(Select(pair_options).pairs, without.pairs);
@@ -146,24 +146,15 @@ TEST_F(SelectPairsTest, NeighborsAndSimilarImagesCount) {
   EXPECT_EQ(counts.size(), 40);
 }
 
-TEST_F(SelectPairsTest, ThreadsDoNotMatterAndOptionsDo) {
+TEST_F(SelectPairsTest, ThreadsDoNotMatter) {
   MakeDatabase(SmallWorld(60));
   PairSelectionOptions options;
   options.num_temporal_neighbors = 0;
   options.num_similar_images = 4;
-  options.descriptors.num_threads = 1;
+  options.num_threads = 1;
   const std::vector<ImagePair> pairs = Select(options).pairs;
-  options.descriptors.num_threads = 3;
+  options.num_threads = 3;
   EXPECT_EQ(Select(options).pairs, pairs);
-  const auto changes = [&](auto change) {
-    PairSelectionOptions changed = options;
-    change(&changed.descriptors);
-    return Select(changed).pairs != pairs;
-  };
-  EXPECT_TRUE(changes([](auto* d) { d->vocabulary.num_words = 2; }));
-  EXPECT_TRUE(changes([](auto* d) { d->num_dimensions = 4; }));
-  EXPECT_TRUE(changes([](auto* d) { d->max_num_pca_images = 5; }));
-  EXPECT_TRUE(changes([](auto* d) { d->max_num_training_descriptors = 30; }));
 }
 
 TEST_F(SelectPairsTest, OrderIsThatOfTimesElseOfNames) {
@@ -361,7 +352,7 @@ TEST_F(SelectPairsTest, WrongInputIsOneLine) {
   const std::string call = "adasfm_pair_generator --output_path " +
                            folder_.File("pairs.txt") + " --database_path ";
   ExpectError(call + folder_.File("missing.db"), "missing.db");
-  ExpectError(call + database_ + " --AdaSfmPairs.num_words 0", "num_words");
+  ExpectError(call + database_ + " --AdaSfmPairs.min_overlap 0", "min_overlap");
   ExpectError(call + database_ + " --AdaSfmPairs.num_similar_images -1",
               "num_similar_images");
   ExpectError(call + database_ +

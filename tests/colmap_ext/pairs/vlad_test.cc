@@ -83,41 +83,28 @@ TEST(Vocabulary, FindsClustersAndRepeatsItself) {
     for (int i = 0; i < rows.rows(); ++i) {
       rows.row(i) = centers.row(i % 6) + RandomRows(1, 8, &random);
     }
-    VocabularyOptions options;
-    options.num_words = 6;
-    options.seed = seed;
-    const RowMatrixXf words = TrainVocabulary(options, rows);
+    const RowMatrixXf words = TrainVocabulary(6, seed, rows);
     ASSERT_EQ(words.rows(), 6);
     for (int k = 0; k < 6; ++k) {
       // The mean of 50 rows in 8 dimensions is within five of its sigmas.
       EXPECT_LT((words.rowwise() - centers.row(k)).rowwise().norm().minCoeff(),
                 5.0 * std::sqrt(8.0 / 50.0));
     }
-    EXPECT_EQ(words, TrainVocabulary(options, rows));
+    EXPECT_EQ(words, TrainVocabulary(6, seed, rows));
   }
 }
 
 TEST(Vocabulary, FewDescriptorsGiveFewWords) {
   Random random(1);
-  EXPECT_EQ(
-      TrainVocabulary(VocabularyOptions(), RandomRows(3, 4, &random)).rows(),
-      3);
-  EXPECT_THROW(TrainVocabulary(VocabularyOptions(), RowMatrixXf(0, 4)),
+  EXPECT_EQ(TrainVocabulary(64, 1, RandomRows(3, 4, &random)).rows(), 3);
+  EXPECT_THROW(TrainVocabulary(64, 1, RowMatrixXf(0, 4)),
                std::invalid_argument);
 }
 
-TEST(Vocabulary, EveryOptionCounts) {
+TEST(Vocabulary, TheSeedCounts) {
   Random random(1);
   const RowMatrixXf rows = RandomRows(300, 4, &random);
-  VocabularyOptions options;
-  options.num_words = 10;
-  const RowMatrixXf words = TrainVocabulary(options, rows);
-  VocabularyOptions other = options;
-  other.seed = 2;
-  EXPECT_NE(words, TrainVocabulary(other, rows));
-  other = options;
-  other.max_num_iterations = 1;
-  EXPECT_NE(words, TrainVocabulary(other, rows));
+  EXPECT_NE(TrainVocabulary(10, 1, rows), TrainVocabulary(10, 2, rows));
 }
 
 TEST(Pca, KeepsWhatVaries) {

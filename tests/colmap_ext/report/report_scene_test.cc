@@ -52,6 +52,14 @@ TEST(ReportScene, PriorsWithoutErrorFollowTheModel) {
   }
 }
 
+TEST(ReportScene, PointsAreSampledUpToALimit) {
+  const colmap::Reconstruction model = MakeModel(BuildWorld(1), 4, 0.25);
+  ASSERT_GT(model.NumPoints3D(), 7);
+  EXPECT_EQ(PointsToJson(model, ReportScene(), 7)["count"], 7);
+  EXPECT_EQ(PointsToJson(model, ReportScene(), 1000000)["count"],
+            model.NumPoints3D());
+}
+
 TEST(ReportScene, TheTruthComesIntoTheModelsWorld) {
   for (const uint64_t seed : {1, 2, 3}) {
     const SyntheticWorld world = BuildWorld(seed);

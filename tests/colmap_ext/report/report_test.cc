@@ -203,25 +203,26 @@ TEST_F(ReportTest, NamesModelsLostImagesAndWeakPlaces) {
 TEST_F(ReportTest, DrawsMatchesOnPhotos) {
   ReportOptions options = AllInputs();
   options.image_path = folder_.File("photos");
-  options.max_num_examples = 2;
   // Any picture will do: OpenCV goes by the content and not by the name.
   std::filesystem::create_directories(options.image_path);
   for (const SyntheticImage& image : world_.images) {
-    if (image.name == kHostileName) continue;
+    const std::filesystem::path path = folder_.File("photos/" + image.name);
+    std::filesystem::create_directories(path.parent_path());
     folder_.Write("photos/" + image.name,
                   "P6 8 5 255\n" + std::string(8 * 5 * 3, '\x60'));
   }
   const StatusOr<std::string> page = BuildReport(options);
   ASSERT_TRUE(page.ok()) << page.status().message();
   ExpectSelfContained(*page);
-  EXPECT_EQ(Count(*page, "data:image/jpeg"), 3);
+  // One removed pair and four kept ones.
+  EXPECT_EQ(Count(*page, "data:image/jpeg"), 5);
   SqliteConnection database(database_, SqliteConnection::Mode::kRead);
   const size_t num_inliers =
       ReadMatchesOfPair(&database, kTwoViewGeometryBackupTable, removed_)
           .size();
   EXPECT_NE(page->find(std::to_string(num_inliers) + " inliers, all removed"),
             std::string::npos);
-  EXPECT_EQ(Count(*page, "<path class=\"kept\""), 2);
+  EXPECT_EQ(Count(*page, "<path class=\"kept\""), 4);
   EXPECT_EQ(*page, *BuildReport(options));
 
   // Truncated or missing photos are counted, and the page is made nevertheless.
@@ -231,7 +232,7 @@ TEST_F(ReportTest, DrawsMatchesOnPhotos) {
   const StatusOr<std::string> without = BuildReport(options);
   ASSERT_TRUE(without.ok()) << without.status().message();
   ExpectSelfContained(*without);
-  EXPECT_NE(without->find("3 of the pairs on photos"), std::string::npos);
+  EXPECT_NE(without->find("5 of the pairs on photos"), std::string::npos);
   EXPECT_EQ(Count(*without, "data:image/jpeg"), 0);
 }
 
@@ -247,7 +248,6 @@ TEST_F(ReportTest, NamesCannotBreakThePage) {
 TEST_F(ReportTest, LeavesOutWhatIsNotGiven) {
   ReportOptions options;
   options.input_path = folder_.File("global/0");
-  options.max_num_points = 7;
   const StatusOr<std::string> page = BuildReport(options);
   ASSERT_TRUE(page.ok()) << page.status().message();
   ExpectSelfContained(*page);
@@ -257,7 +257,7 @@ TEST_F(ReportTest, LeavesOutWhatIsNotGiven) {
   }
   const nlohmann::json data = DataOf(*page);
   EXPECT_EQ(data["unit"], "units");
-  EXPECT_EQ(data["points"]["count"], 7);
+  EXPECT_EQ(data["points"]["count"], 100);
   EXPECT_TRUE(data["images"]["coarse"].is_null());
   EXPECT_FALSE(data.contains("pairs"));
 }
@@ -295,9 +295,7 @@ TEST_F(ReportTest, WrongInputIsOneLine) {
        {"coarse_path", "database_path", "ground_truth_path"}) {
     ExpectError(arguments + " --" + option + " /nowhere", "/nowhere");
   }
-  ExpectError(arguments + " --max_num_points -1", "max_num_points = -1");
   ExpectError(arguments + " --max_time_gap_s -1", "max_time_gap_s");
-  ExpectError(arguments + " --max_num_examples 51", "max_num_examples = 51");
   ExpectError(
       arguments + " --database_path " + database_ + " --image_path /nowhere",
       "/nowhere");

@@ -56,17 +56,16 @@ std::vector<RelativePosePrior> DrawLogs(const OdometryChainOptions& options,
 }
 
 // The relative pose of two images with the noise of its own edge.
-ViewGraphEdge DrawPair(int i, int j, const LoopClosureOptions& options,
-                       double* length, Random* random) {
+ViewGraphEdge DrawPair(int i, int j, double* length, Random* random) {
   Rigid3d motion;
   for (int k = i; k < j; ++k) motion = TrueStep(k) * motion;
-  const double angle = DegToRad(options.pair_angle_sigma_deg);
+  const double angle = DegToRad(kPairAngleSigmaDeg);
   *length = motion.translation.norm();
   const Eigen::Vector3d direction = motion.translation / *length;
   motion.rotation = ExpSo3(random->GaussianVector(angle)) * motion.rotation;
   motion.translation =
       (direction + random->GaussianVector(angle).cross(direction)).normalized();
-  *length *= 1.0 + random->Gaussian(options.pair_length_log_sigma);
+  *length *= 1.0 + random->Gaussian(kPairLengthLogSigma);
   ViewGraphEdge edge = BuildEdge(ImagePair(i, j), motion);
   edge.rotation_sigma_rad = 0.0;
   edge.direction_sigma_rad = 0.0;
@@ -90,14 +89,13 @@ double RefusedShare(double probability, bool has_length,
                     const OdometryChainOptions& believed, uint64_t seed) {
   constexpr int kNumDrives = 400;
   Random random(seed);
-  const LoopClosureOptions options;
   int num_refused = 0;
   for (int k = 0; k < kNumDrives; ++k) {
     const OdometryChain chain(DrawLogs(drawn, &random), believed);
     double length = 0.0;
-    const ViewGraphEdge edge = DrawPair(5, 125, options, &length, &random);
+    const ViewGraphEdge edge = DrawPair(5, 125, &length, &random);
     const PairMotion pair = MeasurePair(
-        options, edge,
+        edge,
         has_length ? std::optional<EdgeLength>(EdgeLength{length, 0.0})
                    : std::nullopt,
         0.0);
@@ -160,8 +158,7 @@ TEST(TestPair, UnknownLengthTestsTheDirection) {
     ViewGraphEdge edge = BuildEdge(
         ImagePair(1, 2), Rigid3d(Eigen::Quaterniond::Identity(), direction));
     edge.direction_sigma_rad = 0.005;
-    return TestPair(MeasurePair(LoopClosureOptions(), edge, std::nullopt, 1.0),
-                    predicted, true);
+    return TestPair(MeasurePair(edge, std::nullopt, 1.0), predicted, true);
   };
   EXPECT_EQ(test(Eigen::Vector3d::UnitZ()).dof, 5);
   EXPECT_GT(test(Eigen::Vector3d::UnitZ()).Probability(), 0.9);
@@ -176,24 +173,20 @@ TEST(MeasurePair, GrantsTheLeastErrors) {
       Rigid3d(Eigen::Quaterniond::Identity(), Eigen::Vector3d::UnitZ()));
   edge.rotation_sigma_rad = 0.0;
   edge.direction_sigma_rad = 0.0;
-  LoopClosureOptions options;
-  options.pair_angle_sigma_deg = RadToDeg(0.02);
-  options.pair_length_log_sigma = 0.05;
-  const PairMotion pair =
-      MeasurePair(options, edge, EdgeLength{10.0, 0.12}, 0.0);
+  const PairMotion pair = MeasurePair(edge, EdgeLength{10.0, 0.04}, 0.0);
   const Eigen::Matrix<double, 6, 1> sigmas =
       pair.motion.covariance.diagonal().cwiseSqrt();
-  EXPECT_NEAR(sigmas(0), 0.02, 1e-9);
-  EXPECT_NEAR(sigmas(3), 0.2, 1e-9);
-  EXPECT_NEAR(sigmas(5), 1.3, 1e-9);
+  EXPECT_NEAR(sigmas(0), DegToRad(0.5), 1e-9);
+  EXPECT_NEAR(sigmas(3), 10.0 * DegToRad(0.5), 1e-9);
+  // 0.03 and the length's own 0.04.
+  EXPECT_NEAR(sigmas(5), 10.0 * 0.05, 1e-9);
 }
 
 // Without a baseline only the rotation is tested.
 TEST(TestPair, NoBaselineTestsTheRotation) {
   ViewGraphEdge edge = BuildEdge(ImagePair(1, 2), Rigid3d());
   edge.has_baseline = false;
-  const PairMotion pair =
-      MeasurePair(LoopClosureOptions(), edge, std::nullopt, 1.0);
+  const PairMotion pair = MeasurePair(edge, std::nullopt, 1.0);
   UncertainMotion predicted;
   predicted.covariance.diagonal().setConstant(1e-4);
   predicted.cam2_from_cam1.translation.x() = 2.0;

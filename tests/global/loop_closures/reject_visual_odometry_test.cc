@@ -24,15 +24,15 @@ TestScene BuildScene(uint64_t seed) {
 
 VisualOdometryEdges AddSteps(
     const TestScene& scene, const std::vector<RelativePosePrior>& priors = {}) {
-  return AddVisualOdometry(VisualOdometryOptions(), EdgeLengthOptions(),
-                           scene.graph, scene.correspondences, {}, priors);
+  constexpr int kNumThreads = -1;
+  return AddVisualOdometry(kNumThreads, scene.graph, scene.correspondences, {},
+                           priors);
 }
 
 int Reject(const TestScene& scene, VisualOdometryEdges* steps,
            size_t num_sensor_priors = 0) {
-  return RejectVisualOdometry(VisualOdometryOptions(), LoopClosureOptions(),
-                              OdometryChainOptions(), scene.graph,
-                              num_sensor_priors, steps);
+  return RejectVisualOdometry(LoopClosureOptions(), OdometryChainOptions(),
+                              scene.graph, num_sensor_priors, steps);
 }
 
 void Turn(double angle_rad, ViewGraphEdge* edge) {

@@ -45,12 +45,12 @@ TestScene BuildHingedScene(bool shares_landmarks) {
 
 std::vector<int> PartsOf(const TestScene& scene,
                          const std::map<ImagePair, double>& known_lengths_m) {
-  const EdgeLengthOptions options;
+  constexpr int kNumThreads = -1;
   const EdgeLengths lengths = EstimateEdgeLengths(
-      options, scene.graph, known_lengths_m, scene.correspondences);
+      kNumThreads, scene.graph, known_lengths_m, scene.correspondences);
   return FindPartsOfOneUnit(
       scene.graph,
-      FindLengthUnits(options, scene.graph, known_lengths_m,
+      FindLengthUnits(kNumThreads, scene.graph, known_lengths_m,
                       scene.correspondences, lengths),
       {});
 }

@@ -5,6 +5,7 @@
 
 #include <cmath>
 
+#include "core/so3.h"
 #include "global/odometry/odometry_chain.h"
 #include "tests/testing/global/test_scene.h"
 
@@ -47,9 +48,9 @@ StepProblem BuildProblem(uint64_t seed, Function has_position) {
   return problem;
 }
 
-VisualOdometryEdges Complete(const StepProblem& problem,
-                             const VisualOdometryOptions& options = {}) {
-  return AddVisualOdometry(options, EdgeLengthOptions(), problem.scene.graph,
+VisualOdometryEdges Complete(const StepProblem& problem) {
+  constexpr int kNumThreads = -1;
+  return AddVisualOdometry(kNumThreads, problem.scene.graph,
                            problem.scene.correspondences,
                            problem.known_lengths_m, problem.priors);
 }
@@ -97,19 +98,18 @@ TEST(AddVisualOdometry, WithoutMetresTheUnitIsAStep) {
   EXPECT_NEAR(steps.unit_m, first, 0.5 * first);
 }
 
-double TranslationVariance(const RelativePosePrior& prior) {
-  return prior.covariance.bottomRightCorner<3, 3>().trace();
-}
-
-// Larger stated drift of visual odometry gives larger sigmas.
-TEST(AddVisualOdometry, SigmasFollowTheOptions) {
+// The drift adds to the noise of a step's own pair.
+TEST(AddVisualOdometry, SigmasContainTheDrift) {
   const StepProblem problem = BuildProblem(1, [](int) { return false; });
-  VisualOdometryOptions options;
-  const double plain = TranslationVariance(Complete(problem).priors[3]);
-  options.length_error_ratio *= 3.0;
-  options.direction_error_deg *= 3.0;
-  EXPECT_GT(TranslationVariance(Complete(problem, options).priors[3]),
-            4.0 * plain);
+  for (const RelativePosePrior& step : Complete(problem).priors) {
+    const Eigen::Vector3d& translation = step.cam2_from_cam1.translation;
+    const Eigen::Matrix3d covariance =
+        step.covariance.bottomRightCorner<3, 3>();
+    const double along = translation.dot(covariance * translation);
+    EXPECT_GT(along, std::pow(0.1 * translation.squaredNorm(), 2));
+    EXPECT_GT(covariance.trace() - along / translation.squaredNorm(),
+              2.0 * std::pow(DegToRad(1.0), 2) * translation.squaredNorm());
+  }
 }
 
 // Steps that neither sensors nor vision observe stay open.
@@ -131,23 +131,6 @@ TEST(AddVisualOdometry, ContinuesAnInterruptedChain) {
   EXPECT_EQ(steps.priors.size(), kNumImages - 1);
   EXPECT_EQ(steps.num_by_vision, 1);
   EXPECT_NEAR(LengthRatioOfTheWay(problem, steps), 1.0, 0.1);
-}
-
-TEST(VisualOdometryOptions, NamesWhatIsWrong) {
-  VisualOdometryOptions options;
-  std::string error;
-  EXPECT_TRUE(options.IsValid(&error));
-  options.max_num_steps = 0;
-  EXPECT_FALSE(options.IsValid(&error));
-  EXPECT_NE(error.find("max_num_steps"), std::string::npos);
-  options = VisualOdometryOptions();
-  options.scale_drift_ratio = -1.0;
-  EXPECT_FALSE(options.IsValid(&error));
-  EXPECT_NE(error.find("scale_drift_ratio"), std::string::npos);
-  options = VisualOdometryOptions();
-  options.max_contradicting_ratio = 1.5;
-  EXPECT_FALSE(options.IsValid(&error));
-  EXPECT_NE(error.find("max_contradicting_ratio"), std::string::npos);
 }
 
 }  // namespace

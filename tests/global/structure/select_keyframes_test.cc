@@ -43,40 +43,31 @@ std::vector<RelativePosePrior> Priors(uint32_t flags) {
 
 constexpr uint32_t kComplete = kPriorRotation | kPriorDirection | kPriorLength;
 
-KeyframeOptions SmallOptions() {
-  KeyframeOptions options;
-  options.min_num_images = kNumImages;
-  return options;
+std::set<image_t> Select(const std::vector<Track>& tracks,
+                         const std::vector<RelativePosePrior>& priors) {
+  return SelectKeyframes(Images(), tracks, priors, kNumImages);
 }
 
 TEST(SelectKeyframes, TakesEveryFewImagesAndBothEnds) {
-  for (const int stride : {1, 2, 3, 5}) {
-    KeyframeOptions options = SmallOptions();
-    options.stride = stride;
-    const std::set<image_t> keyframes =
-        SelectKeyframes(options, Images(), Tracks(10), Priors(kComplete));
-    EXPECT_EQ(keyframes.count(1), 1);
-    EXPECT_EQ(keyframes.count(kNumImages), 1);
-    image_t last = 1;
-    for (const image_t id : keyframes) {
-      EXPECT_LE(id - last, stride);
-      last = id;
-    }
-    EXPECT_NEAR(keyframes.size(), kNumImages / stride, 2);
+  const std::set<image_t> keyframes = Select(Tracks(10), Priors(kComplete));
+  EXPECT_EQ(keyframes.count(1), 1);
+  EXPECT_EQ(keyframes.count(kNumImages), 1);
+  image_t last = 1;
+  for (const image_t id : keyframes) {
+    EXPECT_LE(id - last, kKeyframeStride);
+    last = id;
   }
+  EXPECT_NEAR(keyframes.size(), kNumImages / kKeyframeStride, 2);
 }
 
 TEST(SelectKeyframes, KeepsImagesThatNothingCarries) {
-  const KeyframeOptions options = SmallOptions();
-  EXPECT_EQ(SelectKeyframes(options, Images(), Tracks(10), {}), Images());
-  EXPECT_EQ(SelectKeyframes(options, Images(), Tracks(10),
-                            Priors(kPriorRotation | kPriorDirection)),
+  EXPECT_EQ(Select(Tracks(10), {}), Images());
+  EXPECT_EQ(Select(Tracks(10), Priors(kPriorRotation | kPriorDirection)),
             Images());
   // A gap in the chain: both images beside it stay.
   std::vector<RelativePosePrior> priors = Priors(kComplete);
   priors.erase(priors.begin() + 19);
-  const std::set<image_t> keyframes =
-      SelectKeyframes(options, Images(), Tracks(10), priors);
+  const std::set<image_t> keyframes = Select(Tracks(10), priors);
   EXPECT_EQ(keyframes.count(20), 1);
   EXPECT_EQ(keyframes.count(21), 1);
   EXPECT_LT(keyframes.size(), kNumImages / 2);
@@ -85,38 +76,25 @@ TEST(SelectKeyframes, KeepsImagesThatNothingCarries) {
   priors.push_back(priors.back());
   priors.back().image_id1 = kNumImages;
   priors.back().image_id2 = 1;
-  EXPECT_EQ(SelectKeyframes(options, Images(), Tracks(10), priors), Images());
+  EXPECT_EQ(Select(Tracks(10), priors), Images());
 }
 
 TEST(SelectKeyframes, KeepsImagesWhereFewPointsReachAcross) {
-  EXPECT_EQ(
-      SelectKeyframes(SmallOptions(), Images(), Tracks(2), Priors(kComplete)),
-      Images());
+  EXPECT_EQ(Select(Tracks(2), Priors(kComplete)), Images());
 }
 
 TEST(SelectKeyframes, LeavesSmallComponentsAlone) {
-  KeyframeOptions options;
-  options.min_num_images = kNumImages + 1;
-  EXPECT_EQ(SelectKeyframes(options, Images(), Tracks(10), Priors(kComplete)),
-            Images());
+  EXPECT_EQ(
+      SelectKeyframes(Images(), Tracks(10), Priors(kComplete), kNumImages + 1),
+      Images());
 }
 
 TEST(RestrictTracks, KeepsTheImagesAndLongEnoughTracks) {
   const std::vector<Track> tracks = {{{1, 0}, {2, 0}, {3, 4}, {5, 0}},
                                      {{1, 1}, {2, 1}, {4, 1}}};
-  const std::vector<Track> restricted =
-      RestrictTracks(TrackOptions(), tracks, {1, 3, 5});
+  const std::vector<Track> restricted = RestrictTracks(tracks, {1, 3, 5});
   ASSERT_EQ(restricted.size(), 1);
   EXPECT_EQ(restricted[0], (Track{{1, 0}, {3, 4}, {5, 0}}));
-}
-
-TEST(KeyframeOptions, NamesTheBrokenRule) {
-  KeyframeOptions options;
-  std::string error;
-  EXPECT_TRUE(options.IsValid(&error));
-  options.stride = 0;
-  EXPECT_FALSE(options.IsValid(&error));
-  EXPECT_NE(error.find("keyframe_stride"), std::string::npos);
 }
 
 }  // namespace

@@ -14,9 +14,9 @@ namespace adasfm {
 namespace {
 
 std::vector<Track> FindTracks(
-    const TrackOptions& options,
-    const std::map<ImagePair, std::vector<FeatureMatch>>& matches) {
-  return SelectTracks(options, BuildTracks(options, matches));
+    const std::map<ImagePair, std::vector<FeatureMatch>>& matches,
+    int max_track_length = 12) {
+  return SelectTracks(max_track_length, BuildTracks(matches));
 }
 
 // Images 1 2 3: keypoint 0 is the same point in all of them. A wrong match
@@ -27,16 +27,36 @@ TEST(BuildTracks, KeepsOneKeypointPerImage) {
   matches[ImagePair(1, 2)] = {{0, 0}, {1, 1}, {2, 2}};
   matches[ImagePair(1, 3)] = {{0, 0}, {1, 1}};
   matches[ImagePair(2, 3)] = {{0, 5}};
-  const std::vector<Track> tracks = FindTracks(TrackOptions(), matches);
+  const std::vector<Track> tracks = FindTracks(matches);
   ASSERT_EQ(tracks.size(), 2);
   EXPECT_EQ(tracks[0], (Track{{1, 0}, {2, 0}, {3, 0}}));
   EXPECT_EQ(tracks[1], (Track{{1, 1}, {2, 1}, {3, 1}}));
-  TrackOptions options;
-  options.min_track_length = 2;
-  EXPECT_EQ(FindTracks(options, matches).size(), 3);
-  options = TrackOptions();
-  options.min_num_tracks_per_image = 1;
-  EXPECT_EQ(FindTracks(options, matches).size(), 1);
+}
+
+// Matches of images with 150 points in 1 2 3 4, 50 in 1 2 3 and 50 in 2 3 5.
+// An image needs 120 tracks: the long ones suffice for 1 2 3 4, image 5 needs
+// its own.
+TEST(SelectTracks, TakesLongTracksFirstUntilImagesHaveEnough) {
+  std::map<ImagePair, std::vector<FeatureMatch>> matches;
+  const auto add = [&matches](image_t i, image_t j, point2D_t begin,
+                              point2D_t end) {
+    for (point2D_t k = begin; k < end; ++k) {
+      matches[ImagePair(i, j)].push_back({k, k});
+    }
+  };
+  add(1, 2, 0, 200);
+  add(2, 3, 0, 250);
+  add(3, 4, 0, 150);
+  add(3, 5, 200, 250);
+  std::map<size_t, int> num_of_length;
+  int num_in_5 = 0;
+  for (const Track& track : FindTracks(matches)) {
+    ++num_of_length[track.size()];
+    num_in_5 += track.back().image_id == 5;
+  }
+  EXPECT_EQ(num_of_length[4], 120);
+  EXPECT_EQ(num_of_length[3], 50);
+  EXPECT_EQ(num_in_5, 50);
 }
 
 TEST(BuildTracks, ShortensLongTracksEvenly) {
@@ -49,9 +69,7 @@ TEST(BuildTracks, ShortensLongTracksEvenly) {
     }
   }
   for (const int max_length : {3, 4, 12, 39, 40, 50}) {
-    TrackOptions options;
-    options.max_track_length = max_length;
-    const std::vector<Track> tracks = FindTracks(options, matches);
+    const std::vector<Track> tracks = FindTracks(matches, max_length);
     ASSERT_EQ(tracks.size(), kNumTracks);
     std::map<image_t, int> num_tracks;
     const int length = std::min(max_length, kNumImages);
@@ -88,9 +106,7 @@ TEST(EstimateTrackBytes, CoversTheTracksAndGrowsWithTheMatches) {
     EXPECT_GT(estimate, last);
     last = estimate;
     size_t num_bytes = 0;
-    TrackOptions options;
-    options.min_track_length = 2;
-    for (const Track& track : FindTracks(options, matches)) {
+    for (const Track& track : FindTracks(matches)) {
       num_bytes += sizeof(Track) + track.capacity() * sizeof(TrackElement);
     }
     EXPECT_GT(estimate, num_bytes);

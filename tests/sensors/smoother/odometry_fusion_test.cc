@@ -227,11 +227,11 @@ TEST(FuseOdometry, RefusesWrongSizesAndOptions) {
                std::invalid_argument);
   problem.initial_states.resize(3);
   OdometryFusionOptions options;
-  options.slip_threshold_sigma = 0.0;
+  options.gravity_m_s2 = 0.0;
   EXPECT_THROW(FuseOdometry(problem, options), std::invalid_argument);
   std::string error;
   EXPECT_FALSE(options.IsValid(&error));
-  EXPECT_NE(error.find("slip_threshold_sigma"), std::string::npos);
+  EXPECT_NE(error.find("gravity_m_s2"), std::string::npos);
 }
 
 TEST(FuseOdometry, ALinkWithoutSensorsStaysFinite) {
