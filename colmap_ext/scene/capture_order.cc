@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cctype>
 
+#include "global/view_graph/view_graph.h"
+
 namespace adasfm {
 namespace {
 
@@ -60,6 +62,42 @@ std::vector<image_t> OrderByCapture(std::vector<CapturedImage> images,
   std::vector<image_t> image_ids;
   for (const CapturedImage& image : images) image_ids.push_back(image.image_id);
   return image_ids;
+}
+
+std::map<image_t, int64_t> RankByCapture(
+    const std::vector<CapturedImage>& images) {
+  std::map<image_t, int> drive_of;
+  for (const CapturedImage& image : images) {
+    drive_of[image.image_id] = image.drive;
+  }
+  const std::vector<image_t> image_ids = OrderByCapture(images);
+  std::map<int, size_t> last_of;
+  for (size_t k = 0; k < image_ids.size(); ++k) {
+    last_of[drive_of[image_ids[k]]] = k;
+  }
+  // Drives of one lane do not overlap. Images without a drive are in the first.
+  struct Lane {
+    size_t end = 0;
+    int64_t num_images = 0;
+  };
+  std::vector<Lane> lanes(1);
+  std::map<int, size_t> lane_of = {{-1, 0}};
+  std::map<image_t, int64_t> ranks;
+  for (size_t k = 0; k < image_ids.size(); ++k) {
+    const int drive = drive_of[image_ids[k]];
+    const auto [found, is_new] = lane_of.emplace(drive, lanes.size());
+    if (is_new) {
+      const auto lane =
+          std::find_if(lanes.begin(), lanes.end(),
+                       [k](const Lane& lane) { return lane.end <= k; });
+      found->second = lane - lanes.begin();
+      if (lane == lanes.end()) lanes.emplace_back();
+      lanes[found->second].end = last_of[drive] + 1;
+    }
+    ranks[image_ids[k]] =
+        found->second * kRankGapOfDrives + lanes[found->second].num_images++;
+  }
+  return ranks;
 }
 
 }  // namespace adasfm

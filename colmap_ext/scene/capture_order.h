@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <cstdint>
+#include <map>
 #include <optional>
 #include <string>
 #include <vector>
@@ -13,6 +15,7 @@ struct CapturedImage {
   image_t image_id = kInvalidImageId;
   std::string name;
   std::optional<timestamp_t> timestamp_ns;
+  int drive = -1;  // SceneImage::drive
 };
 
 // Sorts by time if all images have one, else by name with runs of digits as
@@ -20,5 +23,11 @@ struct CapturedImage {
 // which its threads finish the features. by_time may be null.
 std::vector<image_t> OrderByCapture(std::vector<CapturedImage> images,
                                     bool* by_time = nullptr);
+
+// Ranks for ViewGraph::capture_ranks, by image. Drives that overlap in this
+// order, as those of several robots at the same time, follow each other at a
+// distance of kRankGapOfDrives.
+std::map<image_t, int64_t> RankByCapture(
+    const std::vector<CapturedImage>& images);
 
 }  // namespace adasfm

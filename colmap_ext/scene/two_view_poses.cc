@@ -125,7 +125,7 @@ InitialViewGraph BuildInitialViewGraph(
   const std::map<uint32_t, image_t> leaders = FindFrameLeaders(scene.rigs);
   for (const auto& [image_id, image] : scene.images) {
     initial.graph.images.push_back(image_id);
-    captured.push_back({image_id, image.name, image.timestamp_ns});
+    captured.push_back({image_id, image.name, image.timestamp_ns, image.drive});
     // Keeps the images of a frame adjacent when images are ordered by name.
     const auto rig_image = scene.rigs.images.find(image_id);
     if (rig_image == scene.rigs.images.end()) continue;
@@ -133,10 +133,8 @@ InitialViewGraph BuildInitialViewGraph(
     if (leader == leaders.end()) continue;
     captured.back().name = scene.images.at(leader->second).name;
   }
-  initial.graph.capture_ranks.resize(captured.size());
-  int64_t rank = 0;
-  for (const image_t image_id : OrderByCapture(std::move(captured))) {
-    initial.graph.capture_ranks[initial.graph.IndexOf(image_id)] = rank++;
+  for (const auto& [image_id, rank] : RankByCapture(captured)) {
+    initial.graph.capture_ranks.push_back(rank);  // In the order of the ids.
   }
   std::vector<PoseOrigin> origins(scene.pairs.size(), PoseOrigin::kNone);
   std::vector<Rigid3d> poses(scene.pairs.size());

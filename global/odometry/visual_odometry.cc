@@ -60,8 +60,10 @@ std::vector<RelativePosePrior> ContinueChain(
     RelativePosePrior step;
     step.image_id1 = images[k];
     step.image_id2 = images[k + 1];
+    const int e =
+        FindVisualEdge(graph, ImagePair(step.image_id1, step.image_id2));
     if (has_next.count(step.image_id1) || has_previous.count(step.image_id2) ||
-        FindVisualEdge(graph, ImagePair(step.image_id1, step.image_id2)) < 0) {
+        e < 0 || graph.CaptureGap(graph.edges[e]) >= kRankGapOfDrives / 2) {
       continue;
     }
     priors.push_back(step);

@@ -61,11 +61,14 @@ struct ViewGraphEdge {
   ImagePair Pair() const { return ImagePair(image_id1, image_id2); }
 };
 
+inline constexpr int64_t kRankGapOfDrives = int64_t{1} << 32;
+
 struct ViewGraph {
   std::vector<image_t> images;       // sorted
   std::vector<ViewGraphEdge> edges;  // sorted by pair, one per pair
   // The position of each image in the order of capture, all different; empty:
-  // the order of the ids.
+  // the order of the ids. Drives captured at the same time have ranks at least
+  // kRankGapOfDrives apart, since none of them continues another.
   std::vector<int64_t> capture_ranks;
 
   // The position of an image in images, -1 when absent.

@@ -184,11 +184,13 @@ class Benchmark:
         (tables.long_table(self.records(entries)), describe(entries))))
 
 
-def run_script(args, step, script, *options):
+def run_script(args, step, script, *options, page=''):
+  """page: with the tables of the step, if it is not docs/results/STEP.md."""
   call(script, [*options, '--output_path',
                 os.path.join(args.output_path, step), '--colmap', args.colmap,
                 '--run', str(args.run), '--table_path',
-                os.path.join(args.docs_root, 'docs', 'results', step + '.md'),
+                os.path.join(args.docs_root, page or
+                             'docs/results/%s.md' % step),
                 '--figures_path',
                 os.path.join(args.figures_path, step + '.json')])
 
@@ -242,6 +244,10 @@ STEPS = {
         args, 'global_without_sensors', 'global_without_sensors.py'),
     'estimator_seeds': lambda args: run_script(args, 'estimator_seeds',
                                                'estimator_seeds.py'),
+    'sessions': lambda args: run_script(
+        args, 'sessions', 'session_tables.py', '--data_path', args.data_path,
+        '--features_path', os.path.join(args.output_path, 'features'),
+        page='docs/guide/sessions.md'),
     'kinds': lambda args: Benchmark(args).kinds(),
     'faults': lambda args: run_script(
         args, 'faults', 'fault_tables.py', '--data_path', args.data_path,

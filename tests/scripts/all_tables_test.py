@@ -176,10 +176,11 @@ class PagesTest(Folder):
     root = os.path.join(SCRIPTS, '..', '..')
     for page, tables in (
         ('README.md', ['summary']), ('docs/guide/cleaner.md', ['cleaner']),
+        ('docs/guide/sessions.md', ['drives', 'extension']),
         ('docs/results/benchmark.md', ['peers', 'ablations', 'kinds']),
         *(('docs/results/%s.md' % step, [step]) for step in
           all_tables.STEPS if step not in ('readme', 'cleaner', 'ablations',
-                                           'kinds'))):
+                                           'kinds', 'sessions'))):
       text = read(os.path.join(root, page))
       for table in tables:
         write(self.path('copy.md'), text)

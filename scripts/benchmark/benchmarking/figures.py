@@ -50,9 +50,9 @@ def open_ledger(args):
   return ledger
 
 
-def run_table(rows, report, args):
-  """Runs the rows that are not done and writes the table; rows: {key: (spec,
-  function that gives the record)}, report: text of records and args."""
+def run_rows(rows, args):
+  """Runs the rows that are not done, writes the figures and returns the rows'
+  entries; rows: {key: (spec, function that gives the record)}."""
   ledger = open_ledger(args)
   for key, (spec, function) in rows.items() if args.run else ():
     records = ledger.run(key, lambda: [function()], spec)
@@ -60,6 +60,13 @@ def run_table(rows, report, args):
           flush=True)
   entries = ledger.entries(list(rows))
   write_figures(args.figures_path, entries)
+  return entries
+
+
+def run_table(rows, report, args):
+  """Runs rows as run_rows and writes the table; report: text of records and
+  args."""
+  entries = run_rows(rows, args)
   text = report([r for e in entries for r in e['records']], args)
   name = os.path.splitext(os.path.basename(args.table_path))[0]
   write_table(args.table_path, name, text + '\n' + describe(entries))

@@ -171,7 +171,7 @@ def evaluate(model_path, ground_truth_path, args, log_path):
 def list_models(folder, ground_truth_path, args, log_path):
   """Images and error of every model of a run, the largest first."""
   models = []
-  for name in os.listdir(folder) if os.path.isdir(folder) else ():
+  for name in sorted(os.listdir(folder)) if os.path.isdir(folder) else ():
     path = os.path.join(folder, name)
     evaluation = (evaluate(path, ground_truth_path, args, log_path)
                   if name.isdigit() and os.path.isdir(path) else None)

@@ -121,6 +121,23 @@ def turn_camera(folder, angle_deg):
   turn_matrix(folder, 'T_cam_imu', axis_rotation(1, angle_deg))
 
 
+def rotation_about(axis, angle_deg):
+  """Rotation matrix about an axis of any length (Rodrigues)."""
+  length = math.sqrt(sum(value * value for value in axis))
+  x, y, z = (value / length for value in axis)
+  cosine = math.cos(math.radians(angle_deg))
+  sine = math.sin(math.radians(angle_deg))
+  cross = [[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]]
+  return [[cosine * (i == j) + sine * cross[i][j] +
+           (1 - cosine) * (x, y, z)[i] * (x, y, z)[j] for j in range(3)]
+          for i in range(3)]
+
+
+def turn_camera_about(folder, axis, angle_deg):
+  """Rotates the camera in the calibration about an axis of its frame."""
+  turn_matrix(folder, 'T_cam_imu', rotation_about(axis, angle_deg))
+
+
 def scale_focal_length(folder, factor):
   """Scales fx and fy in database and calibration; the verified pairs stay."""
   database = sqlite3.connect(os.path.join(folder, 'database.db'))

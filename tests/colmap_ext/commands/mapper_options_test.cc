@@ -70,7 +70,7 @@ TEST(MapperOptionsTest, EachSetsItsOwnField) {
 }
 
 TEST(MapperOptionsTest, WrongValuesAreNamedAsTheyAreTyped) {
-  EXPECT_GT(ExpectWrongValuesAreNamed(Cases(), AddMapperOptions), 18);
+  EXPECT_GT(ExpectWrongValuesAreNamed(Cases(), AddMapperOptions), 13);
 }
 
 TEST(MapperOptionsTest, TheHelpNamesAll) {

@@ -3,6 +3,10 @@
 
 #include <gtest/gtest.h>
 
+#include <map>
+
+#include "global/view_graph/view_graph.h"
+
 namespace adasfm {
 namespace {
 
@@ -26,6 +30,35 @@ TEST(OrderByCapture, TimesComeFirstWhereAllImagesHaveOne) {
   EXPECT_EQ(OrderByCapture({{1, "1", 30}, {2, "2", {}}, {3, "3", 20}}),
             (std::vector<image_t>{1, 2, 3}));
   EXPECT_TRUE(OrderByCapture({}).empty());
+}
+
+// Three robots, of which the third starts when the second has stopped, and an
+// image without logs.
+TEST(RankByCapture, DrivesAtTheSameTimeAreFarApart) {
+  const auto ranks = RankByCapture({{1, "", 10, 0},
+                                    {2, "", 11, 1},
+                                    {3, "", 20, 0},
+                                    {4, "", 21, 1},
+                                    {5, "", 22, 2},
+                                    {6, "", 30, 0},
+                                    {7, "", 31, 2},
+                                    {8, "", 32, -1}});
+  const std::map<image_t, int64_t> expected = {{1, 0},
+                                               {3, 1},
+                                               {6, 2},
+                                               {8, 3},
+                                               {2, kRankGapOfDrives},
+                                               {4, kRankGapOfDrives + 1},
+                                               {5, kRankGapOfDrives + 2},
+                                               {7, kRankGapOfDrives + 3}};
+  EXPECT_EQ(ranks, expected);
+}
+
+TEST(RankByCapture, DrivesThatFollowEachOtherAreOneSequence) {
+  const auto ranks = RankByCapture(
+      {{1, "", 10, 0}, {2, "", 11, 0}, {3, "", 20, 1}, {4, "", 21, 1}});
+  const std::map<image_t, int64_t> expected = {{1, 0}, {2, 1}, {3, 2}, {4, 3}};
+  EXPECT_EQ(ranks, expected);
 }
 
 }  // namespace
