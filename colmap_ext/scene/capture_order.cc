@@ -64,7 +64,7 @@ std::vector<image_t> OrderByCapture(std::vector<CapturedImage> images,
   return image_ids;
 }
 
-std::map<image_t, int64_t> RankByCapture(
+std::map<image_t, CaptureRank> RankByCapture(
     const std::vector<CapturedImage>& images) {
   std::map<image_t, int> drive_of;
   for (const CapturedImage& image : images) {
@@ -82,7 +82,7 @@ std::map<image_t, int64_t> RankByCapture(
   };
   std::vector<Lane> lanes(1);
   std::map<int, size_t> lane_of = {{-1, 0}};
-  std::map<image_t, int64_t> ranks;
+  std::map<image_t, CaptureRank> ranks;
   for (size_t k = 0; k < image_ids.size(); ++k) {
     const int drive = drive_of[image_ids[k]];
     const auto [found, is_new] = lane_of.emplace(drive, lanes.size());
@@ -94,8 +94,10 @@ std::map<image_t, int64_t> RankByCapture(
       if (lane == lanes.end()) lanes.emplace_back();
       lanes[found->second].end = last_of[drive] + 1;
     }
-    ranks[image_ids[k]] =
+    CaptureRank& rank = ranks[image_ids[k]];
+    rank.rank =
         found->second * kRankGapOfDrives + lanes[found->second].num_images++;
+    rank.position = k;
   }
   return ranks;
 }

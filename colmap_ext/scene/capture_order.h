@@ -24,10 +24,14 @@ struct CapturedImage {
 std::vector<image_t> OrderByCapture(std::vector<CapturedImage> images,
                                     bool* by_time = nullptr);
 
-// Ranks for ViewGraph::capture_ranks, by image. Drives that overlap in this
-// order, as those of several robots at the same time, follow each other at a
-// distance of kRankGapOfDrives.
-std::map<image_t, int64_t> RankByCapture(
+// As ViewGraph::capture_ranks and capture_positions. The ranks of drives that
+// overlap in the order of capture, as those of several robots at the same time,
+// follow each other at a distance of kRankGapOfDrives.
+struct CaptureRank {
+  int64_t rank = 0;
+  int64_t position = 0;
+};
+std::map<image_t, CaptureRank> RankByCapture(
     const std::vector<CapturedImage>& images);
 
 }  // namespace adasfm

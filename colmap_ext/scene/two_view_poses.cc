@@ -134,7 +134,9 @@ InitialViewGraph BuildInitialViewGraph(
     captured.back().name = scene.images.at(leader->second).name;
   }
   for (const auto& [image_id, rank] : RankByCapture(captured)) {
-    initial.graph.capture_ranks.push_back(rank);  // In the order of the ids.
+    // In the order of the ids.
+    initial.graph.capture_ranks.push_back(rank.rank);
+    initial.graph.capture_positions.push_back(rank.position);
   }
   std::vector<PoseOrigin> origins(scene.pairs.size(), PoseOrigin::kNone);
   std::vector<Rigid3d> poses(scene.pairs.size());

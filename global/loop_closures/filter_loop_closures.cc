@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cstdlib>
 #include <map>
 #include <numeric>
 #include <stdexcept>
@@ -325,13 +326,27 @@ class LoopClosureFilter {
       for (const int b : set) {
         const Closure& one = clusters[a].best;
         const Closure& other = clusters[b].best;
-        if (groups_.AreApart(one.i, other.i, options_.max_sequence_gap) &&
-            groups_.AreApart(one.j, other.j, options_.max_sequence_gap)) {
+        if ((groups_.AreApart(one.i, other.i, options_.max_sequence_gap) &&
+             groups_.AreApart(one.j, other.j, options_.max_sequence_gap)) ||
+            GoTogether(one, other)) {
           return true;
         }
       }
     }
     return false;
+  }
+
+  // Whether two drives are at one place at the same time, twice. Two streets
+  // that look alike would have to be driven in step.
+  bool GoTogether(const Closure& one, const Closure& other) const {
+    const int max_gap = options_.max_sequence_gap;
+    const auto are_far = [&](int i, int j) {
+      return segments_.segment_of[i] == segments_.segment_of[j] &&
+             std::abs(segments_.rank_of[i] - segments_.rank_of[j]) > max_gap;
+    };
+    return graph_.PositionGap(one.i, one.j) <= max_gap &&
+           graph_.PositionGap(other.i, other.j) <= max_gap &&
+           are_far(one.i, other.i) && are_far(one.j, other.j);
   }
 
   UnconfirmedClosure Describe(

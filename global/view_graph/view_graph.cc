@@ -42,8 +42,10 @@ int ViewGraph::IndexOf(image_t image_id) const {
 }
 
 void ViewGraph::Check() const {
-  if (!capture_ranks.empty() && capture_ranks.size() != images.size()) {
-    throw std::invalid_argument("ViewGraph: not one capture rank per image");
+  for (const auto* values : {&capture_ranks, &capture_positions}) {
+    if (!values->empty() && values->size() != images.size()) {
+      throw std::invalid_argument("ViewGraph: not one capture rank per image");
+    }
   }
   for (size_t i = 1; i < images.size(); ++i) {
     if (images[i - 1] >= images[i]) {
@@ -99,9 +101,13 @@ ViewGraph ExtractSubgraph(const ViewGraph& graph,
   ViewGraph subgraph;
   subgraph.images = images;
   for (const image_t image_id : images) {
-    if (graph.capture_ranks.empty()) break;
-    subgraph.capture_ranks.push_back(
-        graph.capture_ranks[graph.IndexOf(image_id)]);
+    const int i = graph.IndexOf(image_id);
+    if (!graph.capture_ranks.empty()) {
+      subgraph.capture_ranks.push_back(graph.capture_ranks[i]);
+    }
+    if (!graph.capture_positions.empty()) {
+      subgraph.capture_positions.push_back(graph.capture_positions[i]);
+    }
   }
   for (const ViewGraphEdge& edge : graph.edges) {
     if (subgraph.IndexOf(edge.image_id1) >= 0 &&

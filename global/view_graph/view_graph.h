@@ -70,12 +70,21 @@ struct ViewGraph {
   // the order of the ids. Drives captured at the same time have ranks at least
   // kRankGapOfDrives apart, since none of them continues another.
   std::vector<int64_t> capture_ranks;
+  // The same, of all drives together; empty: as above.
+  std::vector<int64_t> capture_positions;
 
   // The position of an image in images, -1 when absent.
   int IndexOf(image_t image_id) const;
   // Of the image at an index.
   int64_t CaptureRank(int index) const {
     return capture_ranks.empty() ? images[index] : capture_ranks[index];
+  }
+  // How far two images are apart in the order of capture of all drives.
+  int64_t PositionGap(int index1, int index2) const {
+    return std::abs(capture_positions.empty()
+                        ? CaptureRank(index1) - CaptureRank(index2)
+                        : capture_positions[index1] -
+                              capture_positions[index2]);
   }
   // Of a pair: how far its images are apart in the order of capture.
   int64_t CaptureGap(const ViewGraphEdge& edge) const {

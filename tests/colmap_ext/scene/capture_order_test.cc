@@ -32,17 +32,27 @@ TEST(OrderByCapture, TimesComeFirstWhereAllImagesHaveOne) {
   EXPECT_TRUE(OrderByCapture({}).empty());
 }
 
+std::map<image_t, int64_t> RanksOf(const std::vector<CapturedImage>& images) {
+  std::map<image_t, int64_t> ranks;
+  for (const auto& [image_id, rank] : RankByCapture(images)) {
+    // The images are given in the order of capture.
+    EXPECT_EQ(rank.position, image_id - 1);
+    ranks[image_id] = rank.rank;
+  }
+  return ranks;
+}
+
 // Three robots, of which the third starts when the second has stopped, and an
 // image without logs.
 TEST(RankByCapture, DrivesAtTheSameTimeAreFarApart) {
-  const auto ranks = RankByCapture({{1, "", 10, 0},
-                                    {2, "", 11, 1},
-                                    {3, "", 20, 0},
-                                    {4, "", 21, 1},
-                                    {5, "", 22, 2},
-                                    {6, "", 30, 0},
-                                    {7, "", 31, 2},
-                                    {8, "", 32, -1}});
+  const auto ranks = RanksOf({{1, "", 10, 0},
+                              {2, "", 11, 1},
+                              {3, "", 20, 0},
+                              {4, "", 21, 1},
+                              {5, "", 22, 2},
+                              {6, "", 30, 0},
+                              {7, "", 31, 2},
+                              {8, "", 32, -1}});
   const std::map<image_t, int64_t> expected = {{1, 0},
                                                {3, 1},
                                                {6, 2},
@@ -55,8 +65,8 @@ TEST(RankByCapture, DrivesAtTheSameTimeAreFarApart) {
 }
 
 TEST(RankByCapture, DrivesThatFollowEachOtherAreOneSequence) {
-  const auto ranks = RankByCapture(
-      {{1, "", 10, 0}, {2, "", 11, 0}, {3, "", 20, 1}, {4, "", 21, 1}});
+  const auto ranks =
+      RanksOf({{1, "", 10, 0}, {2, "", 11, 0}, {3, "", 20, 1}, {4, "", 21, 1}});
   const std::map<image_t, int64_t> expected = {{1, 0}, {2, 1}, {3, 2}, {4, 3}};
   EXPECT_EQ(ranks, expected);
 }

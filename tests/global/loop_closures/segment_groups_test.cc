@@ -132,6 +132,28 @@ TEST_F(SegmentGroupsTest, OneStreetOfJoinedDrivesConfirmsNothing) {
   EXPECT_EQ(CountKept(0, 2) + CountKept(1, 2), 0);
 }
 
+// A straight street confirms two drives that pass it together, image by image,
+// not others.
+TEST_F(SegmentGroupsTest, DrivesAtTheSameTimeNeedNoTurn) {
+  for (const int delay : {0, 1000}) {
+    graph_.edges.clear();
+    odometry_.lengths.clear();
+    graph_.capture_ranks.clear();
+    graph_.capture_positions.clear();
+    for (const image_t id : graph_.images) {
+      const int64_t drive = id / 200;
+      const int64_t k = id % 200;
+      graph_.capture_ranks.push_back(drive * kRankGapOfDrives + k);
+      graph_.capture_positions.push_back(3 * k + drive * (1 + delay));
+    }
+    AddPlace(0, 1, 1);
+    AddPlace(0, 1, 12);
+    const LoopClosureReport report = Filter();
+    EXPECT_EQ(report.num_confirmed_closures, delay == 0 ? 1 : 0);
+    EXPECT_EQ(CountKept(0, 1), delay == 0 ? 14 : 0);
+  }
+}
+
 // The motion through the tree is the true one, within its own sigmas.
 TEST_F(SegmentGroupsTest, MotionsLeadThroughClosures) {
   AddPlace(0, 1, 3);
