@@ -7,13 +7,11 @@
 #include <map>
 #include <numeric>
 #include <stdexcept>
-#include <tuple>
 #include <utility>
 
 #include "core/option_checker.h"
 #include "global/loop_closures/consistent_set.h"
 #include "global/loop_closures/pair_motion.h"
-#include "global/loop_closures/segment_groups.h"
 #include "global/loop_closures/trajectory_segments.h"
 
 namespace adasfm {
@@ -27,6 +25,14 @@ constexpr size_t kMaxNumClusters = 2000;
 // metres: the scene is as deep there as elsewhere, within a factor of two.
 constexpr double kUnitLogSigma = 0.35;
 
+// A pair from image i to image j, indices of ViewGraph::images; i lies in the
+// segment of the smaller index or, within a segment, earlier.
+struct Closure {
+  int i = 0;
+  int j = 0;
+  PairMotion j_from_i;
+};
+
 // Pairs between the same two windows of images.
 struct ClosureCluster {
   std::vector<int> edges;
@@ -37,17 +43,6 @@ struct ClosureCluster {
   Closure best;
 };
 
-// The clusters between two groups of segments, and what was found of them.
-struct GroupPair {
-  std::vector<ClosureCluster> clusters;
-  bool is_tested = false;
-  std::vector<int> set;  // consistent, in order
-  int num_pairs = 0;     // kept, of the set
-  bool is_confirmed = false;
-
-  int NumConfirmed() const { return is_confirmed ? num_pairs : 0; }
-};
-
 class LoopClosureFilter {
  public:
   LoopClosureFilter(const LoopClosureOptions& options,
@@ -56,8 +51,7 @@ class LoopClosureFilter {
         odometry_(odometry),
         graph_(*graph),
         segments_(FindTrajectorySegments(options, odometry.priors,
-                                         odometry.chain, *graph)),
-        groups_(segments_, odometry.chain, *graph) {}
+                                         odometry.chain, *graph)) {}
 
   LoopClosureReport Run() {
     report_.segments_were_split = options_.split_unconfirmed_closures;
@@ -65,16 +59,18 @@ class LoopClosureFilter {
       report_.num_segments += num_images >= kMinNumSegmentImages;
     }
     TestPairsByOdometry();
-    std::map<std::pair<int, int>, GroupPair> between;
+    std::map<std::pair<int, int>, std::vector<ClosureCluster>> between;
     for (const ClosureCluster& cluster : ClusterClosures()) {
       const auto segments = SegmentsOf(cluster.edges.front());
       if (segments.first == segments.second) {
         Vote(cluster);
-      } else if (cluster.num_kept > 0) {
-        between[segments].clusters.push_back(cluster);
+      } else {
+        between[segments].push_back(cluster);
       }
     }
-    FilterBetween(std::move(between));
+    for (const auto& [segments, clusters] : between) {
+      FilterBetween(segments, clusters);
+    }
     for (size_t e = 0; e < graph_.edges.size(); ++e) {
       if (graph_.edges[e].IsKept()) graph_.edges[e].removal = removals_[e];
     }
@@ -142,21 +138,15 @@ class LoopClosureFilter {
     return list;
   }
 
-  // From the group of the smaller index or, within one, from the segment of the
-  // smaller index or, within a segment, from the earlier image.
-  Closure Orient(Closure closure) const {
-    const auto place = [this](int image) {
-      return std::make_tuple(groups_.GroupOf(image),
-                             segments_.segment_of[image],
-                             segments_.rank_of[image]);
-    };
-    return place(closure.i) > place(closure.j) ? closure.Inverse() : closure;
-  }
-
   Closure MakeClosure(int e) const {
-    const ViewGraphEdge& edge = graph_.edges[e];
-    return Orient({graph_.IndexOf(edge.image_id1),
-                   graph_.IndexOf(edge.image_id2), pairs_[e]});
+    const int i = graph_.IndexOf(graph_.edges[e].image_id1);
+    const int j = graph_.IndexOf(graph_.edges[e].image_id2);
+    const auto place = [this](int image) {
+      return std::make_pair(segments_.segment_of[image],
+                            segments_.rank_of[image]);
+    };
+    if (place(i) > place(j)) return {j, i, pairs_[e].Inverse()};
+    return {i, j, pairs_[e]};
   }
 
   std::pair<bool, int> Quality(int e) const {
@@ -187,81 +177,33 @@ class LoopClosureFilter {
         Change(cluster, EdgeRemoval::kKept, EdgeRemoval::kFalseLoop);
   }
 
-  // Rule 3. The best confirmed pair is taken first: from then on its groups, if
-  // they are in metres, are one.
-  void FilterBetween(std::map<std::pair<int, int>, GroupPair> between) {
-    while (!between.empty()) {
-      for (auto& [groups, pair] : between) {
-        if (!pair.is_tested) Test(groups, &pair);
-      }
-      const auto best = std::max_element(
-          between.begin(), between.end(), [](const auto& a, const auto& b) {
-            return a.second.NumConfirmed() < b.second.NumConfirmed();
-          });
-      const auto groups = best->first;
-      const GroupPair pair = std::move(best->second);
-      between.erase(best);
-      Decide(groups, pair);
-      if (!pair.is_confirmed || !options_.split_unconfirmed_closures ||
-          !groups_.IsMetric(groups.first) || !groups_.IsMetric(groups.second)) {
-        continue;
-      }
-      groups_.Join(pair.clusters[pair.set.front()].best);
-      JoinPairsOf(groups, &between);
-    }
-  }
-
-  // Gives the pairs of the second group to the first.
-  void JoinPairsOf(const std::pair<int, int>& groups,
-                   std::map<std::pair<int, int>, GroupPair>* between) const {
-    std::map<std::pair<int, int>, GroupPair> joined;
-    for (auto& [key, pair] : *between) {
-      const auto name = [&groups](int group) {
-        return group == groups.second ? groups.first : group;
-      };
-      const std::pair<int, int> new_key =
-          std::minmax({name(key.first), name(key.second)});
-      GroupPair& all = joined[new_key];
-      if (all.clusters.empty() && new_key == key) {
-        all = std::move(pair);
-        continue;
-      }
-      all.is_tested = false;
-      for (ClosureCluster& cluster : pair.clusters) {
-        cluster.best = Orient(cluster.best);
-        all.clusters.push_back(std::move(cluster));
-      }
-    }
-    *between = std::move(joined);
-  }
-
-  void Test(const std::pair<int, int>& groups, GroupPair* pair) const {
-    std::stable_sort(pair->clusters.begin(), pair->clusters.end(),
+  // Rule 3.
+  void FilterBetween(const std::pair<int, int>& segments,
+                     std::vector<ClosureCluster> clusters) {
+    clusters.erase(std::remove_if(clusters.begin(), clusters.end(),
+                                  [](const ClosureCluster& cluster) {
+                                    return cluster.num_kept == 0;
+                                  }),
+                   clusters.end());
+    if (clusters.empty()) return;
+    std::stable_sort(clusters.begin(), clusters.end(),
                      [](const ClosureCluster& a, const ClosureCluster& b) {
                        return a.num_kept > b.num_kept;
                      });
-    pair->set = FindSet(groups, pair->clusters);
-    pair->num_pairs = 0;
-    for (const int c : pair->set) pair->num_pairs += pair->clusters[c].num_kept;
-    pair->is_confirmed = HasTwoPlaces(pair->clusters, pair->set);
-    pair->is_tested = true;
-  }
-
-  void Decide(const std::pair<int, int>& groups, const GroupPair& pair) {
-    if (pair.is_confirmed) {
+    std::vector<int> set = FindSet(segments, clusters);
+    if (HasTwoPlaces(clusters, set)) {
       ++report_.num_confirmed_closures;
     } else {
-      report_.unconfirmed_closures.push_back(Describe(groups, pair.clusters));
+      set.clear();
+      report_.unconfirmed_closures.push_back(Describe(segments, clusters));
     }
     if (!options_.split_unconfirmed_closures) return;
-    for (size_t c = 0; c < pair.clusters.size(); ++c) {
-      const bool is_in_set =
-          pair.is_confirmed &&
-          std::binary_search(pair.set.begin(), pair.set.end(), c);
-      for (const int e : pair.clusters[c].edges) {
+    for (size_t c = 0; c < clusters.size(); ++c) {
+      const bool is_confirmed = std::binary_search(set.begin(), set.end(), c);
+      for (const int e : clusters[c].edges) {
         if (removals_[e] != EdgeRemoval::kKept ||
-            (is_in_set && AreConsistent(pair.clusters[c].best, MakeClosure(e),
-                                        UnitLogSigma(groups)))) {
+            (is_confirmed && AreConsistent(clusters[c].best, MakeClosure(e),
+                                           UnitLogSigma(segments)))) {
           continue;
         }
         removals_[e] = EdgeRemoval::kUnconfirmedClosure;
@@ -270,16 +212,17 @@ class LoopClosureFilter {
     }
   }
 
-  // 1 sigma of the log ratio of both groups' units.
-  double UnitLogSigma(const std::pair<int, int>& groups) const {
-    return groups_.IsMetric(groups.first) && groups_.IsMetric(groups.second)
+  // 1 sigma of the log ratio of both segments' units.
+  double UnitLogSigma(const std::pair<int, int>& segments) const {
+    return segments_.is_metric[segments.first] &&
+                   segments_.is_metric[segments.second]
                ? 0.0
                : kUnitLogSigma;
   }
 
   // All clusters where they are not to be split, such as photos in any order,
   // which have no odometry to test them.
-  std::vector<int> FindSet(const std::pair<int, int>& groups,
+  std::vector<int> FindSet(const std::pair<int, int>& segments,
                            const std::vector<ClosureCluster>& clusters) const {
     const size_t size = std::min(clusters.size(), kMaxNumClusters);
     if (!options_.split_unconfirmed_closures) {
@@ -293,7 +236,7 @@ class LoopClosureFilter {
       weights.push_back(clusters[a].num_kept);
       for (size_t b = a + 1; b < size; ++b) {
         is_consistent[a][b] = is_consistent[b][a] = AreConsistent(
-            clusters[a].best, clusters[b].best, UnitLogSigma(groups));
+            clusters[a].best, clusters[b].best, UnitLogSigma(segments));
       }
     }
     return FindConsistentSet(is_consistent, weights);
@@ -303,32 +246,42 @@ class LoopClosureFilter {
   // of their ends.
   bool AreConsistent(const Closure& a, const Closure& b,
                      double unit_log_sigma) const {
-    const auto first = groups_.FindMotion(b.i, a.i);
-    const auto second = groups_.FindMotion(a.j, b.j);
-    if (!first || !second) return false;
+    const auto image = [this](int index) { return graph_.images[index]; };
+    const OdometryChain& chain = odometry_.chain;
+    if (!chain.IsConnected(image(a.i), image(b.i)) ||
+        !chain.IsConnected(image(a.j), image(b.j))) {
+      return false;
+    }
+    const ChainMotion first = chain.Motion(image(b.i), image(a.i));
+    const ChainMotion second = chain.Motion(image(a.j), image(b.j));
+    if (!first.has_rotation || !second.has_rotation) return false;
     UncertainMotion predicted =
-        second->j_from_i * a.j_from_i.motion * first->j_from_i;
+        UncertainMotion{second.cam2_from_cam1, second.covariance} *
+        a.j_from_i.motion *
+        UncertainMotion{first.cam2_from_cam1, first.covariance};
     const Eigen::Vector3d by_unit =
-        unit_log_sigma * second->j_from_i.cam2_from_cam1.translation;
+        unit_log_sigma * second.cam2_from_cam1.translation;
     predicted.covariance.bottomRightCorner<3, 3>() +=
         by_unit * by_unit.transpose();
     const bool has_position =
-        first->has_position && second->has_position &&
+        first.has_position && second.has_position &&
         a.j_from_i.translation == PairMotion::Translation::kFull;
     return TestPair(b.j_from_i, predicted, has_position).Probability() >=
            options_.significance;
   }
 
-  // The condition under which the motion between two segments is observable.
+  // The condition under which the motion between two segments is observable:
+  // places beyond a turn, or two drives that are at both places at the same
+  // time. Two streets that look alike would have to be driven in step.
   bool HasTwoPlaces(const std::vector<ClosureCluster>& clusters,
                     const std::vector<int>& set) const {
     for (const int a : set) {
       for (const int b : set) {
         const Closure& one = clusters[a].best;
         const Closure& other = clusters[b].best;
-        if ((groups_.AreApart(one.i, other.i, options_.max_sequence_gap) &&
-             groups_.AreApart(one.j, other.j, options_.max_sequence_gap)) ||
-            GoTogether(one, other)) {
+        if (AreApart(one.i, other.i) && AreApart(one.j, other.j) &&
+            ((HasTurn(one.i, other.i) && HasTurn(one.j, other.j)) ||
+             (IsAtOneTime(one) && IsAtOneTime(other)))) {
           return true;
         }
       }
@@ -336,25 +289,26 @@ class LoopClosureFilter {
     return false;
   }
 
-  // Whether two drives are at one place at the same time, twice. Two streets
-  // that look alike would have to be driven in step.
-  bool GoTogether(const Closure& one, const Closure& other) const {
-    const int max_gap = options_.max_sequence_gap;
-    const auto are_far = [&](int i, int j) {
-      return segments_.segment_of[i] == segments_.segment_of[j] &&
-             std::abs(segments_.rank_of[i] - segments_.rank_of[j]) > max_gap;
-    };
-    return graph_.PositionGap(one.i, one.j) <= max_gap &&
-           graph_.PositionGap(other.i, other.j) <= max_gap &&
-           are_far(one.i, other.i) && are_far(one.j, other.j);
+  bool AreApart(int i, int j) const {
+    return std::abs(segments_.rank_of[i] - segments_.rank_of[j]) >
+           options_.max_sequence_gap;
+  }
+
+  bool HasTurn(int i, int j) const {
+    return segments_.heading_of[i] != segments_.heading_of[j];
+  }
+
+  bool IsAtOneTime(const Closure& closure) const {
+    return graph_.PositionGap(closure.i, closure.j) <=
+           options_.max_sequence_gap;
   }
 
   UnconfirmedClosure Describe(
-      const std::pair<int, int>& groups,
+      const std::pair<int, int>& segments,
       const std::vector<ClosureCluster>& clusters) const {
     UnconfirmedClosure closure;
-    closure.num_images = std::min(groups_.NumImages(groups.first),
-                                  groups_.NumImages(groups.second));
+    closure.num_images = std::min(segments_.num_images[segments.first],
+                                  segments_.num_images[segments.second]);
     int max_num_inliers = -1;
     for (const ClosureCluster& cluster : clusters) {
       closure.num_pairs += cluster.num_kept;
@@ -370,8 +324,7 @@ class LoopClosureFilter {
   const LoopClosureOptions& options_;
   const TrajectoryOdometry& odometry_;
   ViewGraph& graph_;
-  const TrajectorySegments segments_;
-  SegmentGroups groups_;
+  TrajectorySegments segments_;
   std::vector<bool> has_pair_;  // by edge
   std::vector<PairMotion> pairs_;
   std::vector<EdgeRemoval> removals_;

@@ -67,9 +67,8 @@ struct LoopClosureReport {
 //    are removed unless this set contains two places that are separated by a
 //    turn at both ends (kUnconfirmedClosure): a single place always fits, and a
 //    straight street that looks alike all along fits everywhere. The turn is
-//    not needed where two drives are at both places at the same time. Segments
-//    in metres that are joined count as one for what follows, so that places in
-//    several drives confirm each other. Off without split_unconfirmed_closures.
+//    not needed where two drives are at both places at the same time. Off
+//    without split_unconfirmed_closures.
 // Evidence for each rule and alternatives: docs/reference/global.md, False loop
 // closures. Throws std::invalid_argument for invalid options, or where there is
 // not one length per edge.

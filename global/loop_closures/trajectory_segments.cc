@@ -11,6 +11,10 @@
 namespace adasfm {
 namespace {
 
+// Two closures between segments confirm each other only if the heading changes
+// by this much between them: a long straight street can look alike all along.
+constexpr double kMinTurnDeg = 30.0;
+
 bool IsVisual(const ViewGraphEdge& edge) {
   return edge.IsKept() && edge.source != EdgeSource::kSensor;
 }

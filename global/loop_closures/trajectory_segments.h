@@ -15,10 +15,6 @@ namespace adasfm {
 // pairs.
 inline constexpr int kMinNumSegmentImages = 3;
 
-// Two closures between segments confirm each other only if the heading changes
-// by this much between them: a long straight street can look alike all along.
-inline constexpr double kMinTurnDeg = 30.0;
-
 // The segments of a trajectory: images that are connected by priors with a
 // position or by pairs of images that follow each other. All vectors are in the
 // order of ViewGraph::images.
@@ -32,8 +28,7 @@ struct TrajectorySegments {
   // ViewGraph::CaptureRank.
   std::vector<int64_t> rank_of;
   // Number of the image's heading in the odometry: a new heading begins where
-  // the rotation exceeds kMinTurnDeg since the last one began, and with each
-  // piece.
+  // the rotation exceeds 30 deg since the last one began, and with each piece.
   std::vector<int> heading_of;
 };
 

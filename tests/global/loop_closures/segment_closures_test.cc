@@ -187,6 +187,24 @@ TEST(FilterLoopClosures, AStraightStreetConfirmsNothing) {
   }
 }
 
+// A straight street confirms two drives that pass it together, image by image.
+TEST(FilterLoopClosures, DrivesAtTheSameTimeNeedNoTurn) {
+  for (const int delay : {0, 1000}) {
+    Drives drives = BuildDrives();
+    AddTruePlace(1, 5, &drives);
+    AddTruePlace(13, 18, &drives);
+    for (const image_t id : drives.graph.images) {
+      const int64_t drive = id > kSecond;
+      const int64_t k = id % kSecond;
+      drives.graph.capture_ranks.push_back(drive * kRankGapOfDrives + k);
+      drives.graph.capture_positions.push_back(2 * k + drive * (1 + delay));
+    }
+    const LoopClosureReport report = Filter(&drives);
+    EXPECT_EQ(report.num_confirmed_closures, delay == 0) << delay;
+    EXPECT_EQ(CountKeptJoins(drives.graph), delay == 0 ? 18 : 0) << delay;
+  }
+}
+
 TEST(FilterLoopClosures, LongRunsAroundCornersConfirmThemselves) {
   Drives drives = BuildDrives();
   AddTruePlace(5, 50, &drives);
