@@ -26,7 +26,7 @@ std::vector<image_t> OrderByCapture(std::vector<CapturedImage> images,
 
 // As ViewGraph::capture_ranks and capture_positions. The ranks of drives that
 // overlap in the order of capture, as those of several robots at the same time,
-// follow each other at a distance of kRankGapOfDrives.
+// begin at different multiples of kRankGapOfDrives.
 struct CaptureRank {
   int64_t rank = 0;
   int64_t position = 0;

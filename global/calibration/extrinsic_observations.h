@@ -21,7 +21,7 @@ constexpr int kNumExtrinsicUnknowns = 12;
 constexpr int kDrivingDirectionUnknown = 3;
 constexpr int kRateUnknown = 6;
 // Pairs at most this many steps of the chain apart are used.
-constexpr int kMaxNumExtrinsicSteps = 10;
+inline constexpr int kMaxNumExtrinsicSteps = 10;
 
 // One pair's rotation or direction, whitened: residual = jacobian * unknowns.
 // Rows that a term does not have are zero.

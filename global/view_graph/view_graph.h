@@ -67,8 +67,8 @@ struct ViewGraph {
   std::vector<image_t> images;       // sorted
   std::vector<ViewGraphEdge> edges;  // sorted by pair, one per pair
   // The position of each image in the order of capture, all different; empty:
-  // the order of the ids. Drives captured at the same time have ranks at least
-  // kRankGapOfDrives apart, since none of them continues another.
+  // the order of the ids. Where drives were captured at the same time, none of
+  // them continues another: the ranks of each begin kRankGapOfDrives further.
   std::vector<int64_t> capture_ranks;
   // The same, of all drives together; empty: as above.
   std::vector<int64_t> capture_positions;

@@ -56,9 +56,7 @@ def parse_arguments():
                       help='our launcher')
   parser.add_argument('--host_colmap', default='',
                       help="the host's executable; default: through ours")
-  parser.add_argument('--features_path', default='',
-                      help="folder of COLMAP's databases of real photos; "
-                      'default: features in that of --output_path')
+  sets.add_features_argument(parser)
   parser.add_argument('--max_num_images', type=int, default=0,
                       help='worlds have no more than so many images (100 or '
                       'more, as blackouts have a size), and real sets are '
@@ -66,8 +64,7 @@ def parse_arguments():
   parser.add_argument('--seed', type=int, default=1, help='of the worlds')
   args = parser.parse_args()
   args.root = ROOT
-  args.features_path = args.features_path or os.path.join(args.output_path,
-                                                          'features')
+  sets.set_features_path(args)
   args.peers = {}
   for peer in args.peer:
     match = re.fullmatch(r'([^=]+)=([^:]+):([^:]+)(:cleaned)?', peer)

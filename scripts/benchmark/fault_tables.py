@@ -19,7 +19,8 @@ import sys
 
 from benchmarking.figures import add_arguments, run_table
 from benchmarking.ledger import hash_sources
-from benchmarking.sets import copy_features
+from benchmarking.sets import (add_features_argument, copy_features,
+                               set_features_path)
 from benchmarking.spoil import edit_rows, keep_every
 from verdict_table import Chain, set_value, zero_samples
 
@@ -236,15 +237,12 @@ def parse_arguments():
   add_arguments(parser, __file__, 'faults', 'adasfm-faults')
   parser.add_argument('--data_path', default='../shared/data',
                       help='folder of the real drive')
-  parser.add_argument('--features_path', default='',
-                      help="folder of COLMAP's databases of real photos; "
-                      'default: features in that of --output_path')
+  add_features_argument(parser)
   for name, (_, trials) in CAMPAIGNS.items():
     parser.add_argument('--' + name, type=int, default=trials, metavar='N',
                         help='trials, %d unless given' % trials)
   args = parser.parse_args()
-  args.features_path = args.features_path or os.path.join(args.output_path,
-                                                          'features')
+  set_features_path(args)
   args.colmap = os.path.abspath(args.colmap)
   return args
 

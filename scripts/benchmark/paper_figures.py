@@ -24,7 +24,8 @@ from benchmarking.ledger import MixedVersions, make_stamp
 from benchmarking.match_refinement import CASES, run_case, spec_of
 from benchmarking.methods import make_coarse_model, run_method
 from benchmarking.process import run
-from benchmarking.sets import REAL_SETS, make_database
+from benchmarking.sets import (REAL_SETS, add_features_argument, make_database,
+                               set_features_path)
 from benchmarking.view_graph import run_view_graph
 
 # The world of the view graph and of the merge trials: fragments, perceptual
@@ -111,9 +112,7 @@ def parse_arguments(words=None):
   results = os.path.join(parser.get_default('root'), 'benchmark', 'results')
   parser.add_argument('--data_path', default='../shared/data',
                       help='folder of the recordings')
-  parser.add_argument('--features_path', default='',
-                      help="folder of COLMAP's databases of the real photos; "
-                      'default: features in that of --output_path')
+  add_features_argument(parser)
   parser.add_argument('--hierarchical_sets', default=None,
                       help='sets, with commas, on which hierarchical_mapper is '
                       'run; default: all that are there but %s' %
@@ -128,8 +127,7 @@ def parse_arguments(words=None):
       parser.get_default('root'), 'docs', 'images'),
                       help='folder of the pictures')
   args = parser.parse_args(words)
-  args.features_path = args.features_path or os.path.join(args.output_path,
-                                                          'features')
+  set_features_path(args)
   there = [name for name in REAL_SETS
            if os.path.isdir(os.path.join(args.data_path, name))]
   args.hierarchical_sets = (

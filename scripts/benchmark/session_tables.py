@@ -27,8 +27,8 @@ from benchmarking.methods import list_models, run_adasfm
 from benchmarking.pages import write_table
 from benchmarking.peer_tables import format_error
 from benchmarking.process import Failed, run
-from benchmarking.sets import (copy_whole, extract_and_match, is_world,
-                               make_database)
+from benchmarking.sets import (add_features_argument, copy_features, is_world,
+                               make_database, set_features_path)
 from benchmarking.spoil import turn_camera_about
 from global_worlds import read_warnings
 
@@ -158,21 +158,6 @@ def take_in_turn(names):
           names[first + 1:last:2] + names[last:]]
 
 
-def extract_drive(source, prefix, names, drive, args, log_path):
-  """COLMAP's features of a drive's photos, matched within the drive. They are
-  computed once, since they do not depend on our version."""
-  images = os.path.join(drive, 'images')
-  os.makedirs(images)
-  for name in names:
-    os.symlink(os.path.join(source, 'images', name), os.path.join(images, name))
-  features = os.path.join(args.features_path,
-                          '%s-%s.db' % (PHOTOS, prefix[:-1]))
-  if not os.path.exists(features):
-    os.makedirs(args.features_path, exist_ok=True)
-    extract_and_match(drive, features, args, log_path)
-  return features
-
-
 def match_pairs(features, pairs, args, log_path):
   """A database of drives {prefix: database} with matches of more pairs, without
   logs. It is computed once for a list of pairs."""
@@ -198,11 +183,15 @@ def cut_photos(folder, args, record):
   log_path = os.path.join(folder, 'run.log')
   folders, names = make_drives(source, take_in_turn, folder)
   databases = databases_of(folders)
-  features = {prefix: extract_drive(source, prefix, names[prefix], drive, args,
-                                    log_path)
-              for prefix, drive in folders.items()}
-  for prefix, database in databases.items():
-    copy_whole(features[prefix], database)
+  features = {}
+  for prefix, drive in folders.items():
+    os.makedirs(os.path.join(drive, 'images'))
+    for name in names[prefix]:
+      os.symlink(os.path.join(source, 'images', name),
+                 os.path.join(drive, 'images', name))
+    features_name = '%s-%s' % (PHOTOS, prefix[:-1])
+    copy_features(features_name, drive, databases[prefix], args, log_path)
+    features[prefix] = os.path.join(args.features_path, features_name + '.db')
   merged = os.path.join(folder, 'database.db')
   drives.import_logs(folders.values(), args, log_path)
   drives.merge(databases, merged, args, log_path)
@@ -352,12 +341,9 @@ def parse_arguments():
       root, 'docs', 'guide', 'sessions.md'))
   parser.add_argument('--data_path', default='../shared/data',
                       help='folder of the real photos and of the world-* sets')
-  parser.add_argument('--features_path', default='',
-                      help="folder of COLMAP's databases of the real photos; "
-                      'default: features in that of --output_path')
+  add_features_argument(parser)
   args = parser.parse_args()
-  args.features_path = args.features_path or os.path.join(args.output_path,
-                                                          'features')
+  set_features_path(args)
   return args
 
 

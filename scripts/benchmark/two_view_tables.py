@@ -19,7 +19,8 @@ import sys
 from benchmarking.figures import add_arguments, run_table
 from benchmarking.methods import make_coarse_model
 from benchmarking.process import Failed, run
-from benchmarking.sets import REAL_SETS, copy_features, extract_and_match
+from benchmarking.sets import (REAL_SETS, add_features_argument, copy_features,
+                               extract_and_match, set_features_path)
 from global_tables import SETS, auc_table, histogram_table
 
 RENDERED = 'rendered-60'
@@ -109,12 +110,9 @@ def parse_arguments():
                       'are there' % ', '.join(photos + [RENDERED]))
   parser.add_argument('--data_path', default='../shared/data',
                       help='folder of the real photos')
-  parser.add_argument('--features_path', default='',
-                      help="folder of COLMAP's databases of the real photos; "
-                      'default: features in that of --output_path')
+  add_features_argument(parser)
   args = parser.parse_args()
-  args.features_path = args.features_path or os.path.join(args.output_path,
-                                                          'features')
+  set_features_path(args)
   args.sets = args.sets or [RENDERED] + [
       n for n in photos if os.path.isdir(os.path.join(args.data_path, n))]
   for name in args.sets:

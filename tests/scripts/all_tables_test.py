@@ -7,7 +7,6 @@ import json
 import os
 import subprocess
 import sys
-import tempfile
 import unittest
 
 SCRIPTS = os.path.join(os.path.dirname(os.path.abspath(__file__)), '..', '..',
@@ -20,6 +19,7 @@ from benchmarking.figures import run_table  # noqa: E402
 from benchmarking.ledger import (Ledger, MixedVersions,  # noqa: E402
                                  hash_sources, make_stamp)
 from benchmarking.pages import write_table  # noqa: E402
+from temporary_folder import FolderTest  # noqa: E402
 
 
 def write(path, text):
@@ -33,18 +33,7 @@ def read(path):
     return file.read()
 
 
-class Folder(unittest.TestCase):
-
-  def setUp(self):
-    temporary = tempfile.TemporaryDirectory()
-    self.addCleanup(temporary.cleanup)
-    self.folder = temporary.name
-
-  def path(self, *names):
-    return os.path.join(self.folder, *names)
-
-
-class LedgerTest(Folder):
+class LedgerTest(FolderTest):
 
   def stamp(self, sources='a', machine='m'):
     return {'sources': sources, 'commit': 'c', 'machine': machine}
@@ -96,7 +85,7 @@ class LedgerTest(Folder):
     self.assertEqual(ledger.find('two'), [{'value': 3}])
 
 
-class VersionTest(Folder):
+class VersionTest(FolderTest):
 
   def test_the_version_is_that_of_the_product_and_not_of_docs(self):
     write(self.path('core', 'a.cc'), 'int a;')
@@ -157,7 +146,7 @@ class VersionTest(Folder):
     self.assertEqual(runs, ['a', 'b', 'c', 'd', 'c'])
 
 
-class PagesTest(Folder):
+class PagesTest(FolderTest):
 
   def test_only_what_stands_between_the_markers_changes(self):
     page = self.path('page.md')
@@ -198,7 +187,7 @@ def record(name, method, models, num_images=100, error=''):
           'models': [{'images': n, 'rmse_m': e} for n, e in models]}
 
 
-class HandheldTest(Folder):
+class HandheldTest(FolderTest):
   """A phone's log: objects on many lines, two sensors with their own times."""
 
   def setUp(self):
@@ -235,7 +224,7 @@ class HandheldTest(Folder):
         ['500,0.1,0.2,0.3,0.0,0.0,9.8', '1750,0.1,0.2,0.3,1.25,2.5,9.8'])
 
 
-class AllTest(Folder):
+class AllTest(FolderTest):
 
   RUNS = {'mapper': [(80, 52.5)], 'adasfm': [(100, 0.04)],
           'colmap4_mapper': [(100, 0.02)],

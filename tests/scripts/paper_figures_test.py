@@ -22,6 +22,7 @@ from benchmarking import (match_refinement, merge_trials, models,  # noqa: E402
 from benchmarking.ledger import Ledger, make_stamp  # noqa: E402
 from benchmarking.pair_counts import rotation_matrix  # noqa: E402
 from benchmarking.pages import write_table  # noqa: E402
+from temporary_folder import FolderTest  # noqa: E402
 
 
 def random_rotation(generator):
@@ -230,15 +231,7 @@ def all_records():
                       'after': ''}}}
 
 
-class PageTest(unittest.TestCase):
-
-  def setUp(self):
-    temporary = tempfile.TemporaryDirectory()
-    self.addCleanup(temporary.cleanup)
-    self.folder = temporary.name
-
-  def path(self, *names):
-    return os.path.join(self.folder, *names)
+class PageTest(FolderTest):
 
   def fill(self, benchmark_stamp=None):
     """Rows of all kinds, and the figures of the other steps."""

@@ -4,7 +4,6 @@
 import os
 import sqlite3
 import sys
-import tempfile
 import unittest
 
 SCRIPTS = os.path.join(os.path.dirname(os.path.abspath(__file__)), '..', '..',
@@ -14,6 +13,7 @@ sys.path.insert(0, SCRIPTS)
 import session_tables as tables  # noqa: E402
 from benchmarking import drives  # noqa: E402
 from benchmarking.spoil import rotation_about  # noqa: E402
+from temporary_folder import FolderTest  # noqa: E402
 
 SECOND_NS = 10**9
 NAMES = ['a', 'b', 'c', 'd']
@@ -25,15 +25,7 @@ def record(models, num_images=100, **others):
           'coarse': [{'images': n, 'rmse_m': e} for n, e in models], **others}
 
 
-class Folder(unittest.TestCase):
-
-  def setUp(self):
-    temporary = tempfile.TemporaryDirectory()
-    self.addCleanup(temporary.cleanup)
-    self.folder = temporary.name
-
-  def path(self, *names):
-    return os.path.join(self.folder, *names)
+class Folder(FolderTest):
 
   def write(self, name, lines):
     with open(self.path(name), 'w') as file:

@@ -84,6 +84,17 @@ def make_database(name, folder, args):
   return source
 
 
+def add_features_argument(parser):
+  parser.add_argument('--features_path', default='',
+                      help="folder of COLMAP's databases of the real photos; "
+                      'default: features in that of --output_path')
+
+
+def set_features_path(args):
+  args.features_path = args.features_path or os.path.join(args.output_path,
+                                                          'features')
+
+
 def copy_features(name, source, database, args, log_path):
   """Copies COLMAP's features and matches of real photos. They are computed
   once, since they do not depend on our version."""
