@@ -160,11 +160,13 @@ Status WriteGlobalResult(const GlobalStageOptions& options,
                                CollectPosePriors(options, scene, result));
   }
   if (status.ok() && ChangesDatabase(options)) {
-    status = RewriteTwoViewGeometries(
-        database_path, result.geometries, result.removed_pairs,
-        CorrectionsByCamera(
-            scene, CameraImuCorrections(result.poses.camera_imu_rotations)),
-        result.inertial_lengths);
+    PriorCorrections corrections;
+    corrections.camera_imu = CorrectionsByCamera(
+        scene, CameraImuCorrections(result.poses.camera_imu_rotations));
+    corrections.time_shift_s = CorrectionsByCamera(scene, result.time_shifts);
+    corrections.lengths = result.inertial_lengths;
+    status = RewriteTwoViewGeometries(database_path, result.geometries,
+                                      result.removed_pairs, corrections);
   }
   return status;
 }

@@ -16,11 +16,22 @@ void RotateInertialMotion(const Eigen::Quaterniond& rotated_from_cam,
       rotation * motion->velocity_by_bias * rotation.transpose();
   motion->position_by_bias =
       rotation * motion->position_by_bias * rotation.transpose();
-  motion->camera_from_imu_origin = rotation * motion->camera_from_imu_origin;
+  for (Eigen::Vector3d* vector :
+       {&motion->velocity_by_time_shift, &motion->position_by_time_shift,
+        &motion->translation_by_time_shift, &motion->camera_from_imu_origin}) {
+    *vector = rotation * *vector;
+  }
   if (!motion->by_wheels) return;
   MeasuredTranslation& by_wheels = *motion->by_wheels;
   by_wheels.translation = rotation * by_wheels.translation;
   by_wheels.covariance = rotation * by_wheels.covariance * rotation.transpose();
+}
+
+void AddTimeShift(double shift_s, InertialMotion* motion) {
+  motion->delta_velocity += shift_s * motion->velocity_by_time_shift;
+  motion->delta_position += shift_s * motion->position_by_time_shift;
+  if (!motion->by_wheels) return;
+  motion->by_wheels->translation += shift_s * motion->translation_by_time_shift;
 }
 
 void SetTranslation(const MeasuredTranslation& measured,

@@ -35,6 +35,11 @@ struct InertialMotion {
   Eigen::Vector3d delta_position = Eigen::Vector3d::Zero();    // m
   Eigen::Matrix3d velocity_by_bias = Eigen::Matrix3d::Zero();  // s
   Eigen::Matrix3d position_by_bias = Eigen::Matrix3d::Zero();  // s^2
+  // Derivatives by timeshift_cam_imu: of both above (m/s^2, m/s), and of
+  // by_wheels (m/s).
+  Eigen::Vector3d velocity_by_time_shift = Eigen::Vector3d::Zero();
+  Eigen::Vector3d position_by_time_shift = Eigen::Vector3d::Zero();
+  Eigen::Vector3d translation_by_time_shift = Eigen::Vector3d::Zero();
   // From the IMU's origin to the camera's, in the camera's axes, m.
   Eigen::Vector3d camera_from_imu_origin = Eigen::Vector3d::Zero();
   // The translation of P_12, in the axes of camera 2, from the wheels without
@@ -52,6 +57,9 @@ void SetTranslation(const MeasuredTranslation& measured,
 // stated one.
 void RotateInertialMotion(const Eigen::Quaterniond& rotated_from_cam,
                           InertialMotion* motion);
+
+// Corrects the motion for a timeshift_cam_imu that is too small by shift_s.
+void AddTimeShift(double shift_s, InertialMotion* motion);
 
 // The length of a prior's motion, estimated from vision and accelerometer
 // together.

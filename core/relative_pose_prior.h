@@ -6,6 +6,7 @@
 #include <cstdint>
 
 #include "core/rigid3d.h"
+#include "core/so3.h"
 #include "core/types.h"
 
 namespace adasfm {
@@ -37,6 +38,12 @@ struct RelativePosePrior {
   Eigen::Matrix<double, 6, 6> covariance =
       Eigen::Matrix<double, 6, 6>::Identity();
   uint32_t flags = 0;
+  // Where timeshift_cam_imu is wrong by c, R_true = Exp(c
+  // rotation_by_time_shift) R and t_true = t + c translation_by_time_shift to
+  // first order (docs/reference/math.md). rad/s and m/s, in the frame of camera
+  // 2; zero where no IMU measured the motion.
+  Eigen::Vector3d rotation_by_time_shift = Eigen::Vector3d::Zero();
+  Eigen::Vector3d translation_by_time_shift = Eigen::Vector3d::Zero();
   // Number of the drive, from 0. The errors of calibration and biases are those
   // of one drive.
   int drive = 0;
@@ -60,6 +67,10 @@ inline void RotatePrior(const Eigen::Quaterniond& rotated_from_cam,
       (rotated_from_cam * motion.rotation * rotated_from_cam.conjugate())
           .normalized();
   motion.translation = rotated_from_cam * motion.translation;
+  prior->rotation_by_time_shift =
+      rotated_from_cam * prior->rotation_by_time_shift;
+  prior->translation_by_time_shift =
+      rotated_from_cam * prior->translation_by_time_shift;
   const Eigen::Matrix3d matrix = rotated_from_cam.toRotationMatrix();
   for (int row = 0; row < 6; row += 3) {
     for (int col = 0; col < 6; col += 3) {
@@ -69,6 +80,15 @@ inline void RotatePrior(const Eigen::Quaterniond& rotated_from_cam,
       block = (matrix * block * matrix.transpose()).eval();
     }
   }
+}
+
+// Corrects the prior for a timeshift_cam_imu that is too small by shift_s.
+inline void AddTimeShift(double shift_s, RelativePosePrior* prior) {
+  Rigid3d& motion = prior->cam2_from_cam1;
+  motion.rotation =
+      (ExpSo3(shift_s * prior->rotation_by_time_shift) * motion.rotation)
+          .normalized();
+  motion.translation += shift_s * prior->translation_by_time_shift;
 }
 
 }  // namespace adasfm

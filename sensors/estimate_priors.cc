@@ -5,6 +5,7 @@
 #include <cmath>
 #include <optional>
 #include <stdexcept>
+#include <utility>
 
 #include "core/option_checker.h"
 #include "core/so3.h"
@@ -18,6 +19,7 @@
 #include "sensors/smoother/compose_inertial_motion.h"
 #include "sensors/smoother/compose_prior.h"
 #include "sensors/smoother/compose_wheel_translation.h"
+#include "sensors/time_shift_effects.h"
 #include "sensors/timed_rotations.h"
 #include "sensors/use_vision.h"
 #include "sensors/wheel_skids.h"
@@ -67,6 +69,7 @@ class PriorEstimator {
   void Fuse();
   void BuildPriors();
   void BuildInertialMotions();
+  void DifferentiateByTimeShift();
   void FillSummary();
   Status CheckWheelScale();
 
@@ -245,6 +248,33 @@ void PriorEstimator::BuildInertialMotions() {
   }
 }
 
+void PriorEstimator::DifferentiateByTimeShift() {
+  std::map<image_t, ImuMotion> felt;
+  for (size_t i = 0; i < images_.size(); ++i) {
+    const std::optional<ImuMotion> motion = MeasureImuMotion(
+        logs_.imu, images_[i].timestamp_ns + vision_.timeshift_ns,
+        fused_.states[timeline_.indices[i]]);
+    if (motion) felt[images_[i].image_id] = *motion;
+  }
+  std::map<std::pair<image_t, image_t>, RelativePosePrior*> priors;
+  for (RelativePosePrior& prior : estimate_.priors) {
+    priors[{prior.image_id1, prior.image_id2}] = &prior;
+  }
+  // Motions exist where the IMU has no gap.
+  for (InertialMotion& motion : estimate_.inertial_motions) {
+    const auto first = felt.find(motion.image_id1);
+    const auto second = felt.find(motion.image_id2);
+    const auto prior = priors.find({motion.image_id1, motion.image_id2});
+    if (first == felt.end() || second == felt.end() || prior == priors.end()) {
+      continue;
+    }
+    SetTimeShiftEffects(first->second, second->second,
+                        calibration_.cam_from_imu, prior->second);
+    SetTimeShiftEffects(first->second, second->second,
+                        calibration_.cam_from_imu, *prior->second, &motion);
+  }
+}
+
 void PriorEstimator::FillSummary() {
   SensorSummary& summary = estimate_.summary;
   summary.num_images = static_cast<int>(all_images_.size());
@@ -315,6 +345,7 @@ StatusOr<PriorEstimate> PriorEstimator::Run(
   // 5. Camera frames and figures.
   BuildPriors();
   BuildInertialMotions();
+  DifferentiateByTimeShift();
   FillSummary();
   status = CheckWheelScale();
   if (!status.ok()) return status;

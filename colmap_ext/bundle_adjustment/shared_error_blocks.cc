@@ -29,8 +29,13 @@ std::vector<double*> SharedErrorBlocks::ParametersOf(const PosePriorEdge& edge,
     return block.values;
   };
   if (term == PosePriorCost::Term::kRotation) {
-    return {use(windows.drive, &extrinsic_rotation_),
-            use(windows.gyroscope, &gyroscope_bias_)};
+    std::vector<double*> parameters = {
+        use(windows.drive, &extrinsic_rotation_),
+        use(windows.gyroscope, &gyroscope_bias_)};
+    if (parameters.size() < num_shared) {
+      parameters.push_back(&time_shift_[windows.drive]);
+    }
+    return parameters;
   }
   std::vector<double*> parameters;
   if (term != PosePriorCost::Term::kLength) {
@@ -89,6 +94,7 @@ void SharedErrorBlocks::AddPriors(ceres::Problem* problem) {
   AddGyroscopePriors(problem);
   AddDirectionDriftPriors(problem);
   AddLengthScalePriors(problem);
+  AddTimeShiftPriors(problem);
 }
 
 // A random walk in each drive: the first value has a prior, each later value
@@ -141,22 +147,37 @@ void SharedErrorBlocks::AddLengthScalePriors(ceres::Problem* problem) {
     }
     return;
   }
-  const auto add = [&](double sigma, std::vector<double> weights,
-                       const std::vector<double*>& values) {
-    costs_.push_back(
-        std::make_unique<WeightedSumCost>(sigma, std::move(weights)));
-    problem->AddResidualBlock(costs_.back().get(), nullptr, values);
-  };
   int num_lengths = 0;
   for (auto& [drive, scale] : length_scale_) num_lengths += scale.num_lengths;
   std::vector<double*> values;
   std::vector<double> shares;
   for (auto& [drive, scale] : length_scale_) {
-    add(kSigma, {1.0}, {&scale.value});
+    AddSumPrior(kSigma, {1.0}, {&scale.value}, problem);
     values.push_back(&scale.value);
     shares.push_back(1.0 * scale.num_lengths / num_lengths);
   }
-  add(kMeanSigma, std::move(shares), values);
+  AddSumPrior(kMeanSigma, std::move(shares), values, problem);
+}
+
+void SharedErrorBlocks::AddTimeShiftPriors(ceres::Problem* problem) {
+  // The import corrects what two views show clearly; cameras are often off by
+  // tens of milliseconds.
+  constexpr double kSigmaS = 0.02;
+  for (auto& [drive, shift] : time_shift_) {
+    if (options_.enabled) {
+      AddSumPrior(kSigmaS, {1.0}, {&shift}, problem);
+    } else {
+      problem->SetParameterBlockConstant(&shift);
+    }
+  }
+}
+
+void SharedErrorBlocks::AddSumPrior(double sigma, std::vector<double> weights,
+                                    const std::vector<double*>& values,
+                                    ceres::Problem* problem) {
+  costs_.push_back(
+      std::make_unique<WeightedSumCost>(sigma, std::move(weights)));
+  problem->AddResidualBlock(costs_.back().get(), nullptr, values);
 }
 
 std::vector<double*> SharedErrorBlocks::Used() {
@@ -166,6 +187,7 @@ std::vector<double*> SharedErrorBlocks::Used() {
     for (auto& [key, block] : *blocks) used.push_back(block.values);
   }
   for (auto& [drive, scale] : length_scale_) used.push_back(&scale.value);
+  for (auto& [drive, shift] : time_shift_) used.push_back(&shift);
   return used;
 }
 
@@ -185,6 +207,7 @@ SharedErrors SharedErrorBlocks::Estimated() const {
   for (const auto& [drive, scale] : length_scale_) {
     errors.length_scale.emplace(drive, scale.value);
   }
+  errors.time_shift = time_shift_;
   return errors;
 }
 

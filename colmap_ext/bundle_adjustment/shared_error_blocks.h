@@ -15,7 +15,8 @@
 namespace adasfm {
 
 // The errors that the priors of an adjustment share, as parameters of three
-// numbers each (shared_errors.h). Errors that affect no prior have none.
+// numbers each, or of one (shared_errors.h). Errors that affect no prior have
+// none.
 class SharedErrorBlocks {
  public:
   // The windows of the edges must be set (AssignSharedErrorWindows).
@@ -48,6 +49,10 @@ class SharedErrorBlocks {
   void AddGyroscopePriors(ceres::Problem* problem);
   void AddDirectionDriftPriors(ceres::Problem* problem);
   void AddLengthScalePriors(ceres::Problem* problem);
+  void AddTimeShiftPriors(ceres::Problem* problem);
+  // A normal prior around zero of a weighted sum.
+  void AddSumPrior(double sigma, std::vector<double> weights,
+                   const std::vector<double*>& values, ceres::Problem* problem);
   // A normal prior around zero; sigma 0 holds the values.
   void AddPrior(double sigma, Block* block, ceres::Problem* problem);
   // A normal prior of the change from decay * before to block.
@@ -65,6 +70,7 @@ class SharedErrorBlocks {
     int num_lengths = 0;
   };
   std::map<int, LengthScale> length_scale_;  // by drive
+  std::map<int, double> time_shift_;         // by drive
   std::vector<std::unique_ptr<ceres::CostFunction>> costs_;
 };
 

@@ -142,6 +142,12 @@ std::string DriveName(const SceneData& scene, int drive) {
   return scene.images.at(prior->image_id1).name;
 }
 
+bool HasSeveralDrives(const SceneData& scene) {
+  return std::any_of(
+      scene.priors.begin(), scene.priors.end(),
+      [](const RelativePosePrior& prior) { return prior.drive > 0; });
+}
+
 Json CameraImuRotationJson(const std::string& drive_name,
                            const CameraImuRotationReport& camera_imu) {
   const Eigen::Matrix3d rotation =
@@ -212,6 +218,20 @@ void AppendCameraImuWarning(const std::string& drive_name,
   warnings->push_back(text.str());
 }
 
+// drive_name: empty for the only drive.
+void AppendTimeShiftWarning(const std::string& drive_name, double shift_s,
+                            std::vector<std::string>* warnings) {
+  // A smaller correction leaves no doubt in the model.
+  constexpr double kMinShiftS = 0.01;
+  if (std::abs(shift_s) < kMinShiftS) return;
+  std::ostringstream text;
+  text << std::fixed << std::setprecision(4) << "the camera's clock ";
+  if (!drive_name.empty()) text << "of the drive from " << drive_name << ' ';
+  text << "is off: add " << std::showpos << shift_s
+       << " s to timeshift_cam_imu in --sensors_path";
+  warnings->push_back(text.str());
+}
+
 void AppendPriorWarnings(const CoarseModel& model,
                          std::vector<std::string>* warnings) {
   std::ostringstream text;
@@ -267,6 +287,11 @@ std::string FormatGlobalReportJson(const SceneData& scene,
   for (const auto& [drive, camera_imu] : result.poses.camera_imu_rotations) {
     report["camera_imu_rotations"].push_back(
         CameraImuRotationJson(DriveName(scene, drive), camera_imu));
+  }
+  report["time_shifts"] = Json::array();
+  for (const auto& [drive, shift_s] : result.time_shifts) {
+    report["time_shifts"].push_back(
+        {{"first_image", DriveName(scene, drive)}, {"shift_s", shift_s}});
   }
   report["loop_closures"] = LoopClosuresJson(result.poses.loop_closures);
   report["segment_closures"] =
@@ -335,6 +360,11 @@ std::vector<std::string> ListGlobalWarnings(const SceneData& scene,
     AppendCameraImuWarning(
         rotations.size() > 1 ? DriveName(scene, drive) : std::string(),
         camera_imu, &warnings);
+  }
+  for (const auto& [drive, shift_s] : result.time_shifts) {
+    AppendTimeShiftWarning(
+        HasSeveralDrives(scene) ? DriveName(scene, drive) : std::string(),
+        shift_s, &warnings);
   }
   for (const CoarseModel& model : result.models) {
     AppendPriorWarnings(model, &warnings);

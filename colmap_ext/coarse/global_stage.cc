@@ -2,6 +2,9 @@
 #include "colmap_ext/coarse/global_stage.h"
 
 #include <algorithm>
+#include <cmath>
+#include <iomanip>
+#include <iterator>
 #include <set>
 #include <sstream>
 #include <stdexcept>
@@ -80,6 +83,24 @@ std::map<image_t, Rigid3d> PosesHeldByPoints(
     }
   }
   return poses;
+}
+
+// What timeshift_cam_imu lacks, by drive, as the last adjustment of the largest
+// model with its images found it.
+TimeShiftMap FindTimeShifts(const std::vector<CoarseModel>& models) {
+  // Less changes nothing, since the adjustments have the same unknown.
+  constexpr double kMinShiftS = 1e-3;
+  TimeShiftMap shifts;
+  for (const CoarseModel& model : models) {
+    if (model.rounds.empty() || !model.rounds.back().success) continue;
+    const SharedErrors& errors = model.rounds.back().shared_errors;
+    shifts.insert(errors.time_shift.begin(), errors.time_shift.end());
+  }
+  for (auto shift = shifts.begin(); shift != shifts.end();) {
+    shift = std::abs(shift->second) < kMinShiftS ? shifts.erase(shift)
+                                                 : std::next(shift);
+  }
+  return shifts;
 }
 
 size_t NumImagesOfLargest(const GlobalStageResult& result) {
@@ -182,6 +203,16 @@ std::string DescribeMatches(const GlobalStageResult& result) {
   return text.str();
 }
 
+std::string DescribeTimeShifts(const TimeShiftMap& shifts) {
+  std::ostringstream text;
+  text << std::fixed << std::setprecision(4) << std::showpos;
+  for (const auto& [drive, shift_s] : shifts) {
+    text << (text.tellp() > 0 ? ", " : "") << shift_s << " s";
+  }
+  text << " added to timeshift_cam_imu";
+  return text.str();
+}
+
 std::string DescribeSizes(const GlobalStageResult& result) {
   std::ostringstream text;
   text.precision(2);
@@ -210,6 +241,7 @@ class GlobalStage {
     BuildViewGraph();
     EstimateModels(scene_.priors);
     if (result_.models.empty()) return NothingHoldsTogether();
+    CorrectTimeShifts();
     EstimateModelsAcrossGaps();
     Join();
     MeasurePairAgreements(options_, scene_, correspondences_.bearings,
@@ -296,6 +328,15 @@ class GlobalStage {
     End("structure", DescribeModel(result_.models.back()));
   }
 
+  void CorrectTimeShifts() {
+    result_.time_shifts = FindTimeShifts(result_.models);
+    if (result_.time_shifts.empty()) return;
+    Begin("clocks of the cameras", 0.8);
+    AddTimeShifts(result_.time_shifts, &result_.poses.priors,
+                  &scene_.inertial_motions);
+    End("clocks of the cameras", DescribeTimeShifts(result_.time_shifts));
+  }
+
   // Estimates the models again where the accelerometer alone gives the metres
   // and the way between parts of a drive: odometry then checks the loop
   // closures between parts, too.
@@ -322,6 +363,7 @@ class GlobalStage {
     const int num_split = num_split_;
     result_ = GlobalStageResult();
     result_.focal_lengths = in_parts.focal_lengths;
+    result_.time_shifts = in_parts.time_shifts;
     result_.steps = in_parts.steps;
     correspondences_.matches = all_matches_;
     EstimateModels(odometry.priors);

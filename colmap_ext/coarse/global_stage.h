@@ -10,6 +10,7 @@
 #include "colmap_ext/coarse/coarse_structure.h"
 #include "colmap_ext/host/database.h"
 #include "colmap_ext/scene/calibrate_focal_lengths.h"
+#include "colmap_ext/scene/drives.h"
 #include "colmap_ext/scene/raw_matches.h"
 #include "colmap_ext/scene/scene_data.h"
 #include "core/inertial_motion.h"
@@ -56,6 +57,9 @@ struct GlobalStageResult {
   std::vector<ImagePair> removed_pairs;
   // Lengths for priors without one, in models with metres by accelerometer.
   std::vector<InertialLength> inertial_lengths;
+  // What timeshift_cam_imu lacks, where the coarse models show it; the scene's
+  // priors and inertial motions are corrected by it.
+  TimeShiftMap time_shifts;
   // Covariances of translations across gaps (BridgeGaps), where poses use them.
   std::map<ImagePair, Eigen::Matrix3d> bridges;
   std::vector<CoarseStep> steps;
@@ -76,6 +80,7 @@ using StageProgress = std::function<void(const std::string&, double)>;
 //   2.1-2.6  coarse poses                EstimateCoarsePoses
 //   2.7      tracks, points, adjustment  BuildCoarseModel, per component
 //            parts that nothing ties     SplitModels, JoinModels
+//            clocks of the cameras       FindTimeShifts
 //            gaps, then 2.1 to 2.7 anew  BridgeGaps
 //   2.8      match refinement            RefineMatches
 //   2.9      metres without wheels       MeasureSize, per component

@@ -133,13 +133,18 @@ PosePriorCost::PosePriorCost(const PosePriorEdge& edge, Term term,
   }
   *mutable_parameter_block_sizes() = {6, 6};
   mutable_parameter_block_sizes()->resize(2 + from_shared_.size(), 3);
-  if (!edge.windows.has_length_scale) return;
-  if (term == Term::kTranslation) {
-    from_length_scale_ = inverse_sigma_ * translation_;
-  } else if (term == Term::kLength) {
-    from_length_scale_ = inverse_sigma_ * length_ * Eigen::Vector3d::UnitX();
+  if (term == Term::kRotation) {
+    if (edge.dt_s >= 0.0 && edge.windows.DependOnTimeShift()) {
+      from_scalar_ = inverse_sigma_ * edge.windows.rotation_by_time_shift;
+    }
+  } else if (edge.windows.has_length_scale) {
+    if (term == Term::kTranslation) {
+      from_scalar_ = inverse_sigma_ * translation_;
+    } else if (term == Term::kLength) {
+      from_scalar_ = inverse_sigma_ * length_ * Eigen::Vector3d::UnitX();
+    }
   }
-  if (from_length_scale_) mutable_parameter_block_sizes()->push_back(1);
+  if (from_scalar_) mutable_parameter_block_sizes()->push_back(1);
 }
 
 bool PosePriorCost::Evaluate(double const* const* parameters, double* residuals,
@@ -168,12 +173,12 @@ void PosePriorCost::SubtractSharedErrors(double const* const* parameters,
       }
     }
   }
-  if (!from_length_scale_) return;
+  if (!from_scalar_) return;
   const size_t last = 2 + from_shared_.size();
   for (int row = 0; row < num_residuals(); ++row) {
-    residuals[row] -= (*from_length_scale_)[row] * *parameters[last];
+    residuals[row] -= (*from_scalar_)[row] * *parameters[last];
     if (jacobians[last] != nullptr) {
-      jacobians[last][row] = -(*from_length_scale_)[row];
+      jacobians[last][row] = -(*from_scalar_)[row];
     }
   }
 }

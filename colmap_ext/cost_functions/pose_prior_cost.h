@@ -35,6 +35,7 @@ Eigen::Vector2d DirectionError(const Eigen::Vector3d& vector,
 //   kDirection, kTranslation: driving_direction (3), direction_drift (3)
 //   kLength: direction_drift (3), where length_per_direction > 0
 //   kLength, kTranslation: length_scale (1), last, where has_length_scale
+//   kRotation: time_shift (1), last, where DependOnTimeShift()
 // whose effect on R^ and t^ is subtracted to first order. The poses are read
 // from the objects, which must be up to date. One cost per term, so that the
 // robust loss can reject a wrong term and keep the others.
@@ -68,7 +69,8 @@ class PosePriorCost final : public ceres::CostFunction {
   // Effect of the shared parameters, subtracted from the residuals; as many
   // rows as residuals are used.
   std::vector<Eigen::Matrix3d> from_shared_;
-  std::optional<Eigen::Vector3d> from_length_scale_;
+  // The same of the last parameter, a number.
+  std::optional<Eigen::Vector3d> from_scalar_;
 };
 
 // Sum of weight * value / sigma, 1 residual. Parameters: one of 1 for each

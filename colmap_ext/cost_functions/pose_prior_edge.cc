@@ -40,6 +40,7 @@ PosePriorEdge PosePriorEdgeFromPrior(const RelativePosePrior& prior) {
   edge.image_id2 = prior.image_id2;
   edge.cam2_from_cam1 = prior.cam2_from_cam1;
   edge.windows.drive = prior.drive;
+  edge.windows.rotation_by_time_shift = prior.rotation_by_time_shift;
   // Within a frame of a rig no time passes, and no log measured the motion.
   if (prior.dt_ns > 0) edge.dt_s = SecondsFromNs(prior.dt_ns);
   const auto sigma_or_infinity = [](double variance) {

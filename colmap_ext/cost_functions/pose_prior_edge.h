@@ -57,7 +57,7 @@ struct PosePriorEdge {
   // whole log affect it (shared_errors.h). Negative: not measured, no shared
   // errors.
   double dt_s = -1.0;
-  // The drive; the rest is set by AssignSharedErrorWindows.
+  // Drive and rotation_by_time_shift; AssignSharedErrorWindows sets the rest.
   SharedErrorWindows windows;
 
   // Whether a sensor measured the length with a drive's unit.

@@ -43,7 +43,8 @@ Rigid3d SharedErrors::Correct(const Rigid3d& cam2_from_cam1, double dt_s,
       ValueOr(zero, extrinsic_rotation, windows.drive);
   const Eigen::Vector3d error =
       extrinsic - rotation * extrinsic +
-      dt_s * (from_middle * ValueOr(zero, gyroscope_bias, windows.gyroscope));
+      dt_s * (from_middle * ValueOr(zero, gyroscope_bias, windows.gyroscope)) +
+      ValueOr(0.0, time_shift, windows.drive) * windows.rotation_by_time_shift;
   const Eigen::Vector3d drift =
       ValueOr(zero, direction_drift, windows.direction);
   const Eigen::Vector3d direction =

@@ -42,7 +42,7 @@ struct SharedErrorOptions {
 // Length of the windows with one direction drift each.
 inline constexpr double kDirectionWindowS = 2.0;
 
-// Selects the values of the errors that apply to a motion.
+// Selects the values of the errors that apply to a motion, and how they do.
 struct SharedErrorWindows {
   int drive = 0;  // RelativePosePrior::drive
   // Numbers of the windows of varying errors, counted through all drives.
@@ -53,15 +53,20 @@ struct SharedErrorWindows {
   double length_per_direction = 0.0;
   // Whether the lengths of the drive have a scale of their own.
   bool has_length_scale = false;
+  // As in RelativePosePrior.
+  Eigen::Vector3d rotation_by_time_shift = Eigen::Vector3d::Zero();
+
+  bool DependOnTimeShift() const { return !rotation_by_time_shift.isZero(0.0); }
 };
 
 // The errors of all drives. For a motion with the stated cam2_from_cam1 = (R^,
 // t^) over dt, H = Exp(Log(R^) / 2), to first order
-//   R = Exp(dt H b + (I - R^) e) R^
+//   R = Exp(dt H b + (I - R^) e + c q) R^
 //   t = (1 + s + k u . H d) Exp(H (m + d)) t^
 // with b: gyroscope_bias of its window, e: extrinsic_rotation and m:
 // driving_direction of its drive, d: direction_drift of its window, all in the
-// frame of the camera, u = t^ / |t^| and k = length_per_direction. A rotation
+// frame of the camera, u = t^ / |t^| and k = length_per_direction. c:
+// time_shift of the drive, q: rotation_by_time_shift of the motion. A rotation
 // about u does not change t^, so that component of d serves as the drift of the
 // length. s: length_scale of the drive, where several drives have lengths. A
 // common scale of all lengths is not included: it does not change the shape of
@@ -75,6 +80,7 @@ struct SharedErrors {
   // length_per_direction.
   std::map<int, Eigen::Vector3d> direction_drift;
   std::map<int, double> length_scale;  // by drive, relative
+  std::map<int, double> time_shift;    // by drive, s, of timeshift_cam_imu
 
   Rigid3d Correct(const Rigid3d& cam2_from_cam1, double dt_s,
                   const SharedErrorWindows& windows) const;

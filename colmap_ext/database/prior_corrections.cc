@@ -14,6 +14,7 @@ namespace adasfm {
 namespace {
 
 constexpr char kCorrectionTable[] = "adasfm_camera_mount";
+constexpr char kTimeShiftTable[] = "adasfm_time_shifts";
 
 std::array<double, 4> ToQvec(const Eigen::Quaterniond& q) {
   return {q.w(), q.x(), q.y(), q.z()};
@@ -45,27 +46,49 @@ void WriteCameraImuCorrections(
   }
 }
 
+void WriteTimeShifts(const std::map<camera_t, double>& time_shift_s,
+                     SqliteConnection* database) {
+  database->Execute(
+      "CREATE TABLE adasfm_time_shifts (camera_id INTEGER NOT NULL, shift_s "
+      "REAL NOT NULL)");
+  SqliteStatement statement(database,
+                            "INSERT INTO adasfm_time_shifts VALUES (?, ?)");
+  for (const auto& [camera_id, shift_s] : time_shift_s) {
+    statement.Reset();
+    statement.BindInt(1, camera_id);
+    statement.BindDouble(2, shift_s);
+    statement.Step();
+  }
+}
+
 }  // namespace
 
-void WritePriorCorrections(
-    const std::map<camera_t, Eigen::Quaterniond>& camera_imu_corrections,
-    const std::vector<InertialLength>& lengths, SqliteConnection* database) {
+void WritePriorCorrections(const PriorCorrections& corrections,
+                           SqliteConnection* database) {
   RemovePriorCorrections(database);
-  if (camera_imu_corrections.empty() && lengths.empty()) return;
-  CreateMetaTable(database);
-  if (!camera_imu_corrections.empty()) {
-    WriteCameraImuCorrections(camera_imu_corrections, database);
+  if (corrections.camera_imu.empty() && corrections.time_shift_s.empty() &&
+      corrections.lengths.empty()) {
+    return;
   }
-  WriteInertialLengths(lengths, database);
+  CreateMetaTable(database);
+  if (!corrections.camera_imu.empty()) {
+    WriteCameraImuCorrections(corrections.camera_imu, database);
+  }
+  if (!corrections.time_shift_s.empty()) {
+    WriteTimeShifts(corrections.time_shift_s, database);
+  }
+  WriteInertialLengths(corrections.lengths, database);
 }
 
 bool HasPriorCorrections(SqliteConnection* database) {
   return database->HasTable(kCorrectionTable) ||
+         database->HasTable(kTimeShiftTable) ||
          database->HasTable(kInertialLengthTable);
 }
 
 void RemovePriorCorrections(SqliteConnection* database) {
-  for (const char* table : {kCorrectionTable, kInertialLengthTable}) {
+  for (const char* table :
+       {kCorrectionTable, kTimeShiftTable, kInertialLengthTable}) {
     database->Execute(std::string("DROP TABLE IF EXISTS ") + table);
   }
 }
@@ -86,6 +109,22 @@ std::map<camera_t, Eigen::Quaterniond> ReadCameraImuCorrections(
         ReadRotation(statement, 1, std::string("table ") + kCorrectionTable));
   }
   return corrections;
+}
+
+std::map<camera_t, double> ReadTimeShifts(SqliteConnection* database) {
+  std::map<camera_t, double> shifts;
+  if (!database->HasTable(kTimeShiftTable)) return shifts;
+  SqliteStatement statement(
+      database, "SELECT camera_id, shift_s FROM adasfm_time_shifts");
+  while (statement.Step()) {
+    const double shift_s = statement.Double(1);
+    if (!std::isfinite(shift_s)) {
+      throw SqliteError(std::string("table ") + kTimeShiftTable +
+                        ": not a time");
+    }
+    shifts.emplace(static_cast<camera_t>(statement.Int(0)), shift_s);
+  }
+  return shifts;
 }
 
 }  // namespace adasfm

@@ -2,6 +2,8 @@
 #include "colmap_ext/database/prior_tables.h"
 
 #include <cstdio>
+#include <map>
+#include <utility>
 
 #include "colmap_ext/database/image_names.h"
 #include "colmap_ext/database/inertial_tables.h"
@@ -19,7 +21,7 @@ constexpr const char* kTables[] = {
     "adasfm_image_times",    "adasfm_relative_pose_priors",
     "adasfm_gravity",        "adasfm_position_priors",
     "adasfm_gyroscope_bias", "adasfm_length_drift",
-    "adasfm_wheel_scale"};
+    "adasfm_wheel_scale",    "adasfm_time_shift_effects"};
 
 void CreateTables(SqliteConnection* database) {
   CreateMetaTable(database);
@@ -48,7 +50,13 @@ void CreateTables(SqliteConnection* database) {
       "sigma_ratio REAL NOT NULL);"
       "CREATE TABLE IF NOT EXISTS adasfm_wheel_scale ("
       "image_id INTEGER PRIMARY KEY NOT NULL, name TEXT NOT NULL, "
-      "scale REAL NOT NULL, sigma REAL NOT NULL, stated_sigma REAL NOT NULL);");
+      "scale REAL NOT NULL, sigma REAL NOT NULL, stated_sigma REAL NOT NULL);"
+      "CREATE TABLE IF NOT EXISTS adasfm_time_shift_effects ("
+      "image_id1 INTEGER NOT NULL, image_id2 INTEGER NOT NULL, "
+      "name1 TEXT NOT NULL, name2 TEXT NOT NULL, "
+      "rotation BLOB NOT NULL, translation BLOB NOT NULL, "
+      "delta_velocity BLOB NOT NULL, delta_position BLOB NOT NULL, "
+      "PRIMARY KEY (image_id1, image_id2));");
 }
 
 void WriteImageTimes(const ImageNames& names,
@@ -82,6 +90,35 @@ void WritePriors(const ImageNames& names,
     // Symmetric, so row and column order are the same.
     BindDoubles(&statement, 8, row.covariance.data(), 36);
     statement.BindInt(9, row.flags);
+    statement.Step();
+  }
+}
+
+// Of the motions that an IMU measured.
+void WriteTimeShiftEffects(const ImageNames& names, const PriorTables& tables,
+                           SqliteConnection* database) {
+  std::map<std::pair<image_t, image_t>, const InertialMotion*> motions;
+  for (const InertialMotion& motion : tables.inertial_motions) {
+    motions[{motion.image_id1, motion.image_id2}] = &motion;
+  }
+  SqliteStatement statement(
+      database,
+      "INSERT INTO adasfm_time_shift_effects VALUES (?, ?, ?, ?, ?, ?, ?, ?)");
+  const Eigen::Vector3d zero = Eigen::Vector3d::Zero();
+  for (const RelativePosePrior& prior : tables.priors) {
+    if (prior.rotation_by_time_shift.isZero(0.0)) continue;
+    const auto found = motions.find({prior.image_id1, prior.image_id2});
+    const InertialMotion* motion =
+        found == motions.end() ? nullptr : found->second;
+    const auto bind = [&statement](int column, const Eigen::Vector3d& vector) {
+      BindDoubles(&statement, column, vector.data(), 3);
+    };
+    statement.Reset();
+    names.BindPair(prior.image_id1, prior.image_id2, &statement);
+    bind(5, prior.rotation_by_time_shift);
+    bind(6, prior.translation_by_time_shift);
+    bind(7, motion == nullptr ? zero : motion->velocity_by_time_shift);
+    bind(8, motion == nullptr ? zero : motion->position_by_time_shift);
     statement.Step();
   }
 }
@@ -203,6 +240,7 @@ Status WritePriorTables(const std::string& database_path,
     }
     WriteImageTimes(names, tables.image_times, &database);
     WritePriors(names, tables.priors, &database);
+    WriteTimeShiftEffects(names, tables, &database);
     WriteGravity(names, tables.gravity, &database);
     WritePositions(names, tables.positions, &database);
     WriteGyroscopeBias(names, tables, &database);

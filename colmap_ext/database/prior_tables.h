@@ -20,9 +20,9 @@ namespace adasfm {
 
 // The tables adasfm_image_times, adasfm_relative_pose_priors, adasfm_gravity,
 // adasfm_position_priors, adasfm_gyroscope_bias, adasfm_length_drift,
-// adasfm_wheel_scale, adasfm_inertial_motions and adasfm_rig_cameras in a
-// COLMAP database (docs/reference/formats.md). Older databases may lack the
-// last six; their values are then absent.
+// adasfm_wheel_scale, adasfm_time_shift_effects, adasfm_inertial_motions and
+// adasfm_rig_cameras in a COLMAP database (docs/reference/formats.md). Older
+// databases may lack the last seven; their values are then absent.
 
 struct ImageTimeRow {
   image_t image_id = kInvalidImageId;

@@ -130,6 +130,53 @@ void ReadPriors(const ImageNames& names, SqliteConnection* database,
   SortByChain(times, &loaded->tables.priors);
 }
 
+struct TimeShiftEffect {
+  Eigen::Vector3d rotation, translation, delta_velocity, delta_position;
+};
+
+TimeShiftEffect EffectFromRow(const SqliteStatement& statement) {
+  const std::string row = "table adasfm_time_shift_effects, images " +
+                          statement.Text(0) + " and " + statement.Text(1);
+  TimeShiftEffect effect;
+  int column = 2;
+  for (Eigen::Vector3d* vector :
+       {&effect.rotation, &effect.translation, &effect.delta_velocity,
+        &effect.delta_position}) {
+    DoublesFromBlob(statement, column++, row, 3, vector->data());
+    if (!vector->allFinite())
+      throw SqliteError(row + ": values that are no rates");
+  }
+  return effect;
+}
+
+// After priors and inertial motions; rows of other pairs count for nothing.
+void ReadTimeShiftEffects(const ImageNames& names, SqliteConnection* database,
+                          PriorTables* tables) {
+  if (!database->HasTable("adasfm_time_shift_effects")) return;
+  std::map<std::pair<image_t, image_t>, TimeShiftEffect> effects;
+  SqliteStatement statement(
+      database,
+      "SELECT name1, name2, rotation, translation, delta_velocity, "
+      "delta_position FROM adasfm_time_shift_effects");
+  while (statement.Step()) {
+    const auto pair = names.Ids(statement);
+    if (pair) effects[*pair] = EffectFromRow(statement);
+  }
+  for (RelativePosePrior& prior : tables->priors) {
+    const auto found = effects.find({prior.image_id1, prior.image_id2});
+    if (found == effects.end()) continue;
+    prior.rotation_by_time_shift = found->second.rotation;
+    prior.translation_by_time_shift = found->second.translation;
+  }
+  for (InertialMotion& motion : tables->inertial_motions) {
+    const auto found = effects.find({motion.image_id1, motion.image_id2});
+    if (found == effects.end()) continue;
+    motion.velocity_by_time_shift = found->second.delta_velocity;
+    motion.position_by_time_shift = found->second.delta_position;
+    motion.translation_by_time_shift = found->second.translation;
+  }
+}
+
 void ReadGravity(const ImageNames& names, SqliteConnection* database,
                  LoadedPriorTables* loaded) {
   if (!database->HasTable("adasfm_gravity")) return;
@@ -284,6 +331,7 @@ LoadedPriorTables ReadPriorTables(SqliteConnection* database) {
   ReadWheelScale(database, &loaded.tables);
   loaded.tables.inertial_motions =
       ReadInertialMotions(names, database, &loaded.num_ignored_rows);
+  ReadTimeShiftEffects(names, database, &loaded.tables);
   ReadPositionOrigin(database, &loaded.tables);
   return loaded;
 }

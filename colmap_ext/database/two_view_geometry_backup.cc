@@ -259,12 +259,10 @@ void RemoveRows(const std::vector<ImagePair>& pairs,
 
 }  // namespace
 
-Status RewriteTwoViewGeometries(
-    const std::string& database_path,
-    const std::vector<NewTwoViewGeometry>& rows,
-    const std::vector<ImagePair>& removed,
-    const std::map<camera_t, Eigen::Quaterniond>& camera_imu_corrections,
-    const std::vector<InertialLength>& lengths) {
+Status RewriteTwoViewGeometries(const std::string& database_path,
+                                const std::vector<NewTwoViewGeometry>& rows,
+                                const std::vector<ImagePair>& removed,
+                                const PriorCorrections& corrections) {
   const Status checked = CheckDatabase(database_path);
   if (!checked.ok()) return checked;
   std::vector<ImagePair> pairs = removed;
@@ -279,7 +277,7 @@ Status RewriteTwoViewGeometries(
     RemoveRows(removed, &database);
     WriteTwoViewGeometries(&database, rows);
     RecordDigests(rows, &database);
-    WritePriorCorrections(camera_imu_corrections, lengths, &database);
+    WritePriorCorrections(corrections, &database);
     transaction.Commit();
   } catch (const SqliteError& error) {
     return Status::Error("cannot rewrite the two-view geometries of " +

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <Eigen/Geometry>
-#include <map>
 #include <string>
 #include <vector>
 
@@ -24,12 +22,10 @@ namespace adasfm {
 // `removed`, and writes the corrections of priors, all in one transaction.
 // First restores what an earlier call replaced, so that calling twice equals
 // calling once. On error nothing has changed.
-Status RewriteTwoViewGeometries(
-    const std::string& database_path,
-    const std::vector<NewTwoViewGeometry>& rows,
-    const std::vector<ImagePair>& removed,
-    const std::map<camera_t, Eigen::Quaterniond>& camera_imu_corrections = {},
-    const std::vector<InertialLength>& lengths = {});
+Status RewriteTwoViewGeometries(const std::string& database_path,
+                                const std::vector<NewTwoViewGeometry>& rows,
+                                const std::vector<ImagePair>& removed,
+                                const PriorCorrections& corrections = {});
 
 struct RestoreSummary {
   int num_restored = 0;

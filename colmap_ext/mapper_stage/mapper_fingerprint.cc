@@ -48,6 +48,7 @@ void AddMotions(const SceneData& data, Hash* hash) {
     hash->Add(prior.cam2_from_cam1);
     hash->AddMatrix(prior.covariance);
     hash->Add(prior.flags);
+    hash->AddMatrix(prior.rotation_by_time_shift);
   }
   for (const InertialMotion& motion : data.inertial_motions) {
     hash->Add(motion.image_id1);
@@ -57,6 +58,8 @@ void AddMotions(const SceneData& data, Hash* hash) {
     hash->AddMatrix(motion.delta_position);
     hash->AddMatrix(motion.velocity_by_bias);
     hash->AddMatrix(motion.position_by_bias);
+    hash->AddMatrix(motion.velocity_by_time_shift);
+    hash->AddMatrix(motion.position_by_time_shift);
     hash->AddMatrix(motion.camera_from_imu_origin);
     if (!motion.by_wheels) continue;
     hash->AddMatrix(motion.by_wheels->translation);

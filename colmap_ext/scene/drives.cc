@@ -73,28 +73,17 @@ CameraImuCorrectionMap Inverted(CameraImuCorrectionMap corrections) {
   return corrections;
 }
 
-std::map<camera_t, Eigen::Quaterniond> CorrectionsByCamera(
-    const SceneData& scene, const CameraImuCorrectionMap& corrections) {
-  std::map<camera_t, Eigen::Quaterniond> by_camera;
-  for (const auto& [image_id, image] : scene.images) {
-    const auto found = corrections.find(image.drive);
-    if (found == corrections.end()) continue;
-    by_camera.emplace(image.camera_id, found->second);
+void AddTimeShifts(const TimeShiftMap& shifts,
+                   std::vector<RelativePosePrior>* priors,
+                   std::vector<InertialMotion>* motions) {
+  for (RelativePosePrior& prior : *priors) {
+    const auto found = shifts.find(prior.drive);
+    if (found != shifts.end()) AddTimeShift(found->second, &prior);
   }
-  return by_camera;
-}
-
-CameraImuCorrectionMap CorrectionsByDrive(
-    const SceneData& scene,
-    const std::map<camera_t, Eigen::Quaterniond>& corrections) {
-  CameraImuCorrectionMap by_drive;
-  for (const auto& [image_id, image] : scene.images) {
-    const auto found = corrections.find(image.camera_id);
-    if (found != corrections.end() && image.drive >= 0) {
-      by_drive.emplace(image.drive, found->second);
-    }
+  for (InertialMotion& motion : *motions) {
+    const auto found = shifts.find(motion.drive);
+    if (found != shifts.end()) AddTimeShift(found->second, &motion);
   }
-  return by_drive;
 }
 
 }  // namespace adasfm

@@ -13,6 +13,9 @@ namespace adasfm {
 // the one that T_cam_imu states; none where T_cam_imu is right.
 using CameraImuCorrectionMap = std::map<int, Eigen::Quaterniond>;
 
+// By drive: what timeshift_cam_imu lacks, s.
+using TimeShiftMap = std::map<int, double>;
+
 // Sets the drives of the scene's images, priors and inertial motions. Images
 // that priors connect are of one drive, and so are those of one camera or rig:
 // gaps in a log do not change the machine. Numbers follow the order of the
@@ -25,12 +28,35 @@ void RotatePriors(const CameraImuCorrectionMap& corrections,
 void RotateGravityAndMotions(const CameraImuCorrectionMap& corrections,
                              SceneData* scene);
 CameraImuCorrectionMap Inverted(CameraImuCorrectionMap corrections);
+// Corrects priors and inertial motions.
+void AddTimeShifts(const TimeShiftMap& shifts,
+                   std::vector<RelativePosePrior>* priors,
+                   std::vector<InertialMotion>* motions);
 
-// The same by camera, as the database has them, and back.
-std::map<camera_t, Eigen::Quaterniond> CorrectionsByCamera(
-    const SceneData& scene, const CameraImuCorrectionMap& corrections);
-CameraImuCorrectionMap CorrectionsByDrive(
-    const SceneData& scene,
-    const std::map<camera_t, Eigen::Quaterniond>& corrections);
+// Corrections by camera, as the database has them, and back.
+template <typename Correction>
+std::map<camera_t, Correction> CorrectionsByCamera(
+    const SceneData& scene, const std::map<int, Correction>& corrections) {
+  std::map<camera_t, Correction> by_camera;
+  for (const auto& [image_id, image] : scene.images) {
+    const auto found = corrections.find(image.drive);
+    if (found == corrections.end()) continue;
+    by_camera.emplace(image.camera_id, found->second);
+  }
+  return by_camera;
+}
+
+template <typename Correction>
+std::map<int, Correction> CorrectionsByDrive(
+    const SceneData& scene, const std::map<camera_t, Correction>& corrections) {
+  std::map<int, Correction> by_drive;
+  for (const auto& [image_id, image] : scene.images) {
+    const auto found = corrections.find(image.camera_id);
+    if (found != corrections.end() && image.drive >= 0) {
+      by_drive.emplace(image.drive, found->second);
+    }
+  }
+  return by_drive;
+}
 
 }  // namespace adasfm

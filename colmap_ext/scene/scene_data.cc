@@ -68,6 +68,8 @@ void ReadScenePriors(SqliteConnection* database,
   if (!options.use_original_two_view_geometries) {
     const CameraImuCorrectionMap corrections =
         CorrectionsByDrive(*scene, ReadCameraImuCorrections(database));
+    AddTimeShifts(CorrectionsByDrive(*scene, ReadTimeShifts(database)),
+                  &scene->priors, &scene->inertial_motions);
     RotatePriors(corrections, &scene->priors);
     RotateGravityAndMotions(corrections, scene);
     scene->inertial_scale_sigma =

@@ -28,6 +28,20 @@ class ChainTest : public CommandLineTest {
     return run;
   }
 
+  // A calibration whose timeshift_cam_imu is wrong by shift_s.
+  void ShiftTheClock(double shift_s) {
+    const std::string key = "timeshift_cam_imu:";
+    std::string text = ReadBytes(folder_.File("sensors.yaml"));
+    const size_t begin = text.find(key);
+    ASSERT_NE(begin, std::string::npos);
+    const size_t value = begin + key.size();
+    const size_t length = text.find('\n', value) - value;
+    text.replace(
+        value, length,
+        " " + std::to_string(std::stod(text.substr(value, length)) + shift_s));
+    folder_.Write("sensors.yaml", text);
+  }
+
   void Import() {
     ExpectSuccess("adasfm_prior_importer --database_path " + database_ +
                   " --image_times_path " + folder_.File("times.csv") +
@@ -139,6 +153,31 @@ TEST_F(ChainTest, AliasedDriveWithBlackoutEndsInOneMetricModel) {
   const auto summary =
       nlohmann::json::parse(ReadBytes(folder_.File("sparse/summary.json")));
   EXPECT_FALSE(summary.empty());
+}
+
+// Below 10 ms the import leaves the clock as stated. The coarse model finds the
+// error to a millisecond, and the model is as good as one with the true clock.
+TEST_F(ChainTest, AClockThatIsAFewMillisecondsOffIsFound) {
+  double error_with_true_clock = 0.0;
+  for (const double shift_s : {0.0, 0.008, -0.008}) {
+    Make("--num_images 160 --seed 3");
+    ShiftTheClock(shift_s);
+    Import();
+    ExpectSuccess(GlobalArguments());
+    ExpectSuccess(MapperArguments());
+    const auto shifts = nlohmann::json::parse(
+        ReadBytes(folder_.File("global/summary.json")))["time_shifts"];
+    const double error =
+        Evaluate("sparse/0")["sim3_least_squares"]["translation_rmse_m"];
+    if (shift_s == 0.0) {
+      EXPECT_TRUE(shifts.empty());
+      error_with_true_clock = error;
+    } else {
+      EXPECT_LT(error, 1.1 * error_with_true_clock);
+      ASSERT_EQ(shifts.size(), 1);
+      EXPECT_NEAR(shifts[0]["shift_s"], -shift_s, 1e-3);
+    }
+  }
 }
 
 // Each floor is aliased with the next, 3 m above after 200 m of ramp: a climb

@@ -117,6 +117,9 @@ TEST_P(PosePriorCostTest, JacobiansBySharedErrorsEqualNumericOnes) {
     edge.dt_s = 0.3;
     edge.windows.length_per_direction = 0.5 * (seed % 3);
     edge.windows.has_length_scale = seed % 2 == 1;
+    if (seed % 2 == 1) {
+      edge.windows.rotation_by_time_shift = random.GaussianVector(0.3);
+    }
     const PosePriorCost cost(edge, GetParam(), 1.0, &pose1, &pose2);
     Eigen::Vector3d shared[] = {random.GaussianVector(0.1),
                                 random.GaussianVector(0.1),
@@ -145,8 +148,14 @@ TEST_P(PosePriorCostTest, SharedErrorsAreThoseThatCorrectTakesOut) {
     edge.dt_s = 0.3;
     edge.windows.length_per_direction = 0.5 * (seed % 3);
     edge.windows.has_length_scale = seed % 2 == 1;
+    if (seed % 2 == 1) {
+      edge.windows.rotation_by_time_shift = random.GaussianVector(0.3);
+    }
     SharedErrors errors;
-    if (seed % 2 == 1) errors.length_scale[0] = random.Gaussian(1e-3);
+    if (seed % 2 == 1) {
+      errors.length_scale[0] = random.Gaussian(1e-3);
+      errors.time_shift[0] = random.Gaussian(5e-3);
+    }
     errors.gyroscope_bias[0] = random.GaussianVector(1e-3);
     errors.extrinsic_rotation[0] = random.GaussianVector(1e-3);
     errors.driving_direction[0] = random.GaussianVector(1e-3);
@@ -163,6 +172,9 @@ TEST_P(PosePriorCostTest, SharedErrorsAreThoseThatCorrectTakesOut) {
     if (is_rotation) {
       parameters.push_back(errors.extrinsic_rotation.at(0).data());
       parameters.push_back(errors.gyroscope_bias.at(0).data());
+      if (parameters.size() < cost.parameter_block_sizes().size()) {
+        parameters.push_back(&errors.time_shift.at(0));
+      }
     } else {
       if (!is_length) {
         parameters.push_back(errors.driving_direction.at(0).data());

@@ -68,8 +68,7 @@ class PriorCorrectionsTest : public testing::Test {
   PriorTables tables_;
   const Eigen::Quaterniond correction_ =
       ExpSo3(Eigen::Vector3d(0.01, -0.03, 0.02));
-  const std::map<camera_t, Eigen::Quaterniond> corrections_ = {
-      {1, correction_}};
+  const PriorCorrections corrections_ = {{{1, correction_}}, {}, {}};
   Priors corrected_;
 };
 
@@ -150,6 +149,57 @@ TEST_F(PriorCorrectionsTest, TurnGravityToo) {
   EXPECT_EQ(gravity(false), Eigen::Vector3d::UnitY());
 }
 
+// A clock that is off: rotations, translations and inertial motions follow to
+// first order, in the frame of a rotated camera, too.
+TEST_F(PriorCorrectionsTest, ShiftTheTime) {
+  constexpr double kShiftS = 0.007;
+  for (size_t k = 0; k < tables_.priors.size(); ++k) {
+    RelativePosePrior& prior = tables_.priors[k];
+    prior.rotation_by_time_shift << 0.1, -0.2, 0.05 * (k + 1);
+    prior.translation_by_time_shift << 1.0, 2.0, -3.0;
+    InertialMotion motion;
+    motion.image_id1 = prior.image_id1;
+    motion.image_id2 = prior.image_id2;
+    motion.dt_s = 0.1;
+    motion.velocity_by_time_shift << -4.0, 5.0, 6.0;
+    motion.position_by_time_shift << 0.7, 0.8, -0.9;
+    motion.by_wheels = MeasuredTranslation();
+    tables_.inertial_motions.push_back(motion);
+  }
+  ASSERT_TRUE(WritePriorTables(path_, tables_).ok());
+  PriorCorrections corrections = corrections_;
+  corrections.time_shift_s[1] = kShiftS;
+  ASSERT_TRUE(RewriteTwoViewGeometries(path_, {}, {}, corrections).ok());
+  Priors expected = tables_.priors;
+  for (RelativePosePrior& prior : expected) {
+    Rigid3d& motion = prior.cam2_from_cam1;
+    motion.rotation =
+        ExpSo3(kShiftS * prior.rotation_by_time_shift) * motion.rotation;
+    motion.translation += kShiftS * prior.translation_by_time_shift;
+    RotatePrior(correction_, &prior);
+  }
+  ExpectPriors(Read(), expected);
+  ExpectPriors(Read(true), tables_.priors);
+  const StatusOr<SceneData> scene = ReadSceneData(path_, SceneDataOptions());
+  ASSERT_TRUE(scene.ok());
+  ASSERT_EQ(scene->inertial_motions.size(), tables_.priors.size());
+  const InertialMotion& motion = scene->inertial_motions.front();
+  const auto expect_vector = [&](const Eigen::Vector3d& actual, double x,
+                                 double y, double z) {
+    EXPECT_LT(
+        (actual - kShiftS * (correction_ * Eigen::Vector3d(x, y, z))).norm(),
+        1e-12);
+  };
+  expect_vector(motion.delta_velocity, -4.0, 5.0, 6.0);
+  expect_vector(motion.delta_position, 0.7, 0.8, -0.9);
+  expect_vector(motion.by_wheels->translation, 1.0, 2.0, -3.0);
+  SqliteConnection(path_, SqliteConnection::Mode::kWrite)
+      .Execute("UPDATE adasfm_time_shifts SET shift_s = 9e999");
+  EXPECT_FALSE(ReadSceneData(path_, SceneDataOptions()).ok());
+  EXPECT_TRUE(RestoreTwoViewGeometries(path_)->priors_restored);
+  ExpectPriors(Read(), tables_.priors);
+}
+
 // Priors of an IMU without wheels, except for the last one.
 class InertialLengthsTest : public PriorCorrectionsTest {
  protected:
@@ -176,9 +226,9 @@ class InertialLengthsTest : public PriorCorrectionsTest {
     return bridge;
   }
 
-  Status Rewrite(
-      const std::map<camera_t, Eigen::Quaterniond>& corrections = {}) const {
-    return RewriteTwoViewGeometries(path_, {}, {}, corrections, lengths_);
+  Status Rewrite(PriorCorrections corrections = {}) const {
+    corrections.lengths = lengths_;
+    return RewriteTwoViewGeometries(path_, {}, {}, corrections);
   }
 
   // Whether the priors have the inertial lengths.

@@ -64,6 +64,13 @@ class PriorTablesTest : public testing::Test {
       motion.velocity_by_bias = root.topRightCorner<3, 3>();
       motion.position_by_bias = root.bottomLeftCorner<3, 3>();
       motion.camera_from_imu_origin = random.GaussianVector(0.2);
+      tables.priors.back().rotation_by_time_shift = random.GaussianVector(0.1);
+      tables.priors.back().translation_by_time_shift =
+          random.GaussianVector(1.0);
+      motion.velocity_by_time_shift = random.GaussianVector(1.0);
+      motion.position_by_time_shift = random.GaussianVector(1.0);
+      motion.translation_by_time_shift =
+          tables.priors.back().translation_by_time_shift;
       if (tables.inertial_motions.size() % 2 == 0) {
         motion.by_wheels =
             MeasuredTranslation{random.GaussianVector(1.0),
@@ -115,6 +122,10 @@ void ExpectEqual(const PriorTables& a, const PriorTables& b) {
     EXPECT_EQ(a.priors[i].dt_ns, b.priors[i].dt_ns);
     EXPECT_EQ(a.priors[i].flags, b.priors[i].flags);
     EXPECT_EQ(a.priors[i].covariance, b.priors[i].covariance);
+    EXPECT_EQ(a.priors[i].rotation_by_time_shift,
+              b.priors[i].rotation_by_time_shift);
+    EXPECT_EQ(a.priors[i].translation_by_time_shift,
+              b.priors[i].translation_by_time_shift);
     EXPECT_EQ(a.priors[i].cam2_from_cam1.translation,
               b.priors[i].cam2_from_cam1.translation);
     EXPECT_LT((a.priors[i].cam2_from_cam1.rotation.coeffs() -
@@ -219,8 +230,9 @@ TEST_F(PriorTablesTest, RemovesAllThatItWrote) {
   ASSERT_TRUE(WritePriorTables(path_, tables).ok());
   SqliteConnection database(path_, SqliteConnection::Mode::kWrite);
   WritePriorCorrections(
-      {{1, Eigen::Quaterniond::Identity()}},
-      {{tables.priors[0].image_id1, tables.priors[0].image_id2, 1.0}},
+      {{{1, Eigen::Quaterniond::Identity()}},
+       {{1, 0.004}},
+       {{tables.priors[0].image_id1, tables.priors[0].image_id2, 1.0}}},
       &database);
   RemovePriorTables(&database);
   SqliteStatement names(&database,
@@ -249,6 +261,24 @@ TEST_F(PriorTablesTest, DatabasesWithoutSharedErrorsAreRead) {
   ASSERT_TRUE(WritePriorTables(path_, tables).ok());
   loaded = ReadPriorTables(path_);
   ASSERT_TRUE(loaded.ok());
+  ExpectEqual(loaded->tables, tables);
+}
+
+// Databases written before the clock was an unknown, or without an IMU.
+TEST_F(PriorTablesTest, DatabasesWithoutTimeShiftEffectsAreRead) {
+  PriorTables tables = MakeTables(1);
+  ASSERT_TRUE(WritePriorTables(path_, tables).ok());
+  Execute("DROP TABLE adasfm_time_shift_effects;");
+  const Eigen::Vector3d zero = Eigen::Vector3d::Zero();
+  for (RelativePosePrior& prior : tables.priors) {
+    prior.rotation_by_time_shift = prior.translation_by_time_shift = zero;
+  }
+  for (InertialMotion& motion : tables.inertial_motions) {
+    motion.velocity_by_time_shift = motion.position_by_time_shift =
+        motion.translation_by_time_shift = zero;
+  }
+  const StatusOr<LoadedPriorTables> loaded = ReadPriorTables(path_);
+  ASSERT_TRUE(loaded.ok()) << loaded.status().message();
   ExpectEqual(loaded->tables, tables);
 }
 
@@ -385,6 +415,9 @@ TEST_F(PriorTablesTest, RefusesRowsItCouldNotHaveWritten) {
       "UPDATE adasfm_length_drift SET sigma_ratio = -0.01;",
       "UPDATE adasfm_wheel_scale SET scale = 0.0;",
       "UPDATE adasfm_wheel_scale SET stated_sigma = 9e999;",
+      "UPDATE adasfm_time_shift_effects SET rotation = zeroblob(23);",
+      "UPDATE adasfm_time_shift_effects SET delta_position = "
+      "X'FFFFFFFFFFFFFFFFFFFFFFFFFFFFFFFFFFFFFFFFFFFFFFFF';",
       "UPDATE adasfm_inertial_motions SET dt_s = 0.0;",
       "UPDATE adasfm_inertial_motions SET dt_s = 9e999;",
       "UPDATE adasfm_inertial_motions SET delta_velocity = zeroblob(23);",
