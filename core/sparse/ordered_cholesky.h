@@ -42,6 +42,16 @@ class OrderedCholesky
     CheckMemory();
   }
 
+  // After a factorisation that succeeded. Throws where memory is short, too:
+  // Eigen's returns numbers that were never set.
+  template <typename Right>
+  typename Right::PlainObject solve(
+      const Eigen::MatrixBase<Right>& right_side) const {
+    typename Right::PlainObject solution = Base::solve(right_side);
+    if (Base::info() != Eigen::Success) throw std::bad_alloc();
+    return solution;
+  }
+
   // Eigen's would call its own two.
   void compute(const Eigen::SparseMatrix<double>& matrix) = delete;
 
