@@ -2,13 +2,11 @@
 #include "colmap_ext/coarse/global_stage.h"
 
 #include <algorithm>
-#include <cmath>
-#include <iomanip>
-#include <iterator>
 #include <set>
 #include <sstream>
 #include <stdexcept>
 
+#include "colmap_ext/coarse/find_time_shifts.h"
 #include "colmap_ext/coarse/join_models.h"
 #include "colmap_ext/coarse/measure_size.h"
 #include "colmap_ext/coarse/model_input.h"
@@ -83,24 +81,6 @@ std::map<image_t, Rigid3d> PosesHeldByPoints(
     }
   }
   return poses;
-}
-
-// What timeshift_cam_imu lacks, by drive, as the last adjustment of the largest
-// model with its images found it.
-TimeShiftMap FindTimeShifts(const std::vector<CoarseModel>& models) {
-  // Less changes nothing, since the adjustments have the same unknown.
-  constexpr double kMinShiftS = 1e-3;
-  TimeShiftMap shifts;
-  for (const CoarseModel& model : models) {
-    if (model.rounds.empty() || !model.rounds.back().success) continue;
-    const SharedErrors& errors = model.rounds.back().shared_errors;
-    shifts.insert(errors.time_shift.begin(), errors.time_shift.end());
-  }
-  for (auto shift = shifts.begin(); shift != shifts.end();) {
-    shift = std::abs(shift->second) < kMinShiftS ? shifts.erase(shift)
-                                                 : std::next(shift);
-  }
-  return shifts;
 }
 
 size_t NumImagesOfLargest(const GlobalStageResult& result) {
@@ -200,16 +180,6 @@ std::string DescribeMatches(const GlobalStageResult& result) {
        << result.geometries.size() << " pairs, " << result.removed_pairs.size()
        << " pairs removed, " << result.refinement.num_skipped_pairs
        << " left as they were";
-  return text.str();
-}
-
-std::string DescribeTimeShifts(const TimeShiftMap& shifts) {
-  std::ostringstream text;
-  text << std::fixed << std::setprecision(4) << std::showpos;
-  for (const auto& [drive, shift_s] : shifts) {
-    text << (text.tellp() > 0 ? ", " : "") << shift_s << " s";
-  }
-  text << " added to timeshift_cam_imu";
   return text.str();
 }
 
