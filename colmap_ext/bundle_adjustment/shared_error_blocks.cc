@@ -31,6 +31,8 @@ std::vector<double*> SharedErrorBlocks::ParametersOf(const PosePriorEdge& edge,
   if (term == PosePriorCost::Term::kRotation) {
     std::vector<double*> parameters = {
         use(windows.drive, &extrinsic_rotation_),
+        use(windows.drive, &gyroscope_scale_),
+        use(windows.drive, &gyroscope_misalignment_),
         use(windows.gyroscope, &gyroscope_bias_)};
     if (parameters.size() < num_shared) {
       parameters.push_back(&time_shift_[windows.drive]);
@@ -87,6 +89,13 @@ double* SharedErrorBlocks::ExtrinsicRotation(int drive,
 void SharedErrorBlocks::AddPriors(ceres::Problem* problem) {
   for (auto& [key, block] : extrinsic_rotation_) {
     AddPrior(options_.extrinsic_rotation_sigma_rad, &block, problem);
+  }
+  // Of data sheets of small gyroscopes, each entry of the matrix.
+  constexpr double kGyroscopeScaleSigma = 0.01;
+  for (Blocks* blocks : {&gyroscope_scale_, &gyroscope_misalignment_}) {
+    for (auto& [key, block] : *blocks) {
+      AddPrior(kGyroscopeScaleSigma, &block, problem);
+    }
   }
   for (auto& [key, block] : driving_direction_) {
     AddPrior(options_.driving_direction_sigma_rad, &block, problem);
@@ -182,8 +191,9 @@ void SharedErrorBlocks::AddSumPrior(double sigma, std::vector<double> weights,
 
 std::vector<double*> SharedErrorBlocks::Used() {
   std::vector<double*> used;
-  for (Blocks* blocks : {&extrinsic_rotation_, &driving_direction_,
-                         &gyroscope_bias_, &direction_drift_}) {
+  for (Blocks* blocks :
+       {&extrinsic_rotation_, &gyroscope_scale_, &gyroscope_misalignment_,
+        &driving_direction_, &gyroscope_bias_, &direction_drift_}) {
     for (auto& [key, block] : *blocks) used.push_back(block.values);
   }
   for (auto& [drive, scale] : length_scale_) used.push_back(&scale.value);
@@ -201,6 +211,8 @@ SharedErrors SharedErrorBlocks::Estimated() const {
   };
   SharedErrors errors;
   errors.extrinsic_rotation = values_of(extrinsic_rotation_);
+  errors.gyroscope_scale = values_of(gyroscope_scale_);
+  errors.gyroscope_misalignment = values_of(gyroscope_misalignment_);
   errors.driving_direction = values_of(driving_direction_);
   errors.gyroscope_bias = values_of(gyroscope_bias_);
   errors.direction_drift = values_of(direction_drift_);

@@ -13,11 +13,15 @@ namespace {
 // Calibrations of one camera differ by some tenths of a per cent.
 constexpr double kMinRatio = 0.003;
 // Priors share errors from step to step, which the cost's change does not show.
-// Against a measured focal length many sigmas are needed, and the sigma is
-// never less than kMinSigma.
+// Against a measured focal length many sigmas are needed. Scales of the
+// gyroscope pass for up to kMinSigma of focal length
+// (docs/reference/global.md).
 constexpr double kMinNumSigmas = 10.0;
 constexpr double kMinNumSigmasOfUnknown = 3.0;
-constexpr double kMinSigma = 0.001;
+constexpr double kMinSigma = 0.0025;
+// Single units of the costs' difference count, so adjustments have to converge
+// closer than elsewhere.
+constexpr double kFunctionTolerance = 1e-7;
 // Straight on, such errors pass for 8 % of focal length; turns separate them.
 constexpr double kMinTurnDeg = 20.0;
 // One focal length needs no more, and the time stays bounded.
@@ -92,7 +96,7 @@ bool HasPriorFocalLengths(const std::set<camera_t>& constant_cameras,
 }  // namespace
 
 std::optional<FocalLengthError> FindFocalLengthError(
-    const PriorBundleAdjustmentOptions& options,
+    const PriorBundleAdjustmentOptions& given_options,
     const PriorBundleAdjustmentProblem& whole_problem,
     const colmap::Reconstruction& reconstruction) {
   const PriorBundleAdjustmentProblem problem = SelectImages(whole_problem);
@@ -102,6 +106,8 @@ std::optional<FocalLengthError> FindFocalLengthError(
   // In the course of adjustments wrong points fall behind their cameras, or
   // away from them. Two costs are comparable only where the same points have.
   // So the given lens is adjusted once more, after the free one.
+  PriorBundleAdjustmentOptions options = given_options;
+  options.function_tolerance = kFunctionTolerance;
   colmap::Reconstruction free = reconstruction;
   AdjustBundle(options, problem, &free);
   PriorBundleAdjustmentOptions free_options = options;

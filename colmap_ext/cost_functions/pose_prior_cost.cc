@@ -114,8 +114,11 @@ PosePriorCost::PosePriorCost(const PosePriorEdge& edge, Term term,
                                             direction_.transpose() *
                                             from_middle;
     if (term == Term::kRotation) {
+      const Eigen::Vector3d angles = LogSo3(rotation_);
       from_shared_ = {inverse_sigma_ * (Eigen::Matrix3d::Identity() -
                                         rotation_.toRotationMatrix()),
+                      inverse_sigma_ * Eigen::Matrix3d(angles.asDiagonal()),
+                      inverse_sigma_ * FromGyroscopeMisalignment(angles),
                       inverse_sigma_ * edge.dt_s * from_middle};
     } else if (term == Term::kTranslation) {
       from_shared_ = {
@@ -149,7 +152,7 @@ PosePriorCost::PosePriorCost(const PosePriorEdge& edge, Term term,
 
 bool PosePriorCost::Evaluate(double const* const* parameters, double* residuals,
                              double** jacobians) const {
-  double* no_jacobians[5] = {};
+  double* no_jacobians[7] = {};
   if (jacobians == nullptr) jacobians = no_jacobians;
   if (term_ == Term::kRotation) {
     EvaluateRotation(residuals, jacobians);

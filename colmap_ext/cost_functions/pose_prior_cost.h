@@ -31,7 +31,8 @@ Eigen::Vector2d DirectionError(const Eigen::Vector3d& vector,
 //   kTranslation: (t - t^) / sigma       3 residuals
 // Parameters: AdjustedPose::parameters of image 1 (6) and of image 2 (6), then,
 // when errors that all priors share affect the edge (shared_errors.h),
-//   kRotation: extrinsic_rotation (3), gyroscope_bias of the window (3)
+//   kRotation: extrinsic_rotation (3), gyroscope_scale (3),
+//     gyroscope_misalignment (3), gyroscope_bias of the window (3)
 //   kDirection, kTranslation: driving_direction (3), direction_drift (3)
 //   kLength: direction_drift (3), where length_per_direction > 0
 //   kLength, kTranslation: length_scale (1), last, where has_length_scale

@@ -23,6 +23,12 @@ Eigen::Matrix3d CameraFromMiddle(const Eigen::Quaterniond& cam2_from_cam1) {
   return ExpSo3(0.5 * LogSo3(cam2_from_cam1)).toRotationMatrix();
 }
 
+Eigen::Matrix3d FromGyroscopeMisalignment(const Eigen::Vector3d& w) {
+  Eigen::Matrix3d matrix;
+  matrix << 0.0, w.z(), w.y(), w.z(), 0.0, w.x(), w.y(), w.x(), 0.0;
+  return matrix;
+}
+
 namespace {
 
 template <typename Value>
@@ -41,8 +47,12 @@ Rigid3d SharedErrors::Correct(const Rigid3d& cam2_from_cam1, double dt_s,
   const Eigen::Vector3d zero = Eigen::Vector3d::Zero();
   const Eigen::Vector3d extrinsic =
       ValueOr(zero, extrinsic_rotation, windows.drive);
+  const Eigen::Vector3d angles = LogSo3(rotation);
   const Eigen::Vector3d error =
       extrinsic - rotation * extrinsic +
+      angles.cwiseProduct(ValueOr(zero, gyroscope_scale, windows.drive)) +
+      FromGyroscopeMisalignment(angles) *
+          ValueOr(zero, gyroscope_misalignment, windows.drive) +
       dt_s * (from_middle * ValueOr(zero, gyroscope_bias, windows.gyroscope)) +
       ValueOr(0.0, time_shift, windows.drive) * windows.rotation_by_time_shift;
   const Eigen::Vector3d drift =

@@ -121,13 +121,13 @@ TEST_P(PosePriorCostTest, JacobiansBySharedErrorsEqualNumericOnes) {
       edge.windows.rotation_by_time_shift = random.GaussianVector(0.3);
     }
     const PosePriorCost cost(edge, GetParam(), 1.0, &pose1, &pose2);
-    Eigen::Vector3d shared[] = {random.GaussianVector(0.1),
-                                random.GaussianVector(0.1),
-                                random.GaussianVector(0.1)};
-    std::vector<double*> parameters = {pose1.parameters, pose2.parameters,
-                                       shared[0].data(), shared[1].data(),
-                                       shared[2].data()};
-    parameters.resize(cost.parameter_block_sizes().size());
+    std::vector<Eigen::Vector3d> shared(cost.parameter_block_sizes().size() -
+                                        2);
+    std::vector<double*> parameters = {pose1.parameters, pose2.parameters};
+    for (Eigen::Vector3d& values : shared) {
+      values = random.GaussianVector(0.1);
+      parameters.push_back(values.data());
+    }
     const auto changed = [&] {
       pose1.Update();
       pose2.Update();
@@ -158,6 +158,8 @@ TEST_P(PosePriorCostTest, SharedErrorsAreThoseThatCorrectTakesOut) {
     }
     errors.gyroscope_bias[0] = random.GaussianVector(1e-3);
     errors.extrinsic_rotation[0] = random.GaussianVector(1e-3);
+    errors.gyroscope_scale[0] = random.GaussianVector(1e-3);
+    errors.gyroscope_misalignment[0] = random.GaussianVector(1e-3);
     errors.driving_direction[0] = random.GaussianVector(1e-3);
     errors.direction_drift[0] = random.GaussianVector(1e-3);
     AdjustedPose pose1 = RandomPose(&random);
@@ -171,6 +173,8 @@ TEST_P(PosePriorCostTest, SharedErrorsAreThoseThatCorrectTakesOut) {
                                              pose2.parameters};
     if (is_rotation) {
       parameters.push_back(errors.extrinsic_rotation.at(0).data());
+      parameters.push_back(errors.gyroscope_scale.at(0).data());
+      parameters.push_back(errors.gyroscope_misalignment.at(0).data());
       parameters.push_back(errors.gyroscope_bias.at(0).data());
       if (parameters.size() < cost.parameter_block_sizes().size()) {
         parameters.push_back(&errors.time_shift.at(0));
