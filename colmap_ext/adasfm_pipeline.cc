@@ -164,6 +164,8 @@ Status WriteGlobalResult(const GlobalStageOptions& options,
     corrections.camera_imu = CorrectionsByCamera(
         scene, CameraImuCorrections(result.poses.camera_imu_rotations));
     corrections.time_shift_s = CorrectionsByCamera(scene, result.time_shifts);
+    corrections.gyroscope_scales =
+        CorrectionsByCamera(scene, result.gyroscope_scales);
     corrections.lengths = result.inertial_lengths;
     status = RewriteTwoViewGeometries(database_path, result.geometries,
                                       result.removed_pairs, corrections);

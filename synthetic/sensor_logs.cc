@@ -78,7 +78,7 @@ void SimulateImu(const Drive& drive, double end_s, SyntheticWorld* world) {
     ImuSample sample;
     sample.timestamp_ns = kWorldStartNs + time_ns;
     sample.angular_velocity =
-        state.angular_velocity_in_imu + gyro_bias +
+        (1.0 + options.gyro_scale) * state.angular_velocity_in_imu + gyro_bias +
         random.GaussianVector(noise.gyroscope_noise_density / root_dt);
     sample.specific_force =
         state.world_from_imu.rotation.conjugate() *

@@ -56,6 +56,7 @@ bool SyntheticWorldOptions::IsValid(std::string* error) const {
       .Within(0.0, 0.2, "focal_breathing_ratio", focal_breathing_ratio)
       .Within(0.0, 0.5, "wheel_slip_sigma", wheel_slip_sigma)
       .Within(-1e6, 1e6, "gyro_drift", gyro_drift)
+      .Within(-0.1, 0.1, "gyro_scale", gyro_scale)
       .Within(-1e6, 1e6, "timeshift_cam_imu_s", timeshift_cam_imu_s)
       .Require(num_blackouts <= max_num_blackouts, "num_blackouts",
                num_blackouts,

@@ -106,6 +106,9 @@ struct SyntheticWorldOptions {
   // Growth of the gyroscope's bias about the vertical, rad/s per s. Not part of
   // the calibration.
   double gyro_drift = 0.0;
+  // By this share the gyroscope's rates are too large. Not part of the
+  // calibration.
+  double gyro_scale = 0.0;
   // Positions of a receiver; 0: none. White noise per axis, and intervals of 5
   // s in which they are 15 m off.
   double gnss_rate_hz = 0.0;

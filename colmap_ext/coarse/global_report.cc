@@ -232,6 +232,21 @@ void AppendTimeShiftWarning(const std::string& drive_name, double shift_s,
   warnings->push_back(text.str());
 }
 
+void AppendGyroscopeWarning(const std::string& drive_name,
+                            const Eigen::Matrix3d& scales,
+                            std::vector<std::string>* warnings) {
+  // Small gyroscopes have less.
+  constexpr double kMinScale = 0.02;
+  const double largest = scales.cwiseAbs().maxCoeff();
+  if (largest < kMinScale) return;
+  std::ostringstream text;
+  text << std::fixed << std::setprecision(1) << "the gyroscope ";
+  if (!drive_name.empty()) text << "of the drive from " << drive_name << ' ';
+  text << "errs by up to " << 100.0 * largest
+       << " % of the rates, or the focal length by as much: calibrate them";
+  warnings->push_back(text.str());
+}
+
 void AppendPriorWarnings(const CoarseModel& model,
                          std::vector<std::string>* warnings) {
   std::ostringstream text;
@@ -292,6 +307,15 @@ std::string FormatGlobalReportJson(const SceneData& scene,
   for (const auto& [drive, shift_s] : result.time_shifts) {
     report["time_shifts"].push_back(
         {{"first_image", DriveName(scene, drive)}, {"shift_s", shift_s}});
+  }
+  report["gyroscope_scales"] = Json::array();
+  for (const auto& [drive, scales] : result.gyroscope_scales) {
+    Json rows = Json::array();
+    for (const auto& row : scales.rowwise()) {
+      rows.push_back({row.x(), row.y(), row.z()});
+    }
+    report["gyroscope_scales"].push_back(
+        {{"first_image", DriveName(scene, drive)}, {"scales", rows}});
   }
   report["loop_closures"] = LoopClosuresJson(result.poses.loop_closures);
   report["segment_closures"] =
@@ -365,6 +389,11 @@ std::vector<std::string> ListGlobalWarnings(const SceneData& scene,
     AppendTimeShiftWarning(
         HasSeveralDrives(scene) ? DriveName(scene, drive) : std::string(),
         shift_s, &warnings);
+  }
+  for (const auto& [drive, scales] : result.gyroscope_scales) {
+    AppendGyroscopeWarning(
+        HasSeveralDrives(scene) ? DriveName(scene, drive) : std::string(),
+        scales, &warnings);
   }
   for (const CoarseModel& model : result.models) {
     AppendPriorWarnings(model, &warnings);

@@ -6,7 +6,7 @@
 #include <sstream>
 #include <stdexcept>
 
-#include "colmap_ext/coarse/find_time_shifts.h"
+#include "colmap_ext/coarse/find_sensor_corrections.h"
 #include "colmap_ext/coarse/join_models.h"
 #include "colmap_ext/coarse/measure_size.h"
 #include "colmap_ext/coarse/model_input.h"
@@ -212,6 +212,7 @@ class GlobalStage {
     EstimateModels(scene_.priors);
     if (result_.models.empty()) return NothingHoldsTogether();
     CorrectTimeShifts();
+    CorrectScales();
     EstimateModelsAcrossGaps();
     Join();
     MeasurePairAgreements(options_, scene_, correspondences_.bearings,
@@ -307,6 +308,15 @@ class GlobalStage {
     End("clocks of the cameras", DescribeTimeShifts(result_.time_shifts));
   }
 
+  void CorrectScales() {
+    result_.gyroscope_scales = FindGyroscopeScales(result_.models);
+    if (result_.gyroscope_scales.empty()) return;
+    Begin("scales of the gyroscopes", 0.8);
+    CorrectGyroscopeScales(result_.gyroscope_scales, &result_.poses.priors);
+    End("scales of the gyroscopes",
+        DescribeGyroscopeScales(result_.gyroscope_scales));
+  }
+
   // Estimates the models again where the accelerometer alone gives the metres
   // and the way between parts of a drive: odometry then checks the loop
   // closures between parts, too.
@@ -334,6 +344,7 @@ class GlobalStage {
     result_ = GlobalStageResult();
     result_.focal_lengths = in_parts.focal_lengths;
     result_.time_shifts = in_parts.time_shifts;
+    result_.gyroscope_scales = in_parts.gyroscope_scales;
     result_.steps = in_parts.steps;
     correspondences_.matches = all_matches_;
     EstimateModels(odometry.priors);

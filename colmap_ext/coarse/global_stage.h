@@ -60,6 +60,8 @@ struct GlobalStageResult {
   // What timeshift_cam_imu lacks, where the coarse models show it; the scene's
   // priors and inertial motions are corrected by it.
   TimeShiftMap time_shifts;
+  // Of the gyroscopes, likewise; the priors are corrected by them.
+  GyroscopeScaleMap gyroscope_scales;
   // Covariances of translations across gaps (BridgeGaps), where poses use them.
   std::map<ImagePair, Eigen::Matrix3d> bridges;
   std::vector<CoarseStep> steps;
@@ -81,6 +83,7 @@ using StageProgress = std::function<void(const std::string&, double)>;
 //   2.7      tracks, points, adjustment  BuildCoarseModel, per component
 //            parts that nothing ties     SplitModels, JoinModels
 //            clocks of the cameras       FindTimeShifts
+//            scales of the gyroscopes    FindGyroscopeScales
 //            gaps, then 2.1 to 2.7 anew  BridgeGaps
 //   2.8      match refinement            RefineMatches
 //   2.9      metres without wheels       MeasureSize, per component

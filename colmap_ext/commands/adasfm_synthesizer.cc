@@ -144,6 +144,9 @@ void AddSensorOptions(SyntheticWorldOptions* world, CommandOptions* command) {
   add("gyro_drift", &world->gyro_drift,
       "drift of the gyroscope bias about the vertical, not in sensors.yaml "
       "[rad/s^2]");
+  add("gyro_scale", &world->gyro_scale,
+      "share by which the gyroscope's rates are too large, not in "
+      "sensors.yaml");
   add("gnss_rate", &world->gnss_rate_hz,
       "rate of the GNSS positions in gnss.csv [Hz]; 0: no positions");
   add("gnss_noise", &world->gnss_noise_m,

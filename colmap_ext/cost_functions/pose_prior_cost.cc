@@ -118,7 +118,7 @@ PosePriorCost::PosePriorCost(const PosePriorEdge& edge, Term term,
       from_shared_ = {inverse_sigma_ * (Eigen::Matrix3d::Identity() -
                                         rotation_.toRotationMatrix()),
                       inverse_sigma_ * Eigen::Matrix3d(angles.asDiagonal()),
-                      inverse_sigma_ * FromGyroscopeMisalignment(angles),
+                      inverse_sigma_ * SymmetricOffDiagonal(angles),
                       inverse_sigma_ * edge.dt_s * from_middle};
     } else if (term == Term::kTranslation) {
       from_shared_ = {

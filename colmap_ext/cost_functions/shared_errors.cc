@@ -23,12 +23,6 @@ Eigen::Matrix3d CameraFromMiddle(const Eigen::Quaterniond& cam2_from_cam1) {
   return ExpSo3(0.5 * LogSo3(cam2_from_cam1)).toRotationMatrix();
 }
 
-Eigen::Matrix3d FromGyroscopeMisalignment(const Eigen::Vector3d& w) {
-  Eigen::Matrix3d matrix;
-  matrix << 0.0, w.z(), w.y(), w.z(), 0.0, w.x(), w.y(), w.x(), 0.0;
-  return matrix;
-}
-
 namespace {
 
 template <typename Value>
@@ -40,6 +34,14 @@ Value ValueOr(const Value& fallback, const std::map<int, Value>& values,
 
 }  // namespace
 
+Eigen::Matrix3d SharedErrors::GyroscopeScales(int drive) const {
+  const Eigen::Vector3d zero = Eigen::Vector3d::Zero();
+  Eigen::Matrix3d scales =
+      SymmetricOffDiagonal(ValueOr(zero, gyroscope_misalignment, drive));
+  scales.diagonal() = ValueOr(zero, gyroscope_scale, drive);
+  return scales;
+}
+
 Rigid3d SharedErrors::Correct(const Rigid3d& cam2_from_cam1, double dt_s,
                               const SharedErrorWindows& windows) const {
   const Eigen::Quaterniond& rotation = cam2_from_cam1.rotation;
@@ -47,12 +49,9 @@ Rigid3d SharedErrors::Correct(const Rigid3d& cam2_from_cam1, double dt_s,
   const Eigen::Vector3d zero = Eigen::Vector3d::Zero();
   const Eigen::Vector3d extrinsic =
       ValueOr(zero, extrinsic_rotation, windows.drive);
-  const Eigen::Vector3d angles = LogSo3(rotation);
   const Eigen::Vector3d error =
       extrinsic - rotation * extrinsic +
-      angles.cwiseProduct(ValueOr(zero, gyroscope_scale, windows.drive)) +
-      FromGyroscopeMisalignment(angles) *
-          ValueOr(zero, gyroscope_misalignment, windows.drive) +
+      GyroscopeScales(windows.drive) * LogSo3(rotation) +
       dt_s * (from_middle * ValueOr(zero, gyroscope_bias, windows.gyroscope)) +
       ValueOr(0.0, time_shift, windows.drive) * windows.rotation_by_time_shift;
   const Eigen::Vector3d drift =

@@ -90,13 +90,10 @@ struct SharedErrors {
 
   Rigid3d Correct(const Rigid3d& cam2_from_cam1, double dt_s,
                   const SharedErrorWindows& windows) const;
+  Eigen::Matrix3d GyroscopeScales(int drive) const;  // S
 };
 
 // H: rotation from the frame in the middle of a motion to the later camera.
 Eigen::Matrix3d CameraFromMiddle(const Eigen::Quaterniond& cam2_from_cam1);
-
-// The matrix M by which S w = diag(gyroscope_scale) w + M
-// gyroscope_misalignment.
-Eigen::Matrix3d FromGyroscopeMisalignment(const Eigen::Vector3d& w);
 
 }  // namespace adasfm

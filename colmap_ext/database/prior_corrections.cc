@@ -15,6 +15,7 @@ namespace {
 
 constexpr char kCorrectionTable[] = "adasfm_camera_mount";
 constexpr char kTimeShiftTable[] = "adasfm_time_shifts";
+constexpr char kGyroscopeScaleTable[] = "adasfm_gyroscope_scales";
 
 std::array<double, 4> ToQvec(const Eigen::Quaterniond& q) {
   return {q.w(), q.x(), q.y(), q.z()};
@@ -61,13 +62,28 @@ void WriteTimeShifts(const std::map<camera_t, double>& time_shift_s,
   }
 }
 
+void WriteGyroscopeScales(const std::map<camera_t, Eigen::Matrix3d>& scales,
+                          SqliteConnection* database) {
+  database->Execute(
+      "CREATE TABLE adasfm_gyroscope_scales (camera_id INTEGER NOT NULL, "
+      "scales BLOB NOT NULL)");
+  SqliteStatement statement(
+      database, "INSERT INTO adasfm_gyroscope_scales VALUES (?, ?)");
+  for (const auto& [camera_id, matrix] : scales) {
+    statement.Reset();
+    statement.BindInt(1, camera_id);
+    BindDoubles(&statement, 2, matrix.data(), 9);
+    statement.Step();
+  }
+}
+
 }  // namespace
 
 void WritePriorCorrections(const PriorCorrections& corrections,
                            SqliteConnection* database) {
   RemovePriorCorrections(database);
   if (corrections.camera_imu.empty() && corrections.time_shift_s.empty() &&
-      corrections.lengths.empty()) {
+      corrections.gyroscope_scales.empty() && corrections.lengths.empty()) {
     return;
   }
   CreateMetaTable(database);
@@ -77,18 +93,22 @@ void WritePriorCorrections(const PriorCorrections& corrections,
   if (!corrections.time_shift_s.empty()) {
     WriteTimeShifts(corrections.time_shift_s, database);
   }
+  if (!corrections.gyroscope_scales.empty()) {
+    WriteGyroscopeScales(corrections.gyroscope_scales, database);
+  }
   WriteInertialLengths(corrections.lengths, database);
 }
 
 bool HasPriorCorrections(SqliteConnection* database) {
   return database->HasTable(kCorrectionTable) ||
          database->HasTable(kTimeShiftTable) ||
+         database->HasTable(kGyroscopeScaleTable) ||
          database->HasTable(kInertialLengthTable);
 }
 
 void RemovePriorCorrections(SqliteConnection* database) {
-  for (const char* table :
-       {kCorrectionTable, kTimeShiftTable, kInertialLengthTable}) {
+  for (const char* table : {kCorrectionTable, kTimeShiftTable,
+                            kGyroscopeScaleTable, kInertialLengthTable}) {
     database->Execute(std::string("DROP TABLE IF EXISTS ") + table);
   }
 }
@@ -125,6 +145,24 @@ std::map<camera_t, double> ReadTimeShifts(SqliteConnection* database) {
     shifts.emplace(static_cast<camera_t>(statement.Int(0)), shift_s);
   }
   return shifts;
+}
+
+std::map<camera_t, Eigen::Matrix3d> ReadGyroscopeScales(
+    SqliteConnection* database) {
+  std::map<camera_t, Eigen::Matrix3d> scales;
+  if (!database->HasTable(kGyroscopeScaleTable)) return scales;
+  const std::string row = std::string("table ") + kGyroscopeScaleTable;
+  SqliteStatement statement(
+      database, "SELECT camera_id, scales FROM adasfm_gyroscope_scales");
+  while (statement.Step()) {
+    Eigen::Matrix3d matrix;
+    DoublesFromBlob(statement, 1, row, 9, matrix.data());
+    if (!matrix.allFinite() || !matrix.isApprox(matrix.transpose())) {
+      throw SqliteError(row + ": not a symmetric matrix");
+    }
+    scales.emplace(static_cast<camera_t>(statement.Int(0)), matrix);
+  }
+  return scales;
 }
 
 }  // namespace adasfm

@@ -13,8 +13,9 @@ namespace adasfm {
 
 // Corrections of the priors by adasfm_global (docs/reference/formats.md). The
 // table adasfm_camera_mount has the rotations by which T_cam_imu was wrong,
-// adasfm_time_shifts what timeshift_cam_imu lacked, adasfm_inertial_lengths the
-// lengths estimated for priors without a length.
+// adasfm_time_shifts what timeshift_cam_imu lacked, adasfm_gyroscope_scales by
+// what the gyroscope's rates have to grow, adasfm_inertial_lengths the lengths
+// estimated for priors without a length.
 // The priors themselves stay as they were imported, so that a second run starts
 // from them; a new import removes the corrections. All functions throw
 // SqliteError.
@@ -24,6 +25,8 @@ struct PriorCorrections {
   // none where T_cam_imu is right.
   std::map<camera_t, Eigen::Quaterniond> camera_imu;
   std::map<camera_t, double> time_shift_s;  // by camera, s
+  // By camera, symmetric, in its true frame (CorrectGyroscopeScales).
+  std::map<camera_t, Eigen::Matrix3d> gyroscope_scales;
   std::vector<InertialLength> lengths;
 };
 
@@ -38,5 +41,7 @@ void RemovePriorCorrections(SqliteConnection* database);
 std::map<camera_t, Eigen::Quaterniond> ReadCameraImuCorrections(
     SqliteConnection* database);
 std::map<camera_t, double> ReadTimeShifts(SqliteConnection* database);
+std::map<camera_t, Eigen::Matrix3d> ReadGyroscopeScales(
+    SqliteConnection* database);
 
 }  // namespace adasfm

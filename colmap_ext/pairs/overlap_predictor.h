@@ -30,9 +30,11 @@ struct OverlapPredictionOptions {
 
   // The uncertainty of the extrinsics is already in the sigmas of the
   // smoother's steps, which persist along the chain; here it is not added a
-  // second time. The gate of loops, which must not reject a true loop, is more
-  // conservative.
+  // second time. Scales of the gyroscope, which most drives do not have wrong,
+  // would cost most of the pairs that odometry saves. The gate of loops, which
+  // must not reject a true loop, is more conservative.
   OverlapPredictionOptions() {
+    chain.gyro_scale_sigma = 0.0;
     chain.extrinsic_rotation_sigma_rad = 0.0;
     chain.driving_direction_sigma_rad = 0.0;
   }

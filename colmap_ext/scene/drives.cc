@@ -86,4 +86,12 @@ void AddTimeShifts(const TimeShiftMap& shifts,
   }
 }
 
+void CorrectGyroscopeScales(const GyroscopeScaleMap& scales,
+                            std::vector<RelativePosePrior>* priors) {
+  for (RelativePosePrior& prior : *priors) {
+    const auto found = scales.find(prior.drive);
+    if (found != scales.end()) CorrectGyroscopeScales(found->second, &prior);
+  }
+}
+
 }  // namespace adasfm

@@ -16,6 +16,10 @@ using CameraImuCorrectionMap = std::map<int, Eigen::Quaterniond>;
 // By drive: what timeshift_cam_imu lacks, s.
 using TimeShiftMap = std::map<int, double>;
 
+// By drive: scale errors and misalignments of the gyroscope
+// (CorrectGyroscopeScales in core/relative_pose_prior.h).
+using GyroscopeScaleMap = std::map<int, Eigen::Matrix3d>;
+
 // Sets the drives of the scene's images, priors and inertial motions. Images
 // that priors connect are of one drive, and so are those of one camera or rig:
 // gaps in a log do not change the machine. Numbers follow the order of the
@@ -32,6 +36,9 @@ CameraImuCorrectionMap Inverted(CameraImuCorrectionMap corrections);
 void AddTimeShifts(const TimeShiftMap& shifts,
                    std::vector<RelativePosePrior>* priors,
                    std::vector<InertialMotion>* motions);
+// The priors must be in the frames of the corrected T_cam_imu.
+void CorrectGyroscopeScales(const GyroscopeScaleMap& scales,
+                            std::vector<RelativePosePrior>* priors);
 
 // Corrections by camera, as the database has them, and back.
 template <typename Correction>

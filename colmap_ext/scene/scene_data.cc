@@ -71,6 +71,9 @@ void ReadScenePriors(SqliteConnection* database,
     AddTimeShifts(CorrectionsByDrive(*scene, ReadTimeShifts(database)),
                   &scene->priors, &scene->inertial_motions);
     RotatePriors(corrections, &scene->priors);
+    CorrectGyroscopeScales(
+        CorrectionsByDrive(*scene, ReadGyroscopeScales(database)),
+        &scene->priors);
     RotateGravityAndMotions(corrections, scene);
     scene->inertial_scale_sigma =
         AddInertialLengths(ReadInertialLengths(database), &scene->priors);

@@ -180,6 +180,31 @@ TEST_F(ChainTest, AClockThatIsAFewMillisecondsOffIsFound) {
   }
 }
 
+// The test of loop closures, the models and the mapper's priors allow for it.
+TEST_F(ChainTest, AGyroscopeWithWrongScalesIsFound) {
+  double error_with_right_scales = 0.0;
+  for (const double scale : {0.0, 0.02, -0.02}) {
+    Make("--num_images 200 --seed 4 --alias_ratio 0.03 --gyro_scale " +
+         std::to_string(scale));
+    Import();
+    ExpectSuccess(GlobalArguments());
+    ExpectSuccess(MapperArguments());
+    const auto found = nlohmann::json::parse(
+        ReadBytes(folder_.File("global/summary.json")))["gyroscope_scales"];
+    const double error =
+        Evaluate("sparse/0")["sim3_least_squares"]["translation_rmse_m"];
+    if (scale == 0.0) {
+      EXPECT_TRUE(found.empty());
+      error_with_right_scales = error;
+    } else {
+      EXPECT_LT(error, 1.2 * error_with_right_scales);
+      ASSERT_EQ(found.size(), 1);
+      // The camera turns about its y axis, by much more than vision's errors.
+      EXPECT_NEAR(found[0]["scales"][1][1], 1.0 / (1.0 + scale) - 1.0, 2e-3);
+    }
+  }
+}
+
 // Each floor is aliased with the next, 3 m above after 200 m of ramp: a climb
 // of 0.9 deg, while the direction of driving is known to 0.35 deg beforehand.
 TEST_F(ChainTest, FloorsThatLookAlikeStayApart) {

@@ -376,6 +376,24 @@ TEST(StressOptions, GyroscopeDriftsAsAskedFor) {
   EXPECT_LT(bias.head<2>().norm(), 1e-12);
 }
 
+TEST(StressOptions, RatesOfTheGyroscopeAreScaled) {
+  SyntheticWorldOptions options = NoiseFreeOptions();
+  const SyntheticWorld clean = BuildSyntheticWorld(options);
+  options.gyro_scale = 0.02;
+  const SyntheticWorld scaled = BuildSyntheticWorld(options);
+  double largest = 0.0;
+  for (size_t i = 0; i < clean.imu_samples.size(); ++i) {
+    const Eigen::Vector3d rate =
+        clean.imu_samples[i].angular_velocity - clean.true_gyro_bias;
+    EXPECT_LT((scaled.imu_samples[i].angular_velocity -
+               clean.imu_samples[i].angular_velocity - 0.02 * rate)
+                  .norm(),
+              1e-12);
+    largest = std::max(largest, rate.norm());
+  }
+  EXPECT_GT(largest, 0.1);
+}
+
 TEST(StressOptions, FixesHaveNoiseAndJumps) {
   SyntheticWorldOptions options = NoiseFreeOptions();
   options.num_images = 600;

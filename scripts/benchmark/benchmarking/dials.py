@@ -77,6 +77,7 @@ DIALS = {
         ('num_images_without_texture',), 200, num_blackouts=4,
         blackout_images=12, blackout_keypoints=14),
     'gyroscope drifts by 0.6 deg/s a minute': dial((), gyro_drift=1.75e-4),
+    'rates of the gyroscope 2 % too large': dial((), gyro_scale=0.02),
     'a third of the rotations wrong': dial(
         ('rotation_outlier_ratio',), rotation_outliers=0.33),
     '80 % outliers': dial(('outlier_match_ratio',), outlier_ratio=0.8,

@@ -68,7 +68,7 @@ class PriorCorrectionsTest : public testing::Test {
   PriorTables tables_;
   const Eigen::Quaterniond correction_ =
       ExpSo3(Eigen::Vector3d(0.01, -0.03, 0.02));
-  const PriorCorrections corrections_ = {{{1, correction_}}, {}, {}};
+  const PriorCorrections corrections_ = {{{1, correction_}}, {}, {}, {}};
   Priors corrected_;
 };
 
@@ -195,6 +195,28 @@ TEST_F(PriorCorrectionsTest, ShiftTheTime) {
   expect_vector(motion.by_wheels->translation, 1.0, 2.0, -3.0);
   SqliteConnection(path_, SqliteConnection::Mode::kWrite)
       .Execute("UPDATE adasfm_time_shifts SET shift_s = 9e999");
+  EXPECT_FALSE(ReadSceneData(path_, SceneDataOptions()).ok());
+  EXPECT_TRUE(RestoreTwoViewGeometries(path_)->priors_restored);
+  ExpectPriors(Read(), tables_.priors);
+}
+
+// Rates are corrected in the true frame of the camera.
+TEST_F(PriorCorrectionsTest, GyroscopeScalesCorrectThePriors) {
+  ASSERT_TRUE(WritePriorTables(path_, tables_).ok());
+  Eigen::Matrix3d scales;
+  scales << 0.01, 0.002, 0.0, 0.002, -0.02, 0.003, 0.0, 0.003, 0.005;
+  PriorCorrections corrections = corrections_;
+  corrections.gyroscope_scales[1] = scales;
+  ASSERT_TRUE(RewriteTwoViewGeometries(path_, {}, {}, corrections).ok());
+  Priors expected = tables_.priors;
+  for (RelativePosePrior& prior : expected) {
+    RotatePrior(correction_, &prior);
+    CorrectGyroscopeScales(scales, &prior);
+  }
+  ExpectPriors(Read(), expected);
+  ExpectPriors(Read(true), tables_.priors);
+  SqliteConnection(path_, SqliteConnection::Mode::kWrite)
+      .Execute("UPDATE adasfm_gyroscope_scales SET scales = zeroblob(8)");
   EXPECT_FALSE(ReadSceneData(path_, SceneDataOptions()).ok());
   EXPECT_TRUE(RestoreTwoViewGeometries(path_)->priors_restored);
   ExpectPriors(Read(), tables_.priors);

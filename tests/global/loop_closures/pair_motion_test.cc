@@ -42,9 +42,13 @@ std::vector<RelativePosePrior> DrawLogs(const OdometryChainOptions& options,
       ExpSo3(random->GaussianVector(options.extrinsic_rotation_sigma_rad));
   const Eigen::Quaterniond driving =
       ExpSo3(random->GaussianVector(options.driving_direction_sigma_rad));
+  Eigen::Matrix3d gyro_scales =
+      SymmetricOffDiagonal(random->GaussianVector(options.gyro_scale_sigma));
+  gyro_scales.diagonal() = random->GaussianVector(options.gyro_scale_sigma);
   std::vector<RelativePosePrior> priors;
   for (int k = 1; k <= kNumSteps; ++k) {
     Rigid3d step = TrueStep(k);
+    step.rotation = ExpSo3(gyro_scales * LogSo3(step.rotation)) * step.rotation;
     step.rotation = ExpSo3(kStepSeconds * bias) * extrinsic * step.rotation *
                     extrinsic.conjugate();
     step.translation = scale * (driving * step.translation);
@@ -77,6 +81,7 @@ OdometryChainOptions ErrorsOfEqualWeight() {
   options.scale_sigma = 0.01;
   options.gyro_bias_sigma_rad_s = 1e-3;
   options.gyro_bias_walk_rad_s_sqrt_s = 5e-4;
+  options.gyro_scale_sigma = 0.01;
   options.extrinsic_rotation_sigma_rad = 0.01;
   options.driving_direction_sigma_rad = 0.01;
   options.persistent_translation_ratio = 0.0;
@@ -128,6 +133,7 @@ TEST(TestByOdometry, EachSharedErrorIsInTheCovariance) {
       [](auto* o) { o->scale_sigma = 0.0; },
       [](auto* o) { o->gyro_bias_sigma_rad_s = 0.0; },
       [](auto* o) { o->gyro_bias_walk_rad_s_sqrt_s = 0.0; },
+      [](auto* o) { o->gyro_scale_sigma = 0.0; },
       [](auto* o) { o->extrinsic_rotation_sigma_rad = 0.0; },
       [](auto* o) { o->driving_direction_sigma_rad = 0.0; }};
   for (size_t k = 0; k < leave_out.size(); ++k) {
@@ -139,6 +145,7 @@ TEST(TestByOdometry, EachSharedErrorIsInTheCovariance) {
     drawn.scale_sigma *= 8.0;
     drawn.gyro_bias_sigma_rad_s *= 8.0;
     drawn.gyro_bias_walk_rad_s_sqrt_s *= 8.0;
+    drawn.gyro_scale_sigma *= 2.0;              // the same
     drawn.extrinsic_rotation_sigma_rad *= 2.0;  // has second-order terms
     drawn.driving_direction_sigma_rad *= 8.0;
     OdometryChainOptions without = drawn;

@@ -122,6 +122,7 @@ TEST(OdometryChain, CovarianceAgreesWithMonteCarlo) {
   options.scale_sigma = 0.004;
   options.gyro_bias_sigma_rad_s = 5e-4;
   options.gyro_bias_walk_rad_s_sqrt_s = 3e-4;
+  options.gyro_scale_sigma = 0.003;
   options.extrinsic_rotation_sigma_rad = 0.004;
   options.driving_direction_sigma_rad = 0.003;
   options.persistent_translation_ratio = 0.3;
@@ -136,6 +137,10 @@ TEST(OdometryChain, CovarianceAgreesWithMonteCarlo) {
         noise * random.GaussianVector(options.extrinsic_rotation_sigma_rad);
     const Eigen::Quaterniond driving = ExpSo3(
         noise * random.GaussianVector(options.driving_direction_sigma_rad));
+    Eigen::Matrix3d gyro_scales = SymmetricOffDiagonal(
+        noise * random.GaussianVector(options.gyro_scale_sigma));
+    gyro_scales.diagonal() =
+        noise * random.GaussianVector(options.gyro_scale_sigma);
     const Eigen::Vector3d persistent =
         noise * random.GaussianVector(options.persistent_translation_ratio *
                                       kTranslationSigma);
@@ -143,7 +148,8 @@ TEST(OdometryChain, CovarianceAgreesWithMonteCarlo) {
     for (int k = 1; k <= kNumSteps; ++k) {
       Rigid3d step = TrueStep(k);
       step.rotation =
-          ExpSo3(0.1 * bias + extrinsic - step.rotation * extrinsic) *
+          ExpSo3(0.1 * bias + extrinsic - step.rotation * extrinsic +
+                 gyro_scales * LogSo3(step.rotation)) *
           step.rotation;
       step.translation = scale * (driving * step.translation) + persistent;
       priors.push_back(BuildPrior(k, k + 1, step, noise * kRotationSigma,
@@ -191,6 +197,7 @@ TEST(OdometryChain, SharedErrorsAgreeWithMonteCarlo) {
   options.scale_sigma = 0.0;
   options.gyro_bias_sigma_rad_s = 0.0;
   options.gyro_bias_walk_rad_s_sqrt_s = 0.0;
+  options.gyro_scale_sigma = 0.0;
   options.persistent_translation_ratio = 0.0;
   // Isotropic: rotations of all steps do not change it to first order.
   const double variance = 1e-8;
