@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <iomanip>
+#include <map>
 #include <sstream>
 
 namespace adasfm {
@@ -14,24 +15,29 @@ namespace {
 constexpr double kMinShiftS = 1e-3;
 constexpr double kMinGyroscopeScale = 5e-3;
 
-std::vector<const SharedErrors*> LastSharedErrors(
+// By drive, the errors that its first model has.
+std::map<int, const SharedErrors*> FindSharedErrors(
     const std::vector<CoarseModel>& models) {
-  std::vector<const SharedErrors*> errors;
+  std::map<int, const SharedErrors*> by_drive;
   for (const CoarseModel& model : models) {
     if (model.rounds.empty() || !model.rounds.back().success) continue;
-    errors.push_back(&model.rounds.back().shared_errors);
+    const SharedErrors& errors = model.rounds.back().shared_errors;
+    // All rotations of a drive depend on it.
+    for (const auto& [drive, scale] : errors.gyroscope_scale) {
+      by_drive.emplace(drive, &errors);
+    }
   }
-  return errors;
+  return by_drive;
 }
 
 }  // namespace
 
 TimeShiftMap FindTimeShifts(const std::vector<CoarseModel>& models) {
   TimeShiftMap shifts;
-  for (const SharedErrors* errors : LastSharedErrors(models)) {
-    for (const auto& [drive, shift_s] : errors->time_shift) {
-      if (std::abs(shift_s) >= kMinShiftS) shifts.emplace(drive, shift_s);
-    }
+  for (const auto& [drive, errors] : FindSharedErrors(models)) {
+    const auto shift = errors->time_shift.find(drive);
+    if (shift == errors->time_shift.end()) continue;
+    if (std::abs(shift->second) >= kMinShiftS) shifts.insert(*shift);
   }
   return shifts;
 }
@@ -44,12 +50,10 @@ GyroscopeScaleMap FindGyroscopeScales(const std::vector<CoarseModel>& models) {
     return {};
   }
   GyroscopeScaleMap scales;
-  for (const SharedErrors* errors : LastSharedErrors(models)) {
-    for (const auto& [drive, scale] : errors->gyroscope_scale) {
-      const Eigen::Matrix3d matrix = errors->GyroscopeScales(drive);
-      if (matrix.cwiseAbs().maxCoeff() >= kMinGyroscopeScale) {
-        scales.emplace(drive, matrix);
-      }
+  for (const auto& [drive, errors] : FindSharedErrors(models)) {
+    const Eigen::Matrix3d matrix = errors->GyroscopeScales(drive);
+    if (matrix.cwiseAbs().maxCoeff() >= kMinGyroscopeScale) {
+      scales.emplace(drive, matrix);
     }
   }
   return scales;

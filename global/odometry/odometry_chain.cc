@@ -17,12 +17,11 @@ namespace {
 using Matrix6d = Eigen::Matrix<double, 6, 6>;
 
 // Columns of OdometryChain::Systematic: camera-IMU rotation, direction of
-// driving, persistent error, the gyroscope's scales and its misalignments.
+// driving, persistent error, the gyroscope's scales.
 constexpr int kCameraImu = 4;
 constexpr int kDriving = 7;
 constexpr int kPersistent = 10;
 constexpr int kGyroScale = 13;
-constexpr int kGyroMisalignment = 16;
 
 // The prior's covariance with zeros for what it does not observe, which the
 // counters of the nodes exclude from use.
@@ -88,10 +87,10 @@ Eigen::Matrix3d PersistentRoot(const OdometryChainOptions& options,
 
 // d(error) of a step by the errors that all steps share (columns as in
 // OdometryChain::Systematic).
-Eigen::Matrix<double, 6, 19> SharedJacobian(const OdometryChainOptions& options,
+Eigen::Matrix<double, 6, 16> SharedJacobian(const OdometryChainOptions& options,
                                             const RelativePosePrior& prior,
                                             const Rigid3d& motion) {
-  Eigen::Matrix<double, 6, 19> jacobian = Eigen::Matrix<double, 6, 19>::Zero();
+  Eigen::Matrix<double, 6, 16> jacobian = Eigen::Matrix<double, 6, 16>::Zero();
   const Eigen::Matrix3d camera_from_middle = CameraFromMiddle(motion);
   jacobian.block<3, 1>(3, 0) = motion.translation;
   jacobian.block<3, 3>(0, 1) = SecondsFromNs(prior.dt_ns) * camera_from_middle;
@@ -100,9 +99,7 @@ Eigen::Matrix<double, 6, 19> SharedJacobian(const OdometryChainOptions& options,
   jacobian.block<3, 3>(3, kDriving) =
       -Hat(motion.translation) * camera_from_middle;
   jacobian.block<3, 3>(3, kPersistent) = PersistentRoot(options, prior, motion);
-  const Eigen::Vector3d angles = LogSo3(motion.rotation);
-  jacobian.block<3, 3>(0, kGyroScale) = angles.asDiagonal();
-  jacobian.block<3, 3>(0, kGyroMisalignment) = SymmetricOffDiagonal(angles);
+  jacobian.block<3, 3>(0, kGyroScale) = LogSo3(motion.rotation).asDiagonal();
   return jacobian;
 }
 
@@ -292,13 +289,13 @@ ChainMotion OdometryChain::MotionOfLeaders(image_t image_id1,
 
   // In the start's frame the errors of the steps add up; the error's sign does
   // not matter to a covariance, so both directions of travel are one formula.
-  Eigen::Matrix<double, 19, 1> sigmas;
+  Eigen::Matrix<double, 16, 1> sigmas;
   sigmas << options_.scale_sigma, Eigen::Vector3d::Zero(),
       Eigen::Vector3d::Constant(options_.extrinsic_rotation_sigma_rad),
       Eigen::Vector3d::Constant(options_.driving_direction_sigma_rad),
       Eigen::Vector3d::Constant(options_.persistent_translation_ratio),
-      Eigen::Matrix<double, 6, 1>::Constant(options_.gyro_scale_sigma);
-  Eigen::Matrix<double, 19, 19> shared = sigmas.cwiseAbs2().asDiagonal();
+      Eigen::Vector3d::Constant(options_.gyro_scale_sigma);
+  Eigen::Matrix<double, 16, 16> shared = sigmas.cwiseAbs2().asDiagonal();
   shared.block<3, 3>(kGyro, kGyro) = options_.gyro_bias_covariance.value_or(
       std::pow(options_.gyro_bias_sigma_rad_s, 2) *
       Eigen::Matrix3d::Identity());

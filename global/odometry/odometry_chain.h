@@ -37,9 +37,10 @@ struct OdometryChainOptions {
   // of its random walk, rad/s/sqrt(s).
   double gyro_bias_sigma_rad_s = 2e-4;
   double gyro_bias_walk_rad_s_sqrt_s = 2e-5;
-  // 1 sigma of each entry of the symmetric matrix of the gyroscope's scale
-  // errors and misalignments; half of what data sheets state, as false loops
-  // pass a wider test.
+  // 1 sigma of the gyroscope's scale error about each axis of the camera; half
+  // of what data sheets state, as false loops pass a wider test.
+  // Misalignments, which turn a bend into a climb, would hide the floors of a
+  // car park.
   double gyro_scale_sigma = 0.005;
   // 1 sigma, per axis, of the rotation of T_cam_imu and of the direction of
   // driving in the camera, rad.
@@ -113,8 +114,8 @@ class OdometryChain {
   using Matrix6d = Eigen::Matrix<double, 6, 6>;
   // Derivatives by the scale, the gyro bias, the rotation of T_cam_imu, the
   // direction of driving, the persistent translation error and the gyroscope's
-  // scales and misalignments.
-  using Systematic = Eigen::Matrix<double, 6, 19>;
+  // scales.
+  using Systematic = Eigen::Matrix<double, 6, 16>;
   static constexpr int kGyro = 1;  // first of its columns
   // Prefix sums, weighted by time, of the gyro columns of Systematic before
   // each step.

@@ -199,8 +199,9 @@ TEST_F(ChainTest, AGyroscopeWithWrongScalesIsFound) {
     } else {
       EXPECT_LT(error, 1.2 * error_with_right_scales);
       ASSERT_EQ(found.size(), 1);
-      // The camera turns about its y axis, by much more than vision's errors.
-      EXPECT_NEAR(found[0]["scales"][1][1], 1.0 / (1.0 + scale) - 1.0, 2e-3);
+      // The camera turns about its y axis. 200 images tell the scale to about
+      // 0.4 %, and the prior of 1 % draws it to zero by a sixth.
+      EXPECT_NEAR(found[0]["scales"][1][1], 1.0 / (1.0 + scale) - 1.0, 8e-3);
     }
   }
 }

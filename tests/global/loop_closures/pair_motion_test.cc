@@ -42,13 +42,13 @@ std::vector<RelativePosePrior> DrawLogs(const OdometryChainOptions& options,
       ExpSo3(random->GaussianVector(options.extrinsic_rotation_sigma_rad));
   const Eigen::Quaterniond driving =
       ExpSo3(random->GaussianVector(options.driving_direction_sigma_rad));
-  Eigen::Matrix3d gyro_scales =
-      SymmetricOffDiagonal(random->GaussianVector(options.gyro_scale_sigma));
-  gyro_scales.diagonal() = random->GaussianVector(options.gyro_scale_sigma);
+  const Eigen::Vector3d gyro_scales =
+      random->GaussianVector(options.gyro_scale_sigma);
   std::vector<RelativePosePrior> priors;
   for (int k = 1; k <= kNumSteps; ++k) {
     Rigid3d step = TrueStep(k);
-    step.rotation = ExpSo3(gyro_scales * LogSo3(step.rotation)) * step.rotation;
+    step.rotation =
+        ExpSo3(gyro_scales.cwiseProduct(LogSo3(step.rotation))) * step.rotation;
     step.rotation = ExpSo3(kStepSeconds * bias) * extrinsic * step.rotation *
                     extrinsic.conjugate();
     step.translation = scale * (driving * step.translation);

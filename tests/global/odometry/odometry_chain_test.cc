@@ -137,9 +137,7 @@ TEST(OdometryChain, CovarianceAgreesWithMonteCarlo) {
         noise * random.GaussianVector(options.extrinsic_rotation_sigma_rad);
     const Eigen::Quaterniond driving = ExpSo3(
         noise * random.GaussianVector(options.driving_direction_sigma_rad));
-    Eigen::Matrix3d gyro_scales = SymmetricOffDiagonal(
-        noise * random.GaussianVector(options.gyro_scale_sigma));
-    gyro_scales.diagonal() =
+    const Eigen::Vector3d gyro_scales =
         noise * random.GaussianVector(options.gyro_scale_sigma);
     const Eigen::Vector3d persistent =
         noise * random.GaussianVector(options.persistent_translation_ratio *
@@ -149,7 +147,7 @@ TEST(OdometryChain, CovarianceAgreesWithMonteCarlo) {
       Rigid3d step = TrueStep(k);
       step.rotation =
           ExpSo3(0.1 * bias + extrinsic - step.rotation * extrinsic +
-                 gyro_scales * LogSo3(step.rotation)) *
+                 gyro_scales.cwiseProduct(LogSo3(step.rotation))) *
           step.rotation;
       step.translation = scale * (driving * step.translation) + persistent;
       priors.push_back(BuildPrior(k, k + 1, step, noise * kRotationSigma,
