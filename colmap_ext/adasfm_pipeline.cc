@@ -10,6 +10,7 @@
 
 #include "colmap_ext/check_scene.h"
 #include "colmap_ext/coarse/global_report.h"
+#include "colmap_ext/coarse/global_warnings.h"
 #include "colmap_ext/database/two_view_geometry_backup.h"
 #include "colmap_ext/host/database.h"
 #include "colmap_ext/host/frames.h"

@@ -91,12 +91,12 @@ inline void AddTimeShift(double shift_s, RelativePosePrior* prior) {
   motion.translation += shift_s * prior->translation_by_time_shift;
 }
 
-// Corrects the prior for the scale errors and misalignments of the gyroscope, a
-// symmetric matrix in the axes of the camera, by which the rates have to grow.
-inline void CorrectGyroscopeScales(const Eigen::Matrix3d& scales,
+// Corrects the prior for the scale errors of the gyroscope: the shares by which
+// the rates about the axes of the camera have to grow.
+inline void CorrectGyroscopeScales(const Eigen::Vector3d& scales,
                                    RelativePosePrior* prior) {
   Rigid3d& motion = prior->cam2_from_cam1;
-  const Eigen::Vector3d error = scales * LogSo3(motion.rotation);
+  const Eigen::Vector3d error = scales.cwiseProduct(LogSo3(motion.rotation));
   motion.rotation = (ExpSo3(error) * motion.rotation).normalized();
   // The direction is known in the middle of the motion.
   motion.translation = ExpSo3(0.5 * error) * motion.translation;

@@ -19,14 +19,6 @@ Eigen::Matrix3d Hat(const Eigen::Vector3d& vector) {
   return matrix;
 }
 
-Eigen::Matrix3d SymmetricOffDiagonal(const Eigen::Vector3d& entries) {
-  Eigen::Matrix3d matrix;
-  matrix << 0.0, entries.z(), entries.y(),  //
-      entries.z(), 0.0, entries.x(),        //
-      entries.y(), entries.x(), 0.0;
-  return matrix;
-}
-
 Eigen::Quaterniond ExpSo3(const Eigen::Vector3d& rotation_vector_rad) {
   const double angle = rotation_vector_rad.norm();
   const double half = 0.5 * angle;

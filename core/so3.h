@@ -9,10 +9,6 @@ namespace adasfm {
 // The skew-symmetric matrix with Hat(a) * b = a x b.
 Eigen::Matrix3d Hat(const Eigen::Vector3d& vector);
 
-// The symmetric matrix with entries yz, zx, xy, and zeros on its diagonal.
-// SymmetricOffDiagonal(a) * b = SymmetricOffDiagonal(b) * a.
-Eigen::Matrix3d SymmetricOffDiagonal(const Eigen::Vector3d& entries);
-
 // The rotation of a rotation vector (angle times axis, radians).
 Eigen::Quaterniond ExpSo3(const Eigen::Vector3d& rotation_vector_rad);
 

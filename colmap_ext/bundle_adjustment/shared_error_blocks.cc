@@ -29,11 +29,9 @@ std::vector<double*> SharedErrorBlocks::ParametersOf(const PosePriorEdge& edge,
     return block.values;
   };
   if (term == PosePriorCost::Term::kRotation) {
-    std::vector<double*> parameters = {
-        use(windows.drive, &extrinsic_rotation_),
-        use(windows.drive, &gyroscope_scale_),
-        use(windows.drive, &gyroscope_misalignment_),
-        use(windows.gyroscope, &gyroscope_bias_)};
+    std::vector<double*> parameters = {use(windows.drive, &extrinsic_rotation_),
+                                       use(windows.gyroscope, &gyroscope_bias_),
+                                       use(windows.drive, &gyroscope_scale_)};
     if (parameters.size() < num_shared) {
       parameters.push_back(&time_shift_[windows.drive]);
     }
@@ -90,12 +88,10 @@ void SharedErrorBlocks::AddPriors(ceres::Problem* problem) {
   for (auto& [key, block] : extrinsic_rotation_) {
     AddPrior(options_.extrinsic_rotation_sigma_rad, &block, problem);
   }
-  // Of data sheets of small gyroscopes, each entry of the matrix.
+  // Of data sheets of small gyroscopes, relative, per axis.
   constexpr double kGyroscopeScaleSigma = 0.01;
-  for (Blocks* blocks : {&gyroscope_scale_, &gyroscope_misalignment_}) {
-    for (auto& [key, block] : *blocks) {
-      AddPrior(kGyroscopeScaleSigma, &block, problem);
-    }
+  for (auto& [key, block] : gyroscope_scale_) {
+    AddPrior(kGyroscopeScaleSigma, &block, problem);
   }
   for (auto& [key, block] : driving_direction_) {
     AddPrior(options_.driving_direction_sigma_rad, &block, problem);
@@ -192,8 +188,8 @@ void SharedErrorBlocks::AddSumPrior(double sigma, std::vector<double> weights,
 std::vector<double*> SharedErrorBlocks::Used() {
   std::vector<double*> used;
   for (Blocks* blocks :
-       {&extrinsic_rotation_, &gyroscope_scale_, &gyroscope_misalignment_,
-        &driving_direction_, &gyroscope_bias_, &direction_drift_}) {
+       {&extrinsic_rotation_, &gyroscope_scale_, &driving_direction_,
+        &gyroscope_bias_, &direction_drift_}) {
     for (auto& [key, block] : *blocks) used.push_back(block.values);
   }
   for (auto& [drive, scale] : length_scale_) used.push_back(&scale.value);
@@ -212,7 +208,6 @@ SharedErrors SharedErrorBlocks::Estimated() const {
   SharedErrors errors;
   errors.extrinsic_rotation = values_of(extrinsic_rotation_);
   errors.gyroscope_scale = values_of(gyroscope_scale_);
-  errors.gyroscope_misalignment = values_of(gyroscope_misalignment_);
   errors.driving_direction = values_of(driving_direction_);
   errors.gyroscope_bias = values_of(gyroscope_bias_);
   errors.direction_drift = values_of(direction_drift_);

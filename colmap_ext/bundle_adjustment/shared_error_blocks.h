@@ -61,12 +61,11 @@ class SharedErrorBlocks {
 
   const SharedErrorOptions options_;
   double direction_drift_sigma_rad_ = 0.0;
-  Blocks extrinsic_rotation_;      // by drive
-  Blocks gyroscope_scale_;         // by drive
-  Blocks gyroscope_misalignment_;  // by drive
-  Blocks driving_direction_;       // by drive
-  Blocks gyroscope_bias_;          // by window
-  Blocks direction_drift_;         // by window
+  Blocks extrinsic_rotation_;  // by drive
+  Blocks gyroscope_scale_;     // by drive
+  Blocks driving_direction_;   // by drive
+  Blocks gyroscope_bias_;      // by window
+  Blocks direction_drift_;     // by window
   struct LengthScale {
     double value = 0.0;
     int num_lengths = 0;

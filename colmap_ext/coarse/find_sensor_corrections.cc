@@ -51,9 +51,9 @@ GyroscopeScaleMap FindGyroscopeScales(const std::vector<CoarseModel>& models) {
   }
   GyroscopeScaleMap scales;
   for (const auto& [drive, errors] : FindSharedErrors(models)) {
-    const Eigen::Matrix3d matrix = errors->GyroscopeScales(drive);
-    if (matrix.cwiseAbs().maxCoeff() >= kMinGyroscopeScale) {
-      scales.emplace(drive, matrix);
+    const Eigen::Vector3d& scale = errors->gyroscope_scale.at(drive);
+    if (scale.cwiseAbs().maxCoeff() >= kMinGyroscopeScale) {
+      scales.emplace(drive, scale);
     }
   }
   return scales;
@@ -72,11 +72,9 @@ std::string DescribeTimeShifts(const TimeShiftMap& shifts) {
 std::string DescribeGyroscopeScales(const GyroscopeScaleMap& scales) {
   std::ostringstream text;
   text << std::fixed << std::setprecision(2) << std::showpos;
-  for (const auto& [drive, matrix] : scales) {
-    text << (text.tellp() > 0 ? "; " : "");
-    for (int axis = 0; axis < 3; ++axis) {
-      text << (axis > 0 ? ", " : "") << 100.0 * matrix(axis, axis) << " %";
-    }
+  for (const auto& [drive, scale] : scales) {
+    text << (text.tellp() > 0 ? "; " : "") << 100.0 * scale.x() << " %, "
+         << 100.0 * scale.y() << " %, " << 100.0 * scale.z() << " %";
   }
   text << " added to the rates about the camera's x, y, z";
   return text.str();

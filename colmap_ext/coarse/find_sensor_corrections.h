@@ -15,7 +15,7 @@ namespace adasfm {
 
 // What timeshift_cam_imu lacks; drives where it is less than 1 ms are left out.
 TimeShiftMap FindTimeShifts(const std::vector<CoarseModel>& models);
-// Drives where no entry reaches 0.5 % are left out. Empty where a model has a
+// Drives where no axis reaches 0.5 % are left out. Empty where a model has a
 // focal length that is wrong and was not refined.
 GyroscopeScaleMap FindGyroscopeScales(const std::vector<CoarseModel>& models);
 

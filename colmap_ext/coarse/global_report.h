@@ -17,12 +17,6 @@ std::string FormatGlobalReportJson(const SceneData& scene,
 std::string FormatGlobalReportText(const GlobalStageResult& result,
                                    double total_seconds);
 
-// Warnings for the user: lost images, a corrected camera-IMU rotation, models
-// that contradict sensors, positions or verified pairs, and parts of a model
-// that are joined at one place only.
-std::vector<std::string> ListGlobalWarnings(const SceneData& scene,
-                                            const GlobalStageResult& result);
-
 // One line per removed pair: `name1 name2`, a tab, and why (EdgeRemovalName, or
 // that too few of its matches fit the poses).
 std::string FormatRemovedPairs(const SceneData& scene,

@@ -114,12 +114,10 @@ PosePriorCost::PosePriorCost(const PosePriorEdge& edge, Term term,
                                             direction_.transpose() *
                                             from_middle;
     if (term == Term::kRotation) {
-      const Eigen::Vector3d angles = LogSo3(rotation_);
       from_shared_ = {inverse_sigma_ * (Eigen::Matrix3d::Identity() -
                                         rotation_.toRotationMatrix()),
-                      inverse_sigma_ * Eigen::Matrix3d(angles.asDiagonal()),
-                      inverse_sigma_ * SymmetricOffDiagonal(angles),
                       inverse_sigma_ * edge.dt_s * from_middle};
+      has_gyroscope_scale_ = true;
     } else if (term == Term::kTranslation) {
       from_shared_ = {
           from_direction,
@@ -135,7 +133,8 @@ PosePriorCost::PosePriorCost(const PosePriorEdge& edge, Term term,
     }
   }
   *mutable_parameter_block_sizes() = {6, 6};
-  mutable_parameter_block_sizes()->resize(2 + from_shared_.size(), 3);
+  mutable_parameter_block_sizes()->resize(
+      2 + from_shared_.size() + (has_gyroscope_scale_ ? 1 : 0), 3);
   if (term == Term::kRotation) {
     if (edge.dt_s >= 0.0 && edge.windows.DependOnTimeShift()) {
       from_scalar_ = inverse_sigma_ * edge.windows.rotation_by_time_shift;
@@ -152,10 +151,10 @@ PosePriorCost::PosePriorCost(const PosePriorEdge& edge, Term term,
 
 bool PosePriorCost::Evaluate(double const* const* parameters, double* residuals,
                              double** jacobians) const {
-  double* no_jacobians[7] = {};
+  double* no_jacobians[6] = {};
   if (jacobians == nullptr) jacobians = no_jacobians;
   if (term_ == Term::kRotation) {
-    EvaluateRotation(residuals, jacobians);
+    EvaluateRotation(parameters, residuals, jacobians);
   } else {
     EvaluateTranslation(residuals, jacobians);
   }
@@ -177,7 +176,7 @@ void PosePriorCost::SubtractSharedErrors(double const* const* parameters,
     }
   }
   if (!from_scalar_) return;
-  const size_t last = 2 + from_shared_.size();
+  const size_t last = parameter_block_sizes().size() - 1;
   for (int row = 0; row < num_residuals(); ++row) {
     residuals[row] -= (*from_scalar_)[row] * *parameters[last];
     if (jacobians[last] != nullptr) {
@@ -186,7 +185,8 @@ void PosePriorCost::SubtractSharedErrors(double const* const* parameters,
   }
 }
 
-void PosePriorCost::EvaluateRotation(double* residuals,
+void PosePriorCost::EvaluateRotation(double const* const* parameters,
+                                     double* residuals,
                                      double** jacobians) const {
   const Eigen::Matrix3d cam2_from_cam1 =
       pose2_->rotation * pose1_->rotation.transpose();
@@ -194,10 +194,21 @@ void PosePriorCost::EvaluateRotation(double* residuals,
       LogSo3(Eigen::Quaterniond(cam2_from_cam1) * rotation_.conjugate());
   Eigen::Map<Eigen::Vector3d> residual(residuals);
   residual = inverse_sigma_ * error;
-  if (jacobians[0] == nullptr && jacobians[1] == nullptr) return;
   // Exp(b) R Exp(-a) = Exp(b) Exp(-R a) R: the error moves by Jl^-1 (b - R a).
-  const Eigen::Matrix3d from_turn2 =
-      inverse_sigma_ * RightJacobianInverseSo3(-error);
+  Eigen::Matrix3d from_turn2 = inverse_sigma_ * RightJacobianInverseSo3(-error);
+  if (has_gyroscope_scale_) {
+    const size_t block = 2 + from_shared_.size();
+    const Eigen::Vector3d scale(parameters[block]);
+    const Eigen::Vector3d angles = LogSo3(Eigen::Quaterniond(cam2_from_cam1));
+    residual -= inverse_sigma_ * scale.cwiseProduct(angles);
+    from_turn2 -=
+        inverse_sigma_ * scale.asDiagonal() * RightJacobianInverseSo3(-angles);
+    if (jacobians[block] != nullptr) {
+      Eigen::Map<Eigen::Matrix3d> by_scale(jacobians[block]);
+      by_scale = Eigen::Matrix3d((-inverse_sigma_ * angles).asDiagonal());
+    }
+  }
+  if (jacobians[0] == nullptr && jacobians[1] == nullptr) return;
   const Eigen::Matrix3d zero = Eigen::Matrix3d::Zero();
   WriteJacobian<3>(-from_turn2 * cam2_from_cam1 * pose1_->left_jacobian, zero,
                    jacobians[0]);

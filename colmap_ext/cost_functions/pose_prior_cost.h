@@ -31,15 +31,17 @@ Eigen::Vector2d DirectionError(const Eigen::Vector3d& vector,
 //   kTranslation: (t - t^) / sigma       3 residuals
 // Parameters: AdjustedPose::parameters of image 1 (6) and of image 2 (6), then,
 // when errors that all priors share affect the edge (shared_errors.h),
-//   kRotation: extrinsic_rotation (3), gyroscope_scale (3),
-//     gyroscope_misalignment (3), gyroscope_bias of the window (3)
+//   kRotation: extrinsic_rotation (3), gyroscope_bias of the window (3),
+//     gyroscope_scale (3)
 //   kDirection, kTranslation: driving_direction (3), direction_drift (3)
 //   kLength: direction_drift (3), where length_per_direction > 0
 //   kLength, kTranslation: length_scale (1), last, where has_length_scale
 //   kRotation: time_shift (1), last, where DependOnTimeShift()
-// whose effect on R^ and t^ is subtracted to first order. The poses are read
-// from the objects, which must be up to date. One cost per term, so that the
-// robust loss can reject a wrong term and keep the others.
+// whose effect on R^ and t^ is subtracted to first order. That of the
+// gyroscope's scales g is g o Log(R) with the R of the poses: with the noisy
+// R^, g would shrink the residuals. The poses are read from the objects, which
+// must be up to date. One cost per term, so that the robust loss can reject a
+// wrong term and keep the others.
 class PosePriorCost final : public ceres::CostFunction {
  public:
   using Term = PriorTerm;
@@ -52,7 +54,8 @@ class PosePriorCost final : public ceres::CostFunction {
                 double** jacobians) const final;
 
  private:
-  void EvaluateRotation(double* residuals, double** jacobians) const;
+  void EvaluateRotation(double const* const* parameters, double* residuals,
+                        double** jacobians) const;
   void EvaluateTranslation(double* residuals, double** jacobians) const;
   // Subtracts the shared errors from the residuals of the poses.
   void SubtractSharedErrors(double const* const* parameters, double* residuals,
@@ -67,9 +70,10 @@ class PosePriorCost final : public ceres::CostFunction {
   Eigen::Vector3d translation_;
   double length_ = 0.0;
   double inverse_sigma_ = 1.0;
-  // Effect of the shared parameters, subtracted from the residuals; as many
-  // rows as residuals are used.
+  // Effect of the first shared parameters, subtracted from the residuals; as
+  // many rows as residuals are used.
   std::vector<Eigen::Matrix3d> from_shared_;
+  bool has_gyroscope_scale_ = false;
   // The same of the last parameter, a number.
   std::optional<Eigen::Vector3d> from_scalar_;
 };

@@ -34,14 +34,6 @@ Value ValueOr(const Value& fallback, const std::map<int, Value>& values,
 
 }  // namespace
 
-Eigen::Matrix3d SharedErrors::GyroscopeScales(int drive) const {
-  const Eigen::Vector3d zero = Eigen::Vector3d::Zero();
-  Eigen::Matrix3d scales =
-      SymmetricOffDiagonal(ValueOr(zero, gyroscope_misalignment, drive));
-  scales.diagonal() = ValueOr(zero, gyroscope_scale, drive);
-  return scales;
-}
-
 Rigid3d SharedErrors::Correct(const Rigid3d& cam2_from_cam1, double dt_s,
                               const SharedErrorWindows& windows) const {
   const Eigen::Quaterniond& rotation = cam2_from_cam1.rotation;
@@ -51,7 +43,8 @@ Rigid3d SharedErrors::Correct(const Rigid3d& cam2_from_cam1, double dt_s,
       ValueOr(zero, extrinsic_rotation, windows.drive);
   const Eigen::Vector3d error =
       extrinsic - rotation * extrinsic +
-      GyroscopeScales(windows.drive) * LogSo3(rotation) +
+      LogSo3(rotation).cwiseProduct(
+          ValueOr(zero, gyroscope_scale, windows.drive)) +
       dt_s * (from_middle * ValueOr(zero, gyroscope_bias, windows.gyroscope)) +
       ValueOr(0.0, time_shift, windows.drive) * windows.rotation_by_time_shift;
   const Eigen::Vector3d drift =

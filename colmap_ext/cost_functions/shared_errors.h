@@ -61,27 +61,23 @@ struct SharedErrorWindows {
 
 // The errors of all drives. For a motion with the stated cam2_from_cam1 = (R^,
 // t^) over dt, H = Exp(Log(R^) / 2), to first order
-//   R = Exp(dt H b + (I - R^) e + S Log(R^) + c q) R^
+//   R = Exp(dt H b + (I - R^) e + g o Log(R^) + c q) R^
 //   t = (1 + s + k u . H d) Exp(H (m + d)) t^
 // with b: gyroscope_bias of its window, e: extrinsic_rotation and m:
 // driving_direction of its drive, d: direction_drift of its window, all in the
-// frame of the camera, u = t^ / |t^| and k = length_per_direction. S: the
-// symmetric matrix of the gyroscope's scale errors, gyroscope_scale on its
-// diagonal and gyroscope_misalignment beside it, of the drive; what is not
-// symmetric in a gyroscope's matrix of scales and misalignments is a rotation,
-// that is, part of e. c: time_shift of the drive, q: rotation_by_time_shift of
-// the motion. A rotation about u does not change t^, so that component of d
-// serves as the drift of the length. s: length_scale of the drive, where
-// several drives have lengths. A common scale of all lengths is not included:
-// it does not change the shape of the model, and only the lengths observe it.
+// frame of the camera, u = t^ / |t^| and k = length_per_direction. g:
+// gyroscope_scale of the drive, about each axis of the camera (o: by element).
+// c: time_shift of the drive, q: rotation_by_time_shift of the motion. A
+// rotation about u does not change t^, so that component of d serves as the
+// drift of the length. s: length_scale of the drive, where several drives have
+// lengths. A common scale of all lengths is not included: it does not change
+// the shape of the model, and only the lengths observe it.
 struct SharedErrors {
   // Errors that a map does not have are zero.
   std::map<int, Eigen::Vector3d> gyroscope_bias;      // by window, rad/s
   std::map<int, Eigen::Vector3d> extrinsic_rotation;  // by drive, rad
   std::map<int, Eigen::Vector3d> gyroscope_scale;     // by drive, relative
-  // S_yz, S_zx, S_xy, by drive, rad.
-  std::map<int, Eigen::Vector3d> gyroscope_misalignment;
-  std::map<int, Eigen::Vector3d> driving_direction;  // by drive, rad
+  std::map<int, Eigen::Vector3d> driving_direction;   // by drive, rad
   // By window: rad across the motion; along it relative length error over
   // length_per_direction.
   std::map<int, Eigen::Vector3d> direction_drift;
@@ -90,7 +86,6 @@ struct SharedErrors {
 
   Rigid3d Correct(const Rigid3d& cam2_from_cam1, double dt_s,
                   const SharedErrorWindows& windows) const;
-  Eigen::Matrix3d GyroscopeScales(int drive) const;  // S
 };
 
 // H: rotation from the frame in the middle of a motion to the later camera.

@@ -62,17 +62,17 @@ void WriteTimeShifts(const std::map<camera_t, double>& time_shift_s,
   }
 }
 
-void WriteGyroscopeScales(const std::map<camera_t, Eigen::Matrix3d>& scales,
+void WriteGyroscopeScales(const std::map<camera_t, Eigen::Vector3d>& scales,
                           SqliteConnection* database) {
   database->Execute(
       "CREATE TABLE adasfm_gyroscope_scales (camera_id INTEGER NOT NULL, "
       "scales BLOB NOT NULL)");
   SqliteStatement statement(
       database, "INSERT INTO adasfm_gyroscope_scales VALUES (?, ?)");
-  for (const auto& [camera_id, matrix] : scales) {
+  for (const auto& [camera_id, values] : scales) {
     statement.Reset();
     statement.BindInt(1, camera_id);
-    BindDoubles(&statement, 2, matrix.data(), 9);
+    BindDoubles(&statement, 2, values.data(), 3);
     statement.Step();
   }
 }
@@ -147,20 +147,18 @@ std::map<camera_t, double> ReadTimeShifts(SqliteConnection* database) {
   return shifts;
 }
 
-std::map<camera_t, Eigen::Matrix3d> ReadGyroscopeScales(
+std::map<camera_t, Eigen::Vector3d> ReadGyroscopeScales(
     SqliteConnection* database) {
-  std::map<camera_t, Eigen::Matrix3d> scales;
+  std::map<camera_t, Eigen::Vector3d> scales;
   if (!database->HasTable(kGyroscopeScaleTable)) return scales;
   const std::string row = std::string("table ") + kGyroscopeScaleTable;
   SqliteStatement statement(
       database, "SELECT camera_id, scales FROM adasfm_gyroscope_scales");
   while (statement.Step()) {
-    Eigen::Matrix3d matrix;
-    DoublesFromBlob(statement, 1, row, 9, matrix.data());
-    if (!matrix.allFinite() || !matrix.isApprox(matrix.transpose())) {
-      throw SqliteError(row + ": not a symmetric matrix");
-    }
-    scales.emplace(static_cast<camera_t>(statement.Int(0)), matrix);
+    Eigen::Vector3d values;
+    DoublesFromBlob(statement, 1, row, 3, values.data());
+    if (!values.allFinite()) throw SqliteError(row + ": not finite");
+    scales.emplace(static_cast<camera_t>(statement.Int(0)), values);
   }
   return scales;
 }

@@ -25,8 +25,8 @@ struct PriorCorrections {
   // none where T_cam_imu is right.
   std::map<camera_t, Eigen::Quaterniond> camera_imu;
   std::map<camera_t, double> time_shift_s;  // by camera, s
-  // By camera, symmetric, in its true frame (CorrectGyroscopeScales).
-  std::map<camera_t, Eigen::Matrix3d> gyroscope_scales;
+  // By camera, in its true frame (CorrectGyroscopeScales).
+  std::map<camera_t, Eigen::Vector3d> gyroscope_scales;
   std::vector<InertialLength> lengths;
 };
 
@@ -41,7 +41,7 @@ void RemovePriorCorrections(SqliteConnection* database);
 std::map<camera_t, Eigen::Quaterniond> ReadCameraImuCorrections(
     SqliteConnection* database);
 std::map<camera_t, double> ReadTimeShifts(SqliteConnection* database);
-std::map<camera_t, Eigen::Matrix3d> ReadGyroscopeScales(
+std::map<camera_t, Eigen::Vector3d> ReadGyroscopeScales(
     SqliteConnection* database);
 
 }  // namespace adasfm

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "colmap_ext/scene/drives.h"
 
+#include <algorithm>
 #include <map>
 
 #include "core/disjoint_sets.h"
@@ -42,6 +43,13 @@ void NumberDrives(SceneData* scene) {
   for (InertialMotion& motion : scene->inertial_motions) {
     motion.drive = scene->images.at(motion.image_id1).drive;
   }
+}
+
+std::string DriveName(const SceneData& scene, int drive) {
+  const auto prior = std::find_if(
+      scene.priors.begin(), scene.priors.end(),
+      [drive](const RelativePosePrior& prior) { return prior.drive == drive; });
+  return scene.images.at(prior->image_id1).name;
 }
 
 void RotatePriors(const CameraImuCorrectionMap& corrections,

@@ -3,6 +3,7 @@
 
 #include <Eigen/Geometry>
 #include <map>
+#include <string>
 #include <vector>
 
 #include "colmap_ext/scene/scene_data.h"
@@ -16,15 +17,18 @@ using CameraImuCorrectionMap = std::map<int, Eigen::Quaterniond>;
 // By drive: what timeshift_cam_imu lacks, s.
 using TimeShiftMap = std::map<int, double>;
 
-// By drive: scale errors and misalignments of the gyroscope
-// (CorrectGyroscopeScales in core/relative_pose_prior.h).
-using GyroscopeScaleMap = std::map<int, Eigen::Matrix3d>;
+// By drive: scale errors of the gyroscope (CorrectGyroscopeScales in
+// core/relative_pose_prior.h).
+using GyroscopeScaleMap = std::map<int, Eigen::Vector3d>;
 
 // Sets the drives of the scene's images, priors and inertial motions. Images
 // that priors connect are of one drive, and so are those of one camera or rig:
 // gaps in a log do not change the machine. Numbers follow the order of the
 // priors; images of other cameras have no drive.
 void NumberDrives(SceneData* scene);
+
+// What reports call a drive that has priors: its first image.
+std::string DriveName(const SceneData& scene, int drive);
 
 void RotatePriors(const CameraImuCorrectionMap& corrections,
                   std::vector<RelativePosePrior>* priors);

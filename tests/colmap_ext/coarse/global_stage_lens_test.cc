@@ -5,8 +5,8 @@
 #include <string>
 #include <vector>
 
-#include "colmap_ext/coarse/global_report.h"
 #include "colmap_ext/coarse/global_stage.h"
+#include "colmap_ext/coarse/global_warnings.h"
 #include "colmap_ext/host/colmap.h"
 #include "colmap_ext/host/pose_conversion.h"
 #include "core/so3.h"

@@ -9,6 +9,7 @@
 #include <string>
 
 #include "colmap_ext/coarse/global_report.h"
+#include "colmap_ext/coarse/global_warnings.h"
 #include "colmap_ext/coarse/refine_stage_matches.h"
 #include "colmap_ext/host/colmap.h"
 #include "colmap_ext/host/pose_conversion.h"

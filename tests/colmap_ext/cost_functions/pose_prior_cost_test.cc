@@ -159,7 +159,6 @@ TEST_P(PosePriorCostTest, SharedErrorsAreThoseThatCorrectTakesOut) {
     errors.gyroscope_bias[0] = random.GaussianVector(1e-3);
     errors.extrinsic_rotation[0] = random.GaussianVector(1e-3);
     errors.gyroscope_scale[0] = random.GaussianVector(1e-3);
-    errors.gyroscope_misalignment[0] = random.GaussianVector(1e-3);
     errors.driving_direction[0] = random.GaussianVector(1e-3);
     errors.direction_drift[0] = random.GaussianVector(1e-3);
     AdjustedPose pose1 = RandomPose(&random);
@@ -173,9 +172,8 @@ TEST_P(PosePriorCostTest, SharedErrorsAreThoseThatCorrectTakesOut) {
                                              pose2.parameters};
     if (is_rotation) {
       parameters.push_back(errors.extrinsic_rotation.at(0).data());
-      parameters.push_back(errors.gyroscope_scale.at(0).data());
-      parameters.push_back(errors.gyroscope_misalignment.at(0).data());
       parameters.push_back(errors.gyroscope_bias.at(0).data());
+      parameters.push_back(errors.gyroscope_scale.at(0).data());
       if (parameters.size() < cost.parameter_block_sizes().size()) {
         parameters.push_back(&errors.time_shift.at(0));
       }

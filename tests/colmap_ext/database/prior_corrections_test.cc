@@ -203,8 +203,7 @@ TEST_F(PriorCorrectionsTest, ShiftTheTime) {
 // Rates are corrected in the true frame of the camera.
 TEST_F(PriorCorrectionsTest, GyroscopeScalesCorrectThePriors) {
   ASSERT_TRUE(WritePriorTables(path_, tables_).ok());
-  Eigen::Matrix3d scales;
-  scales << 0.01, 0.002, 0.0, 0.002, -0.02, 0.003, 0.0, 0.003, 0.005;
+  const Eigen::Vector3d scales(0.01, -0.02, 0.005);
   PriorCorrections corrections = corrections_;
   corrections.gyroscope_scales[1] = scales;
   ASSERT_TRUE(RewriteTwoViewGeometries(path_, {}, {}, corrections).ok());

@@ -232,7 +232,7 @@ TEST_F(PriorTablesTest, RemovesAllThatItWrote) {
   WritePriorCorrections(
       {{{1, Eigen::Quaterniond::Identity()}},
        {{1, 0.004}},
-       {{1, 0.01 * Eigen::Matrix3d::Identity()}},
+       {{1, Eigen::Vector3d(0.01, 0.0, 0.0)}},
        {{tables.priors[0].image_id1, tables.priors[0].image_id2, 1.0}}},
       &database);
   RemovePriorTables(&database);
