@@ -16,8 +16,8 @@ namespace adasfm {
 struct SharedErrorOptions {
   bool enabled = true;
   // 1 sigma, per axis, of the random walk of the gyroscope bias that the import
-  // left.
-  double gyroscope_random_walk_rad_s_sqrt_s = 2e-5;
+  // left: of small gyroscopes that warm up, five times what they have at rest.
+  double gyroscope_random_walk_rad_s_sqrt_s = 1e-4;
   // Length of the windows with one bias each.
   double gyroscope_window_s = 20.0;
   // 1 sigma of the rotation of T_cam_imu, per axis.

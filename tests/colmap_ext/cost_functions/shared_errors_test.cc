@@ -252,6 +252,45 @@ TEST(SharedErrorsTest, AConstantBiasIsHeldBackOnce) {
   }
 }
 
+// A gyroscope that warms up: about the y axis, about which the camera turns.
+TEST(SharedErrorsTest, FollowsABiasThatDrifts) {
+  BundleWorldOptions world;
+  world.num_images = 200;
+  world.num_keypoints_per_image = 100;
+  world.pixel_noise_px = 0.3;
+  constexpr double kDrift = 3e-3;  // rad/s, from the first image to the last
+  SharedErrors none;
+  none.gyroscope_bias[0] = none.driving_direction[0] = Eigen::Vector3d::Zero();
+  double sum_m = 0.0, sum_without_drift_m = 0.0, sum_of_constant_m = 0.0;
+  for (const uint64_t seed : {1, 2, 3}) {
+    world.seed = seed;
+    const colmap::Reconstruction given = BuildBundleWorld(world);
+    PriorBundleAdjustmentOptions options = ConvergeFully();
+    options.keypoint_sigma_px = world.pixel_noise_px;
+    const auto adjust = [&](double drift) {
+      Random random(seed);
+      PriorBundleAdjustmentProblem problem = ProblemOfAll(given);
+      problem.priors = BiasedPriors(world, none, &random);
+      for (size_t k = 0; k < problem.priors.size(); ++k) {
+        PosePriorEdge& edge = problem.priors[k];
+        const double bias = drift * k / problem.priors.size();
+        Eigen::Quaterniond& rotation = edge.cam2_from_cam1.rotation;
+        rotation =
+            ExpSo3(-bias * edge.dt_s * Eigen::Vector3d::UnitY()) * rotation;
+      }
+      colmap::Reconstruction model = given;
+      EXPECT_TRUE(AdjustBundle(options, problem, &model).success);
+      return AlignedCenterError(world, model);
+    };
+    sum_m += adjust(kDrift);
+    sum_without_drift_m += adjust(0.0);
+    options.shared_errors.gyroscope_random_walk_rad_s_sqrt_s = 1e-7;
+    sum_of_constant_m += adjust(kDrift);
+  }
+  EXPECT_LT(sum_m, 1.2 * sum_without_drift_m);
+  EXPECT_LT(sum_m, 0.7 * sum_of_constant_m);
+}
+
 // Directions of driving with errors that are smooth in time, as after a
 // smoother: each error has the stated sigma, but neighbours do not average out.
 std::vector<PosePriorEdge> DriftingPriors(const BundleWorldOptions& options,

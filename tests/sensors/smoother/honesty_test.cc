@@ -138,6 +138,37 @@ INSTANTIATE_TEST_SUITE_P(
         Mismatch{"LateWheels", 0.0, 1.0, 1.0, 0.0, 0.0, 1.0, 0.025}),
     [](const auto& mismatch) { return mismatch.param.name; });
 
+// Priors of a log that comes late are those of the log on time, to a third of
+// their sigmas: the delay itself is known to 1.2 ms.
+TEST(WheelDelay, IsTakenOut) {
+  for (int seed = 1; seed <= 5; ++seed) {
+    SyntheticWorldOptions options = SmallWorld(seed, 120);
+    const SyntheticWorld world = BuildSyntheticWorld(options);
+    const auto estimate = [&](double delay_s) {
+      Mismatch mismatch;
+      mismatch.wheel_delay_s = delay_s;
+      const Dataset data = SpoiltDataset(world, mismatch, seed);
+      StatusOr<PriorEstimate> estimate =
+          EstimatePriors(data.images, data.logs, data.calibration, {}, {});
+      EXPECT_TRUE(estimate.ok()) << estimate.status().message();
+      return std::move(estimate).value();
+    };
+    const PriorEstimate on_time = estimate(0.0);
+    const PriorEstimate late = estimate(0.04);
+    ASSERT_EQ(late.priors.size(), on_time.priors.size());
+    double chi2 = 0.0;
+    for (size_t k = 0; k < late.priors.size(); ++k) {
+      const RelativePosePrior& prior = on_time.priors[k];
+      const Eigen::Vector3d difference =
+          late.priors[k].cam2_from_cam1.translation -
+          prior.cam2_from_cam1.translation;
+      chi2 += difference.dot(
+          prior.covariance.bottomRightCorner<3, 3>().inverse() * difference);
+    }
+    EXPECT_LT(chi2, 0.1 * 3.0 * late.priors.size()) << "seed " << seed;
+  }
+}
+
 // Relative errors of the priors' lengths, less their mean, which is the scale.
 std::vector<double> LengthErrors(const Dataset& data,
                                  const PriorEstimate& estimate) {
