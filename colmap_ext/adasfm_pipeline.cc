@@ -23,6 +23,7 @@
 #include "colmap_ext/scene/drives.h"
 #include "colmap_ext/stage_memory.h"
 #include "core/check_options.h"
+#include "core/parallel.h"
 #include "core/so3.h"
 #include "core/sqlite.h"
 #include "core/stopwatch.h"
@@ -218,6 +219,7 @@ StatusOr<PriorImport> ImportPriors(const PriorImportOptions& options,
 StatusOr<CoarseModelReport> EstimateCoarseModel(
     const GlobalStageOptions& options, const std::string& database_path,
     const std::string& output_path, const ProgressCallback& progress) {
+  const OneOpenMpThread one_thread;
   const Stopwatch watch;
   Status status = CheckOptions(options);
   if (status.ok()) {

@@ -29,6 +29,7 @@
 #include "colmap_ext/stage_memory.h"
 #include "core/check_options.h"
 #include "core/option_checker.h"
+#include "core/parallel.h"
 #include "core/sqlite.h"
 
 namespace adasfm {
@@ -323,6 +324,7 @@ bool MapOptions::IsValid(std::string* error) const {
 StatusOr<MapReport> MapParts(const MapOptions& options,
                              const MapRequest& request,
                              const ProgressCallback& progress) {
+  const OneOpenMpThread one_thread;
   Status status = CheckOptions(options);
   if (status.ok()) status = CheckMapPaths(request);
   if (!status.ok()) return status;

@@ -244,6 +244,9 @@ STEPS = {
         args, 'global_without_sensors', 'global_without_sensors.py'),
     'estimator_seeds': lambda args: run_script(args, 'estimator_seeds',
                                                'estimator_seeds.py'),
+    'sensor_errors': lambda args: run_script(
+        args, 'sensor_errors', 'sensor_errors.py', '--data_path',
+        args.data_path),
     'sessions': lambda args: run_script(
         args, 'sessions', 'session_tables.py', '--data_path', args.data_path,
         '--features_path', os.path.join(args.output_path, 'features'),

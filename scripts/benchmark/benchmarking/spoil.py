@@ -49,6 +49,39 @@ def keep_every(folder, name, step):
   edit_calibration(folder, change)
 
 
+def scale_columns(folder, name, columns, factor):
+  edit_rows(folder, name, lambda rows: [
+      ['%.9g' % (factor * float(value)) if i in columns else value
+       for i, value in enumerate(row)] for row in rows])
+
+
+def scale_rates(folder, factor):
+  scale_columns(folder, 'imu.csv', (1, 2, 3), factor)
+
+
+def scale_accelerations(folder, factor):
+  scale_columns(folder, 'imu.csv', (4, 5, 6), factor)
+
+
+def drift_gyroscope(folder, end_rad_s):
+  """Adds to each axis a rate that grows linearly from zero to end_rad_s."""
+  def change(rows):
+    begin, end = int(rows[0][0]), int(rows[-1][0])
+    return [row[:1] +
+            ['%.9g' % (float(value) +
+                       end_rad_s * (int(row[0]) - begin) / (end - begin))
+             for value in row[1:4]] + row[4:] for row in rows]
+  edit_rows(folder, 'imu.csv', change)
+
+
+def jitter_times(folder, name, sigma_s):
+  """Adds white noise to the times of a log; its rows keep their order."""
+  generator = random.Random(7)
+  edit_rows(folder, name, lambda rows: [
+      [str(int(row[0]) + int(generator.gauss(0.0, sigma_s * 1e9)))] + row[1:]
+      for row in rows])
+
+
 def shift_gyroscope(folder, bias_rad_s):
   edit_rows(folder, 'imu.csv', lambda rows: [
       row[:1] + ['%.9g' % (float(value) + bias)
