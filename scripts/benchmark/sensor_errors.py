@@ -9,7 +9,9 @@ docs/results/sensor_errors.md. Rows that are done are not run again.
 
 import argparse
 import functools
+import math
 import os
+import re
 import shutil
 import sys
 
@@ -21,9 +23,29 @@ WORLDS = ['world-clean-300', 'world-hard-400', 'world-alias-300',
           'world-kitti10-592']
 FILES = ['database.db', 'sensors.yaml', 'imu.csv', 'wheel.csv', 'times.csv',
          'gt.txt']
-# Sigmas of a sample at 200 Hz by the calibrations of these worlds.
-RATE_SIGMA_RAD_S = 0.007
-ACCELERATION_SIGMA_M_S2 = 0.07
+
+
+def imu_figure(folder, name):
+  """What the calibration states of the IMU."""
+  with open(os.path.join(folder, 'sensors.yaml')) as file:
+    text = file.read()
+  return float(re.search(r'imu0:.*?\b%s: *(\S+)' % name, text,
+                         re.DOTALL).group(1))
+
+
+def add_noise(folder, factor):
+  """Makes the IMU's noise this many times what is stated."""
+  added = math.sqrt((factor ** 2 - 1) * imu_figure(folder, 'update_rate'))
+  spoil.add_imu_noise(
+      folder, added * imu_figure(folder, 'gyroscope_noise_density'),
+      added * imu_figure(folder, 'accelerometer_noise_density'))
+
+
+def thin_imu(folder, rate_hz):
+  spoil.keep_every(folder, 'imu.csv',
+                   round(imu_figure(folder, 'update_rate') / rate_hz))
+
+
 ERRORS = {
     'none': None,
     'rates of the gyroscope 1 % too large':
@@ -45,10 +67,8 @@ ERRORS = {
     'wheels 5 % too long': lambda folder: spoil.scale_wheels(folder, 1.05),
     'accelerations 2 % too large':
         lambda folder: spoil.scale_accelerations(folder, 1.02),
-    'IMU with four times the stated noise':
-        lambda folder: spoil.add_imu_noise(folder, 3.9 * RATE_SIGMA_RAD_S,
-                                           3.9 * ACCELERATION_SIGMA_M_S2),
-    'IMU at 20 Hz': lambda folder: spoil.keep_every(folder, 'imu.csv', 10),
+    'IMU with four times its stated noise': lambda folder: add_noise(folder, 4),
+    'IMU thinned to 20 Hz': lambda folder: thin_imu(folder, 20),
 }
 
 

@@ -30,7 +30,9 @@ class SpoilTest(FolderTest):
         file.write('\n'.join([HEADERS[name]] +
                              [','.join(map(str, row)) for row in rows]) + '\n')
     with open(os.path.join(self.folder, 'sensors.yaml'), 'w') as file:
-      file.write('imu0:\n  update_rate: 100.0\n')
+      file.write('imu0:\n  update_rate: 100.0\n'
+                 '  gyroscope_noise_density: 0.001\n'
+                 '  accelerometer_noise_density: 0.01\n')
     change = sensor_errors.ERRORS[error]
     if change:
       change(self.folder)
@@ -55,6 +57,14 @@ class SpoilTest(FolderTest):
       for axis, rate in enumerate((0.1, -0.2, 0.3)):
         self.assertAlmostEqual(row[1 + axis], rate + 0.005 * share)
       self.assertEqual(row[4:], [1.0, 2.0, 9.81])
+
+  def test_imu_is_thinned_to_the_rate_and_noise_has_its_size(self):
+    self.assertEqual(len(self.spoil('IMU thinned to 20 Hz')['imu.csv']), 21)
+    rows = self.spoil('IMU with four times its stated noise')['imu.csv']
+    # Of 100 Hz: 0.01 rad/s times sqrt(15). 303 samples determine it to 4 %.
+    square = sum((row[1 + axis] - rate) ** 2 for row in rows
+                 for axis, rate in enumerate((0.1, -0.2, 0.3))) / 303
+    self.assertAlmostEqual(square ** 0.5 / (0.01 * 15 ** 0.5), 1.0, delta=0.16)
 
   def test_scales_change_rates_or_accelerations(self):
     row = self.spoil('rates of the gyroscope 1 % too large')['imu.csv'][7]

@@ -49,18 +49,18 @@ def keep_every(folder, name, step):
   edit_calibration(folder, change)
 
 
-def scale_columns(folder, name, columns, factor):
+def scale_columns(folder, name, begin, end, factor):
   edit_rows(folder, name, lambda rows: [
-      ['%.9g' % (factor * float(value)) if i in columns else value
-       for i, value in enumerate(row)] for row in rows])
+      row[:begin] + ['%.9g' % (factor * float(value))
+                     for value in row[begin:end]] + row[end:] for row in rows])
 
 
 def scale_rates(folder, factor):
-  scale_columns(folder, 'imu.csv', (1, 2, 3), factor)
+  scale_columns(folder, 'imu.csv', 1, 4, factor)
 
 
 def scale_accelerations(folder, factor):
-  scale_columns(folder, 'imu.csv', (4, 5, 6), factor)
+  scale_columns(folder, 'imu.csv', 4, 7, factor)
 
 
 def drift_gyroscope(folder, end_rad_s):
@@ -99,9 +99,7 @@ def add_imu_noise(folder, rate_sigma_rad_s, acceleration_sigma_m_s2):
 
 
 def scale_wheels(folder, factor):
-  edit_rows(folder, 'wheel.csv', lambda rows: [
-      row[:1] + ['%.6f' % (factor * float(value)) for value in row[1:]]
-      for row in rows])
+  scale_columns(folder, 'wheel.csv', 1, 3, factor)
 
 
 def cut_logs(folder, names, begin, end):
