@@ -106,14 +106,13 @@ void SharedErrorBlocks::AddPriors(ceres::Problem* problem) {
 // only a prior on its step. Priors on all values would penalise a constant bias
 // once a window.
 void SharedErrorBlocks::AddGyroscopePriors(ceres::Problem* problem) {
-  constexpr double kSigma = 1e-3;  // rad/s, per axis: what the import left.
   const double step_sigma = options_.gyroscope_random_walk_rad_s_sqrt_s *
                             std::sqrt(options_.gyroscope_window_s);
   std::map<int, Block*> last_of_drive;
   for (auto& [key, block] : gyroscope_bias_) {
     Block*& before = last_of_drive[block.drive];
     if (!options_.enabled || before == nullptr || !(step_sigma > 0.0)) {
-      AddPrior(kSigma, &block, problem);
+      AddPrior(kGyroscopeBiasSigmaRadS, &block, problem);
     } else {
       AddStep(step_sigma, 1.0, before, &block, problem);
     }

@@ -39,6 +39,9 @@ struct SharedErrorOptions {
   bool IsValid(std::string* error) const;
 };
 
+// 1 sigma of the gyroscope's bias that the import left at the beginning of a
+// drive, per axis.
+inline constexpr double kGyroscopeBiasSigmaRadS = 1e-3;
 // Length of the windows with one direction drift each.
 inline constexpr double kDirectionWindowS = 2.0;
 

@@ -34,10 +34,10 @@ struct PriorResiduals {
 
 // Adds the residuals of the scene's priors between images of the model that
 // points constrain. Translations are those of priors with direction and length
-// [m]. Two corrections are no contradictions and are taken out: the shared
-// rotation of the direction of driving, an unknown of the adjustment
-// (shared_errors.h), and size_over_priors, by which the finished model was
-// enlarged.
+// [m]. Three errors are no contradictions and are taken out: what drives share
+// of the gyroscope's bias, which walks, and of the direction of driving, both
+// unknowns of the adjustment (shared_errors.h), and size_over_priors, by which
+// the finished model was enlarged.
 void AddPriorResiduals(const SceneData& data,
                        const colmap::Reconstruction& model,
                        double size_over_priors, PriorResiduals* residuals);

@@ -60,10 +60,11 @@ RotatedMotion RotateMotion(const ChainMotion& motion,
   // rotation of the frames in between is good enough for a few steps.
   rotated.rotation_change.leftCols<3>() =
       Eigen::Matrix3d::Identity() - rotated.rotation;
-  rotated.camera_from_middle =
-      ExpSo3(0.5 * LogSo3(rotation)).toRotationMatrix();
+  const Eigen::Vector3d angles = LogSo3(rotation);
+  rotated.camera_from_middle = ExpSo3(0.5 * angles).toRotationMatrix();
   rotated.rotation_change.middleCols<3>(kRateUnknown) =
       seconds * rotated.camera_from_middle;
+  rotated.rotation_change.middleCols<3>(kScaleUnknown) = angles.asDiagonal();
   const Eigen::Vector3d& translation = motion.cam2_from_cam1.translation;
   const double length = translation.norm();
   rotated.has_direction = motion.has_position && length > kMinLengthM;

@@ -14,12 +14,13 @@ namespace adasfm {
 
 // Unknowns that all pairs share, three numbers each: the error of the
 // camera-IMU rotation, the error of the direction of driving relative to it
-// (both rad), the gyroscope's bias (rad/s) and the offset of visual rotations
-// in the later camera (rad). A direction of motion cannot separate the first
-// two.
-constexpr int kNumExtrinsicUnknowns = 12;
+// (both rad), the gyroscope's bias (rad/s), its scales about the camera's axes
+// (relative; shared_errors.h) and the offset of visual rotations in the later
+// camera (rad). A direction of motion cannot separate the first two.
+constexpr int kNumExtrinsicUnknowns = 15;
 constexpr int kDrivingDirectionUnknown = 3;
 constexpr int kRateUnknown = 6;
+constexpr int kScaleUnknown = 9;
 // Pairs at most this many steps of the chain apart are used.
 inline constexpr int kMaxNumExtrinsicSteps = 10;
 

@@ -142,6 +142,32 @@ TEST_F(VerdictTest, SensorsThatContradictVision) {
   ExpectResult(Assess(), VerdictResult::kGood, "");
 }
 
+// A gyroscope that warms up slowly disagrees with vision, but does not
+// contradict it; a bias that jumps to and fro does.
+TEST_F(VerdictTest, BiasesThatDriftAreNoContradiction) {
+  const SceneData honest = world_.data;
+  constexpr double kLargestRadS = 0.001;
+  constexpr double kStepS = 2.5;
+  const auto add_bias = [&](const auto& share_of_step) {
+    world_.data = honest;
+    std::vector<RelativePosePrior>& priors = world_.data.priors;
+    for (size_t i = 0; i < priors.size(); ++i) {
+      priors[i].dt_ns = NsFromSeconds(kStepS);
+      const double bias = kLargestRadS * share_of_step(i);
+      priors[i].cam2_from_cam1.rotation =
+          ExpSo3(Eigen::Vector3d(0.0, kStepS * bias, 0.0)) *
+          priors[i].cam2_from_cam1.rotation;
+    }
+    return Assess();
+  };
+  const Verdict drifts =
+      add_bias([&](size_t i) { return 2.0 * i / honest.priors.size() - 1.0; });
+  ExpectResult(drifts, VerdictResult::kGood, "rotations agree to 100 %");
+  EXPECT_LT(drifts.priors[0].chi2_ratio, 1.5);
+  ExpectResult(add_bias([](size_t i) { return i % 2 == 0 ? 1.0 : -1.0; }),
+               VerdictResult::kFailed, "rotations contradict");
+}
+
 // The model has the shape of vision, but its scale contradicts the priors.
 TEST_F(VerdictTest, WrongLengthsAreDoubtfulUnlessKeypointsWereLetGo) {
   for (RelativePosePrior& prior : world_.data.priors) {
