@@ -17,8 +17,8 @@ namespace {
 // L1 weights are bounded: residuals below this (relative to the edge's length)
 // weigh alike.
 constexpr double kMinResidual = 1e-3;
-// Least relative sigma of lengths from shared points in the refinement:
-// neighbouring edges share points, so their errors are not independent.
+// Least relative sigma of lengths from shared points: neighbouring edges share
+// points, so their errors are not independent.
 constexpr double kMinSoftLengthSigma = 0.05;
 
 constexpr int kMaxNumIterations = 100;
@@ -168,9 +168,12 @@ class PositionSolver {
       if (has_centers) {
         residual = (difference - length * edge.direction).norm() / scale;
       }
+      // One sigma for all three axes. With that of its direction alone, a free
+      // edge in a wrong direction would outvote twenty edges whose lengths are
+      // known to 5 %.
       const double sigma =
-          is_held ? std::max(edge.direction_sigma, edge.length_sigma / scale)
-                  : edge.direction_sigma;
+          std::max(edge.direction_sigma,
+                   is_held ? edge.length_sigma / scale : kMinSoftLengthSigma);
       const double weight =
           1.0 / (sigma * std::max(residual, kMinResidual) * scale * scale);
       const bool is_silent = !is_held && length == 0.0;

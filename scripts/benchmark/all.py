@@ -218,6 +218,8 @@ STEPS = {
                                      '--data_path', args.data_path),
     'candidates': lambda args: run_script(args, 'candidates',
                                           'candidate_tables.py'),
+    'refinements': lambda args: run_script(args, 'refinements',
+                                           'refinement_tables.py'),
     # After readme and two_view, since it reads their figures.
     'paper': lambda args: run_script(
         args, 'paper', 'paper_figures.py', '--data_path', args.data_path,

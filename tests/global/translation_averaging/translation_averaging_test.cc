@@ -169,6 +169,47 @@ TEST(TranslationAveraging, IsAsGoodAsLeastUnsquaredDeviations) {
   EXPECT_LT(sum / 5, 0.05);
 }
 
+// A straight drive, each image with the ten before it. The farthest of these
+// pairs share too few points for a length, and a tenth of them err by 7 deg
+// with a sigma of 0.1 deg.
+TEST(TranslationAveraging, WrongDirectionsOfSmallSigmaDoNotOutvoteLengths) {
+  for (uint64_t seed = 1; seed <= 5; ++seed) {
+    Random random(seed);
+    PositionProblem problem;
+    for (int k = 1; k <= 60; ++k) {
+      problem.graph.images.push_back(k);
+      problem.rotations[k] = Eigen::Quaterniond::Identity();
+      problem.truth[k] = CamFromWorldWithCenter(
+          problem.rotations[k],
+          Eigen::Vector3d(0, 0, k) + random.GaussianVector(0.02));
+      for (int i = std::max(1, k - 10); i < k; ++i) {
+        Rigid3d motion =
+            ComputeCam2FromCam1(problem.truth.at(i), problem.truth.at(k));
+        const double length = motion.translation.norm();
+        const bool is_far = k - i >= 9;
+        const bool is_wrong = is_far && random.Uniform(0, 1) < 0.1;
+        const double noise_rad = is_wrong ? 0.12 : 0.003;
+        motion.translation = ExpSo3(random.GaussianVector(noise_rad)) *
+                             motion.translation.normalized();
+        problem.graph.edges.push_back(BuildEdge(ImagePair(i, k), motion));
+        problem.graph.edges.back().direction_sigma_rad =
+            is_wrong ? 0.002 : 0.003;
+        problem.lengths.push_back(std::nullopt);
+        if (!is_far) {
+          problem.lengths.back() =
+              EdgeLength{length * (1.0 + random.Gaussian(0.03)), 0.03};
+        }
+      }
+    }
+    const GlobalPositions result =
+        EstimateGlobalPositions(TranslationAveragingOptions(), problem.graph,
+                                problem.rotations, problem.lengths, {});
+    ASSERT_TRUE(result.success);
+    const AlignedErrors errors = Errors(problem, result.centers);
+    EXPECT_LT(errors.rmse_m, 0.1) << "seed " << seed;
+  }
+}
+
 TEST(TranslationAveraging, IsNeverSilentAboutDisconnectedGraphs) {
   PositionProblem problem = BuildProblem(6, 0, 0, 0, false, 1);
   problem.graph.images.push_back(50);
