@@ -17,8 +17,8 @@ import subprocess
 import sys
 
 from benchmarking.figures import add_arguments, run_table, world_folder
-from benchmarking.methods import list_models, make_coarse_model
-from benchmarking.process import Failed, run
+from benchmarking.methods import list_models, run_adasfm
+from benchmarking.process import Failed
 
 NUM_IMAGES = 300
 SEEDS = range(1, 4)
@@ -54,21 +54,16 @@ def map_world(world, folder, options, args):
   """Final models, the largest first, and the verdict; 'failed' without any."""
   shutil.rmtree(folder, ignore_errors=True)
   os.makedirs(folder)
-  log_path = os.path.join(folder, 'run.log')
-  database = os.path.join(folder, 'database.db')
-  output = os.path.join(folder, 'model')
-  shutil.copy(os.path.join(world, 'database.db'), database)
+  shutil.copy(os.path.join(world, 'database.db'), folder)
   try:
-    make_coarse_model(folder, world, args, False, {'global': options})
-    run([args.colmap, 'adasfm_mapper', '--database_path', database,
-         '--input_path', os.path.join(folder, 'global'), '--output_path',
-         output], log_path)
+    output, _ = run_adasfm(folder, world, args, False, {'global': options})
   except Failed:
     return {'models': [], 'verdict': 'failed'}
   with open(os.path.join(output, 'summary.json')) as file:
     verdict = json.load(file)['verdict']['result']
   return {'models': list_models(output, os.path.join(world, 'gt.txt'), args,
-                                log_path), 'verdict': verdict}
+                                os.path.join(folder, 'run.log')),
+          'verdict': verdict}
 
 
 def run_world(kind, seed, args):
