@@ -91,6 +91,10 @@ inline void AddTimeShift(double shift_s, RelativePosePrior* prior) {
   motion.translation += shift_s * prior->translation_by_time_shift;
 }
 
+// 1 sigma of a gyroscope's scale, relative, per axis: of data sheets of small
+// ones.
+inline constexpr double kGyroscopeScaleSigma = 0.01;
+
 // Corrects the prior for the scale errors of the gyroscope: the shares by which
 // the rates about the axes of the camera have to grow.
 inline void CorrectGyroscopeScales(const Eigen::Vector3d& scales,

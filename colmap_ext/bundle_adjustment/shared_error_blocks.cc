@@ -88,8 +88,6 @@ void SharedErrorBlocks::AddPriors(ceres::Problem* problem) {
   for (auto& [key, block] : extrinsic_rotation_) {
     AddPrior(options_.extrinsic_rotation_sigma_rad, &block, problem);
   }
-  // Of data sheets of small gyroscopes, relative, per axis.
-  constexpr double kGyroscopeScaleSigma = 0.01;
   for (auto& [key, block] : gyroscope_scale_) {
     AddPrior(kGyroscopeScaleSigma, &block, problem);
   }

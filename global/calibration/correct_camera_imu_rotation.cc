@@ -28,11 +28,10 @@ using RotationCovariance =
 // Fewer spans of the drive do not determine the spread between spans.
 constexpr int kMinNumSpans = 5;
 // 1 sigma of the other unknowns: the direction of driving as in the odometry
-// chain, the remaining gyroscope bias, its scales as in the adjustments, and an
-// error that all two-view rotations share.
+// chain, the remaining gyroscope bias, and an error that all two-view rotations
+// share.
 constexpr double kDrivingDirectionSigmaRad = 0.01;
 constexpr double kRateSigmaRadS = 1e-3;
-constexpr double kScaleSigma = 0.01;
 constexpr double kOffsetSigmaRad = 2e-3;
 
 std::vector<ExtrinsicObservation> Observe(
@@ -79,7 +78,7 @@ Unknowns PriorSigmas(const CameraImuRotationOptions& options) {
   sigmas << Eigen::Vector3d::Constant(DegToRad(options.sigma_deg)),
       Eigen::Vector3d::Constant(kDrivingDirectionSigmaRad),
       Eigen::Vector3d::Constant(kRateSigmaRadS),
-      Eigen::Vector3d::Constant(kScaleSigma),
+      Eigen::Vector3d::Constant(kGyroscopeScaleSigma),
       Eigen::Vector3d::Constant(kOffsetSigmaRad);
   return sigmas;
 }
