@@ -170,9 +170,9 @@ TrajectoryOdometry CoarsePoseEstimator::BuildTrajectoryOdometry(
     odometry.chain = OdometryChain(steps.priors, options, frame_priors_);
     odometry.unit = steps.unit_m;
     lengths = steps.lengths;
-    *summary = "; vision added " + std::to_string(steps.num_by_vision) +
-               " odometry edges, of which " + std::to_string(num_rejected) +
-               " were rejected";
+    *summary = "; vision gave " + std::to_string(steps.num_by_vision) +
+               " odometry edges a position, " + std::to_string(num_rejected) +
+               " visual odometry edges rejected";
   }
   odometry.lengths.resize(graph_.edges.size());
   if (lengths.metric) odometry.lengths = lengths.lengths;

@@ -11,9 +11,8 @@
 namespace adasfm {
 
 // Rejects visual odometry that its own pairs contradict: photos in any order
-// and a hand-held camera must exclude no pair, while a drive that was filmed in
-// order keeps its chain. steps->priors from num_sensor_priors on are by vision
-// alone.
+// must exclude no pair, while a drive that was filmed in order keeps its chain.
+// steps->priors from num_sensor_priors on are by vision alone.
 // A run is a sequence of consecutive visual odometry edges. It is rejected when
 // more than 5 % of the pairs within it, 2 to kMaxNumVisualSteps edges long,
 // fail the chi-square test against the chain. Returns the number of odometry

@@ -14,8 +14,14 @@
 namespace adasfm {
 namespace {
 
-// 1 sigma, per axis, of the drift of a visual step's rotation.
-constexpr double kRotationErrorRad = DegToRad(0.3);
+// 1 sigma of a visual step's length, as a ratio.
+constexpr double kLengthErrorRatio = 0.1;
+// Least sigmas of a visual step's rotation (per axis) and direction, rad. A few
+// wrong matches that the pose of verification fits hold both in a second
+// optimum, by far more than the sigmas of the pair (docs/reference/math.md,
+// Step 1).
+constexpr double kMinRotationSigma = 0.01;
+constexpr double kMinDirectionSigma = 0.05;
 
 int FindVisualEdge(const ViewGraph& graph, const ImagePair& pair) {
   const int e = FindEdge(graph, pair);
@@ -103,8 +109,7 @@ Rigid3d VisualMotion(const ViewGraphEdge& edge,
 }
 
 void FillRotation(const ViewGraphEdge& edge, RelativePosePrior* prior) {
-  const double sigma_rad =
-      std::hypot(edge.rotation_sigma_rad, kRotationErrorRad);
+  const double sigma_rad = std::max(edge.rotation_sigma_rad, kMinRotationSigma);
   prior->cam2_from_cam1.rotation = VisualMotion(edge, *prior).rotation;
   prior->covariance.setZero();
   prior->covariance.topLeftCorner<3, 3>() =
@@ -117,10 +122,9 @@ void FillPosition(const ViewGraphEdge& edge, const EdgeLength& length,
   const Eigen::Vector3d direction =
       VisualMotion(edge, *prior).translation.normalized();
   const double along =
-      length.length * std::hypot(length.log_sigma, kVisualLengthErrorRatio);
+      length.length * std::hypot(length.log_sigma, kLengthErrorRatio);
   const double across =
-      length.length *
-      std::hypot(edge.direction_sigma_rad, DegToRad(kVisualDirectionErrorDeg));
+      length.length * std::max(edge.direction_sigma_rad, kMinDirectionSigma);
   SetTranslation(length.length * direction,
                  CovarianceAlong(direction, along, across), prior);
 }
@@ -168,7 +172,7 @@ VisualOdometryEdges AddVisualOdometry(
     known_lengths[pair] = lengths.lengths[e]->length;
     ++steps.num_by_vision;
   }
-  const double sigma = kVisualLengthErrorRatio * MedianLength(steps.priors);
+  const double sigma = kLengthErrorRatio * MedianLength(steps.priors);
   for (RelativePosePrior* prior : standstills) {
     SetTranslation(Eigen::Vector3d::Zero(),
                    sigma * sigma * Eigen::Matrix3d::Identity(), prior);

@@ -18,9 +18,6 @@ namespace adasfm {
 // Pairs at most this many steps apart determine the lengths of steps, and are
 // tested by RejectVisualOdometry.
 inline constexpr int kMaxNumVisualSteps = 10;
-// 1 sigma of a visual step's length, as a ratio, and of its direction.
-inline constexpr double kVisualLengthErrorRatio = 0.1;
-inline constexpr double kVisualDirectionErrorDeg = 1.0;
 // 1 sigma of the change of scale at each step where no priors constrain the
 // scale (OdometryChainOptions::scale_drift_ratio). With 1.5 % a drive of 1,000
 // images with aliased places folds.

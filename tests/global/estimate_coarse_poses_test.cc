@@ -136,7 +136,7 @@ TEST(EstimateCoarsePoses, VisionCompletesAHoleInThePriors) {
                             problem.correspondences, problem.priors);
     return std::any_of(
         result.steps.begin(), result.steps.end(), [](const CoarseStep& step) {
-          return step.summary.find("vision added 1 ") != std::string::npos;
+          return step.summary.find("vision gave 1 ") != std::string::npos;
         });
   };
   EXPECT_FALSE(added_edges());
