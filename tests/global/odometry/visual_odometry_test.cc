@@ -98,7 +98,7 @@ TEST(AddVisualOdometry, WithoutMetresTheUnitIsAStep) {
   EXPECT_NEAR(steps.unit_m, first, 0.5 * first);
 }
 
-// The sigmas of 400 exact matches say nothing of a second optimum.
+// The sigmas of the pairs, however small, say nothing of a second optimum.
 TEST(AddVisualOdometry, SigmasHaveAFloor) {
   StepProblem problem = BuildProblem(1, [](int) { return false; });
   for (ViewGraphEdge& edge : problem.scene.graph.edges) {
