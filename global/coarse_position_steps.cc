@@ -120,7 +120,7 @@ int CoarsePoseEstimator::ReportUnconfirmedClosures() {
   constexpr int kMinNumImages = 10;
   int num_closures = 0;
   if (result_.loop_closures.segments_were_split) return num_closures;
-  for (const UnconfirmedClosure& closure :
+  for (const SegmentClosure& closure :
        result_.loop_closures.unconfirmed_closures) {
     if (closure.num_images < kMinNumImages) continue;
     for (CoarseComponent& component : result_.components) {

@@ -9,7 +9,7 @@
 #include "core/so3.h"
 #include "global/calibration/extrinsic_observations.h"
 #include "global/coarse_pose_estimator.h"
-#include "global/loop_closures/reject_visual_odometry.h"
+#include "global/loop_closures/judge_visual_odometry.h"
 #include "global/odometry/visual_odometry.h"
 #include "global/rotation_averaging/filter_edges_by_rotation.h"
 
@@ -167,12 +167,17 @@ TrajectoryOdometry CoarsePoseEstimator::BuildTrajectoryOdometry(
     }
     const int num_rejected = RejectVisualOdometry(
         options_.loops, options, graph_, priors_.size(), &steps);
+    const double sigma_ratio =
+        FitVisualSigmas(priors_, options, graph_, &steps);
     odometry.chain = OdometryChain(steps.priors, options, frame_priors_);
     odometry.unit = steps.unit_m;
     lengths = steps.lengths;
-    *summary = "; vision gave " + std::to_string(steps.num_by_vision) +
-               " odometry edges a position, " + std::to_string(num_rejected) +
-               " visual odometry edges rejected";
+    char text[128];
+    std::snprintf(text, sizeof(text),
+                  "; vision gave %d odometry edges a position, sigmas times "
+                  "%.2f, %d visual odometry edges rejected",
+                  steps.num_by_vision, sigma_ratio, num_rejected);
+    *summary = text;
   }
   odometry.lengths.resize(graph_.edges.size());
   if (lengths.metric) odometry.lengths = lengths.lengths;

@@ -56,7 +56,7 @@ struct CoarseComponent {
   bool positions_converged = false;
   double sdp_optimality = 0.0;
   // Closures that may be perceptual aliasing; none with odometry throughout.
-  std::vector<UnconfirmedClosure> unconfirmed_closures;
+  std::vector<SegmentClosure> unconfirmed_closures;
 };
 
 struct CoarseStep {

@@ -16,9 +16,9 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 Json ClosuresJson(const SceneData& scene,
-                  const std::vector<UnconfirmedClosure>& closures) {
+                  const std::vector<SegmentClosure>& closures) {
   Json json = Json::array();
-  for (const UnconfirmedClosure& closure : closures) {
+  for (const SegmentClosure& closure : closures) {
     json.push_back({{"name1", scene.images.at(closure.image_id1).name},
                     {"name2", scene.images.at(closure.image_id2).name},
                     {"pairs", closure.num_pairs},
@@ -39,6 +39,7 @@ Json SegmentClosuresJson(const SceneData& scene,
                          const LoopClosureReport& report) {
   return {{"parts", report.num_segments},
           {"confirmed", report.num_confirmed_closures},
+          {"by_vision", ClosuresJson(scene, report.closures_by_vision)},
           {"pairs_removed", report.num_pairs_of_unconfirmed_closures},
           {"not_made", report.segments_were_split
                            ? ClosuresJson(scene, report.unconfirmed_closures)

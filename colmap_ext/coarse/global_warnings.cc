@@ -16,7 +16,7 @@ namespace {
 constexpr int kMinNumReportedPairs = 3;
 
 std::string DescribeUnconfirmedClosure(const SceneData& scene,
-                                       const UnconfirmedClosure& closure) {
+                                       const SegmentClosure& closure) {
   std::ostringstream text;
   text << "a trajectory segment of " << closure.num_images
        << " images is connected to another only by " << closure.num_pairs
@@ -25,6 +25,19 @@ std::string DescribeUnconfirmedClosure(const SceneData& scene,
        << "; neither sensors nor a second place confirm them, so they may be "
           "places that look alike: the segments become two models "
           "(--AdaSfmGlobal.split_unconfirmed_closures 0 joins them)";
+  return text.str();
+}
+
+std::string DescribeClosureByVision(const SceneData& scene,
+                                    const SegmentClosure& closure) {
+  std::ostringstream text;
+  text << "a trajectory segment of " << closure.num_images
+       << " images is joined to another by " << closure.num_pairs
+       << " pairs like " << scene.images.at(closure.image_id1).name << " and "
+       << scene.images.at(closure.image_id2).name
+       << ", which vision alone confirms: if these are streets that look alike "
+          "around a corner the model is folded; look at both photos, or add "
+          "sensors that cover the gap";
   return text.str();
 }
 
@@ -190,14 +203,19 @@ std::vector<std::string> ListGlobalWarnings(const SceneData& scene,
     warnings.push_back(text.str());
   }
   const LoopClosureReport& loops = result.poses.loop_closures;
-  for (const UnconfirmedClosure& closure : loops.unconfirmed_closures) {
+  for (const SegmentClosure& closure : loops.unconfirmed_closures) {
     if (loops.segments_were_split &&
         closure.num_pairs >= kMinNumReportedPairs) {
       warnings.push_back(DescribeUnconfirmedClosure(scene, closure));
     }
   }
+  for (const SegmentClosure& closure : loops.closures_by_vision) {
+    if (loops.segments_were_split) {
+      warnings.push_back(DescribeClosureByVision(scene, closure));
+    }
+  }
   for (const CoarseComponent& component : result.poses.components) {
-    for (const UnconfirmedClosure& closure : component.unconfirmed_closures) {
+    for (const SegmentClosure& closure : component.unconfirmed_closures) {
       std::ostringstream text;
       text << closure.num_images
            << " images are connected to the rest at one place only ("

@@ -191,8 +191,23 @@ class LoopClosureFilter {
                        return a.num_kept > b.num_kept;
                      });
     std::vector<int> set = FindSet(segments, clusters);
-    if (HasTwoPlaces(clusters, set)) {
+    // Two drives that are at two places at the same time need no turn: streets
+    // that look alike would have to be driven in step.
+    const bool are_together = HasTwoPlaces(
+        clusters, set, [this](const Closure& one, const Closure& other) {
+          return IsAtOneTime(one) && IsAtOneTime(other);
+        });
+    const bool have_turn = HasTwoPlaces(
+        clusters, set, [this](const Closure& one, const Closure& other) {
+          return HasTurn(one.i, other.i) && HasTurn(one.j, other.j);
+        });
+    if (are_together || have_turn) {
       ++report_.num_confirmed_closures;
+      if (!are_together && UnitLogSigma(segments) > 0.0) {
+        std::vector<ClosureCluster> confirmed;
+        for (const int c : set) confirmed.push_back(clusters[c]);
+        report_.closures_by_vision.push_back(Describe(segments, confirmed));
+      }
     } else {
       set.clear();
       report_.unconfirmed_closures.push_back(Describe(segments, clusters));
@@ -270,18 +285,17 @@ class LoopClosureFilter {
            options_.significance;
   }
 
-  // The condition under which the motion between two segments is observable:
-  // places beyond a turn, or two drives that are at both places at the same
-  // time. Two streets that look alike would have to be driven in step.
+  // Whether the set has two places that are apart in both segments, and with
+  // confirm(place, place).
+  template <typename Confirm>
   bool HasTwoPlaces(const std::vector<ClosureCluster>& clusters,
-                    const std::vector<int>& set) const {
+                    const std::vector<int>& set, const Confirm& confirm) const {
     for (const int a : set) {
       for (const int b : set) {
         const Closure& one = clusters[a].best;
         const Closure& other = clusters[b].best;
         if (AreApart(one.i, other.i) && AreApart(one.j, other.j) &&
-            ((HasTurn(one.i, other.i) && HasTurn(one.j, other.j)) ||
-             (IsAtOneTime(one) && IsAtOneTime(other)))) {
+            confirm(one, other)) {
           return true;
         }
       }
@@ -303,10 +317,9 @@ class LoopClosureFilter {
            options_.max_sequence_gap;
   }
 
-  UnconfirmedClosure Describe(
-      const std::pair<int, int>& segments,
-      const std::vector<ClosureCluster>& clusters) const {
-    UnconfirmedClosure closure;
+  SegmentClosure Describe(const std::pair<int, int>& segments,
+                          const std::vector<ClosureCluster>& clusters) const {
+    SegmentClosure closure;
     closure.num_images = std::min(segments_.num_images[segments.first],
                                   segments_.num_images[segments.second]);
     int max_num_inliers = -1;

@@ -24,9 +24,8 @@ struct TrajectoryOdometry {
   std::vector<RelativePosePrior> priors;
 };
 
-// Two segments that loop closures could join, but that nothing confirms:
-// possibly perceptual aliasing.
-struct UnconfirmedClosure {
+// The loop closures between two trajectory segments.
+struct SegmentClosure {
   // The pair with the most inliers, and the number of pairs.
   image_t image_id1 = kInvalidImageId;
   image_t image_id2 = kInvalidImageId;
@@ -44,7 +43,12 @@ struct LoopClosureReport {
   int num_segments = 0;
   // Each one joins two segments.
   int num_confirmed_closures = 0;
-  std::vector<UnconfirmedClosure> unconfirmed_closures;
+  // Those of them that vision alone confirms, by two places beyond a turn:
+  // without metres on both sides, and not at the same time. Streets that look
+  // alike around a corner confirm themselves in the same way.
+  std::vector<SegmentClosure> closures_by_vision;
+  // Nothing confirms these: possibly perceptual aliasing.
+  std::vector<SegmentClosure> unconfirmed_closures;
   // Whether unconfirmed closures were removed (split_unconfirmed_closures).
   bool segments_were_split = false;
   int num_pairs_of_unconfirmed_closures = 0;

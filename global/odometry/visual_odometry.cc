@@ -16,10 +16,11 @@ namespace {
 
 // 1 sigma of a visual step's length, as a ratio.
 constexpr double kLengthErrorRatio = 0.1;
-// Least sigmas of a visual step's rotation (per axis) and direction, rad. A few
-// wrong matches that the pose of verification fits hold both in a second
-// optimum, by far more than the sigmas of the pair (docs/reference/math.md,
-// Step 1).
+// Least sigmas of a visual step's rotation (per axis) and direction, rad,
+// before FitVisualSigmas. A few wrong matches that the pose of verification
+// fits hold both in a second optimum, by far more than the sigmas of the pair
+// (docs/reference/math.md, Step 1). The chain lets errors persist over all
+// steps.
 constexpr double kMinRotationSigma = 0.01;
 constexpr double kMinDirectionSigma = 0.05;
 
@@ -182,6 +183,19 @@ VisualOdometryEdges AddVisualOdometry(
   steps.lengths =
       EstimateEdgeLengths(num_threads, graph, known_lengths, correspondences);
   return steps;
+}
+
+void ScaleVisualSigmas(const std::vector<RelativePosePrior>& given,
+                       double ratio, std::vector<RelativePosePrior>* steps) {
+  for (size_t k = 0; k < steps->size(); ++k) {
+    Eigen::Matrix<double, 6, 6>& covariance = (*steps)[k].covariance;
+    if (k >= given.size() || !given[k].HasRotation()) {
+      covariance.topLeftCorner<3, 3>() *= ratio * ratio;
+    }
+    if (k >= given.size() || !given[k].HasMotion()) {
+      covariance.bottomRightCorner<3, 3>() *= ratio * ratio;
+    }
+  }
 }
 
 }  // namespace adasfm

@@ -12,11 +12,8 @@
 
 namespace adasfm {
 
-// Sigmas describe the drift of visual odometry, not the noise of one pair: the
-// chain lets errors persist over all steps.
-
-// Pairs at most this many steps apart determine the lengths of steps, and are
-// tested by RejectVisualOdometry.
+// Pairs at most this many steps apart determine the lengths of steps, and judge
+// them (global/loop_closures/judge_visual_odometry.h).
 inline constexpr int kMaxNumVisualSteps = 10;
 // 1 sigma of the change of scale at each step where no priors constrain the
 // scale (OdometryChainOptions::scale_drift_ratio). With 1.5 % a drive of 1,000
@@ -50,5 +47,10 @@ VisualOdometryEdges AddVisualOdometry(
     const std::map<ImagePair, double>& known_lengths_m,
     const std::vector<RelativePosePrior>& priors,
     const std::vector<RelativePosePrior>& frame_priors = {});
+
+// Scales the sigmas of what vision gave: of the steps from given.size() on, and
+// of the parts that `given`, the priors that AddVisualOdometry completed, lack.
+void ScaleVisualSigmas(const std::vector<RelativePosePrior>& given,
+                       double ratio, std::vector<RelativePosePrior>* steps);
 
 }  // namespace adasfm

@@ -170,8 +170,28 @@ TEST(FilterLoopClosures, ASecondPlaceBehindATurnConfirms) {
     const LoopClosureReport report = Filter(&drives);
     EXPECT_EQ(report.num_confirmed_closures, 1) << scale;
     EXPECT_TRUE(report.unconfirmed_closures.empty());
+    ASSERT_EQ(report.closures_by_vision.size(), 1);
+    EXPECT_EQ(report.closures_by_vision[0].num_pairs, 28);
+    EXPECT_EQ(report.closures_by_vision[0].num_images, kNumImages);
     EXPECT_EQ(CountKeptJoins(drives.graph), 28) << scale;
   }
+}
+
+TEST(FilterLoopClosures, MetresOnBothSidesConfirmToo) {
+  Drives drives = BuildDrives();
+  AddTruePlace(3, 10, &drives);
+  AddTruePlace(45, 52, &drives);
+  Random random(2);
+  for (image_t i = kSecond + 1; i < kSecond + kNumImages; ++i) {
+    drives.priors.push_back(
+        BuildPrior(i, i + 1, ComputeCam2FromCam1(PoseOf(i), PoseOf(i + 1)),
+                   1e-4, 1e-3, &random));
+    drives.priors.back().flags =
+        kPriorRotation | kPriorDirection | kPriorLength;
+  }
+  const LoopClosureReport report = Filter(&drives);
+  EXPECT_EQ(report.num_confirmed_closures, 1);
+  EXPECT_TRUE(report.closures_by_vision.empty());
 }
 
 // Repetitive facades give false pairs all along two parallel streets. Such
@@ -201,6 +221,7 @@ TEST(FilterLoopClosures, DrivesAtTheSameTimeNeedNoTurn) {
     }
     const LoopClosureReport report = Filter(&drives);
     EXPECT_EQ(report.num_confirmed_closures, delay == 0) << delay;
+    EXPECT_TRUE(report.closures_by_vision.empty());
     EXPECT_EQ(CountKeptJoins(drives.graph), delay == 0 ? 18 : 0) << delay;
   }
 }

@@ -136,5 +136,21 @@ TEST(AddVisualOdometry, ContinuesAnInterruptedChain) {
   EXPECT_NEAR(LengthRatioOfTheWay(problem, steps), 1.0, 0.1);
 }
 
+// Sensors measured all rotations and every other position.
+TEST(ScaleVisualSigmas, SensorsKeepTheirs) {
+  const StepProblem problem =
+      BuildProblem(1, [](int step) { return step % 2 == 0; });
+  const VisualOdometryEdges steps = Complete(problem);
+  std::vector<RelativePosePrior> scaled = steps.priors;
+  ScaleVisualSigmas(problem.priors, 0.5, &scaled);
+  for (size_t k = 0; k < scaled.size(); ++k) {
+    const double ratio = problem.priors[k].HasMotion() ? 1.0 : 0.25;
+    EXPECT_EQ(scaled[k].covariance.topLeftCorner(3, 3),
+              steps.priors[k].covariance.topLeftCorner(3, 3));
+    EXPECT_EQ(scaled[k].covariance.bottomRightCorner(3, 3),
+              ratio * steps.priors[k].covariance.bottomRightCorner(3, 3));
+  }
+}
+
 }  // namespace
 }  // namespace adasfm

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "global/loop_closures/reject_visual_odometry.h"
+#include "global/loop_closures/judge_visual_odometry.h"
 
 #include <gtest/gtest.h>
 
@@ -110,6 +110,57 @@ TEST(RejectVisualOdometry, EachRunIsJudgedByItsOwnPairs) {
       EXPECT_LE(prior.image_id1, 12);
     }
   }
+}
+
+// Steps whose rotations and directions err by `ratio` times their sigmas.
+TestScene BuildErringScene(double ratio, uint64_t seed) {
+  TestScene scene = BuildScene(seed);
+  Random random(seed);
+  for (ViewGraphEdge& edge : scene.graph.edges) {
+    if (edge.image_id2 - edge.image_id1 > 1) continue;
+    Rigid3d& pose = edge.cam2_from_cam1;
+    pose.rotation = ExpSo3(random.GaussianVector(ratio * 0.01)) * pose.rotation;
+    pose.translation =
+        ExpSo3(random.GaussianVector(ratio * 0.05)) * pose.translation;
+  }
+  return scene;
+}
+
+double Fit(const TestScene& scene, VisualOdometryEdges* steps) {
+  return FitVisualSigmas({}, OdometryChainOptions(), scene.graph, steps);
+}
+
+TEST(FitVisualSigmas, SigmasGrowWithTheErrors) {
+  for (uint64_t seed = 1; seed <= 5; ++seed) {
+    double last = 0.0;
+    for (const double error : {0.05, 0.3, 1.0, 3.0}) {
+      const TestScene scene = BuildErringScene(error, seed);
+      VisualOdometryEdges steps = AddSteps(scene);
+      const std::vector<RelativePosePrior> before = steps.priors;
+      const double ratio = Fit(scene, &steps);
+      EXPECT_GE(ratio, last) << "seed " << seed << ", errors " << error;
+      last = ratio;
+      if (error == 0.05) {
+        EXPECT_EQ(ratio, 0.35) << "seed " << seed;
+      }
+      for (size_t k = 0; k < before.size(); ++k) {
+        EXPECT_TRUE(steps.priors[k].covariance.isApprox(
+            ratio * ratio * before[k].covariance, 1e-12));
+      }
+    }
+    EXPECT_EQ(last, 1.0) << "seed " << seed;
+  }
+}
+
+// Neighbours alone say nothing about the errors of the steps between them.
+TEST(FitVisualSigmas, WithoutPairsSigmasStay) {
+  TestSceneOptions options;
+  options.num_images = 60;
+  options.max_gap = 1;
+  const TestScene scene = BuildTestScene(options, 1);
+  VisualOdometryEdges steps = AddSteps(scene);
+  ASSERT_FALSE(steps.priors.empty());
+  EXPECT_EQ(Fit(scene, &steps), 1.0);
 }
 
 }  // namespace
