@@ -47,6 +47,7 @@ ABLATION_SETS = ['alias-300', 'clean-500', 'noisy-500', 'outliers-500',
 # Worlds with much perceptual aliasing or many false pairs, for forty seeds.
 ALIKE_DIALS = ['parallel streets', 'parallel streets, half of the pairs false',
                'parallel streets, three blackouts',
+               'parallel streets alike around corners, a blackout between',
                'half of the pairs spurious', '62 % of the pairs false']
 # The commands of COLMAP 4, and the names of the benchmark's methods for them.
 PEER_COMMANDS = {'mapper': 'colmap4_mapper',

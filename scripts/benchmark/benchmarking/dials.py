@@ -45,6 +45,11 @@ DIALS = {
         ('alias_pair_ratio', 'num_images_without_texture'),
         trajectory='parallel', street_blocks=2, spacing=3, num_neighbors=6,
         alias_ratio=0.2, num_blackouts=3, blackout_images=10),
+    # Both parts pass a corner where both streets look alike.
+    'parallel streets alike around corners, a blackout between': dial(
+        ('alias_pair_ratio', 'num_images_without_texture'), 200,
+        trajectory='parallel', street_blocks=2, spacing=3, num_neighbors=6,
+        alias_ratio=0.2, num_blackouts=1, blackout_images=10),
     'two parallel streets, 180 images alike, a blackout between': dial(
         ('alias_pair_ratio', 'num_images_with_false_pairs'), 400,
         trajectory='parallel', spacing=1, num_neighbors=4, alias_ratio=0.2,
