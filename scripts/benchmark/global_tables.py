@@ -114,9 +114,11 @@ def run_variant(variant, folder, args):
     record['coarse'] = shorten(evaluate(os.path.join(coarse, '0'), truth, args,
                                         log_path))
     with open(os.path.join(coarse, 'summary.json')) as file:
-      model = json.load(file)['models'][0]
+      summary = json.load(file)
+    model = summary['models'][0]
     record['unsuspected'] = (model['pairs_agree'] and
-                             not model['unconfirmed_closures'])
+                             not model['unconfirmed_closures'] and
+                             not summary['segment_closures']['by_vision'])
     if variant == 'as it is' and args.compare_pairs:
       record['pairs'] = evaluate_pairs(database, os.path.join(coarse, '0'),
                                        folder, args, log_path)
@@ -255,7 +257,8 @@ def report(records, args):
            'seeds %s. Errors are the RMSE of camera centres after a '
            'similarity. A model that lacks images or errs by more than '
            '%.1f m has failed; it is wrong without a word when it errs by more and '
-           'neither convergence nor unverified joins are reported against it.' % (
+           'neither its pairs nor joins that nothing or vision alone confirms '
+           'are reported against it.' % (
                os.path.basename(args.figures_path),
                ' '.join(hard_options(args)),
                ' and '.join(map(str, args.sizes)),

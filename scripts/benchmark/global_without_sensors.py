@@ -41,10 +41,12 @@ def run_ours(folder, args, record):
   run([args.colmap, 'adasfm_global', '--database_path', database,
        '--output_path', coarse], log_path)
   with open(os.path.join(coarse, 'summary.json')) as file:
-    models = json.load(file)['models']
+    summary = json.load(file)
+  models = summary['models']
   record['coarse'] = [measure(os.path.join(coarse, str(k)), folder, args,
                               log_path) for k in range(len(models))]
-  record['suspected'] = [not model['pairs_agree'] or
+  by_vision = bool(summary['segment_closures']['by_vision'])
+  record['suspected'] = [by_vision or not model['pairs_agree'] or
                          bool(model['unconfirmed_closures']) for model in models]
   output = os.path.join(folder, 'model')
   run([args.colmap, 'adasfm_mapper', '--database_path', database,

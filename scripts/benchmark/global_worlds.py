@@ -191,6 +191,7 @@ def describe(record):
     said.append('joins not made')
   for key, word in (('contradict each other', 'sensors against vision'),
                     ('agree on a focal', 'focal length'),
+                    ('vision alone confirms', 'joined by vision alone'),
                     ('camera-IMU rotation is', 'camera-IMU rotation'),
                     ('time offset that differs', 'time shift'),
                     ('did not converge', 'smoother did not converge'),
