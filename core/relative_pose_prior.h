@@ -28,6 +28,8 @@ enum PriorFlags : uint32_t {
 struct RelativePosePrior {
   image_t image_id1 = kInvalidImageId;
   image_t image_id2 = kInvalidImageId;
+  // The time between both, without hours parked: over it, errors of the
+  // sensors' rates add up.
   timestamp_t dt_ns = 0;
   // P_12, translation in metres.
   Rigid3d cam2_from_cam1;

@@ -45,10 +45,13 @@ class CoarsePoseEstimator {
   std::vector<std::optional<RotationPrediction>> PredictFromRotations() const;
   void EstimateTranslations();
   void EstimatePositions();
+  std::vector<std::vector<image_t>> FindComponentsByDirection() const;
   std::vector<std::vector<image_t>> FindDirectedComponents() const;
+  int JoinAtRest();
+  bool OdometryMoves(const ViewGraphEdge& edge) const;
   GlobalPositions EstimatePositionsOf(const std::vector<image_t>& images) const;
   bool HasMetresEverywhere() const;
-  int SplitWhereSizeIsUnknown();
+  int SplitWhereSizeIsUnknown(bool has_joins_at_rest);
   int ReportUnconfirmedClosures();
   int EstimateComponent(const std::vector<image_t>& images);
   int RemoveEdgesOffPositions();

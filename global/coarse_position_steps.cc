@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include <Eigen/Cholesky>
 #include <algorithm>
 #include <utility>
 
@@ -24,10 +25,11 @@ void CoarsePoseEstimator::EstimateTranslations() {
 
 void CoarsePoseEstimator::EstimatePositions() {
   lengths_ = EstimateLengths();
+  const int num_at_rest = JoinAtRest();
   // Unit vectors throughout, as in the paper: shared points would reintroduce
   // metres.
   if (!options_.augmentation.use_metric_lengths) lengths_ = EdgeLengths();
-  const int num_hinges = SplitWhereSizeIsUnknown();
+  const int num_hinges = SplitWhereSizeIsUnknown(num_at_rest > 0);
   int num_images = 0;
   int num_iterations = 0;
   for (const std::vector<image_t>& images : FindDirectedComponents()) {
@@ -46,18 +48,63 @@ void CoarsePoseEstimator::EstimatePositions() {
           std::to_string(num_iterations) + " iterations, " +
           std::to_string(num_removed) + " edges removed, " +
           std::to_string(num_hinges) + " between parts of unknown size, " +
-          std::to_string(num_closures) + " joins at one place only");
+          std::to_string(num_closures) + " joins at one place only, " +
+          std::to_string(num_at_rest) + " pairs at rest join others");
 }
 
-// Components by edges with a direction; at least two images each.
-std::vector<std::vector<image_t>> CoarsePoseEstimator::FindDirectedComponents()
-    const {
+// Components by edges with a direction; images without one are components of
+// their own.
+std::vector<std::vector<image_t>>
+CoarsePoseEstimator::FindComponentsByDirection() const {
   ViewGraph directed = graph_;
   for (ViewGraphEdge& edge : directed.edges) {
     if (!edge.has_translation) edge.removal = EdgeRemoval::kTranslation;
   }
-  std::vector<std::vector<image_t>> components =
-      FindConnectedComponents(directed);
+  return FindConnectedComponents(directed);
+}
+
+// A camera at rest sees no direction. Where nothing else joins two components,
+// the images of such a pair are at one place, unless the odometry says that the
+// machine moved. Returns the number of pairs.
+int CoarsePoseEstimator::JoinAtRest() {
+  std::map<image_t, size_t> component_of;
+  const auto components = FindComponentsByDirection();
+  for (size_t k = 0; k < components.size(); ++k) {
+    for (const image_t image_id : components[k]) component_of[image_id] = k;
+  }
+  int num_joins = 0;
+  for (size_t e = 0; e < graph_.edges.size(); ++e) {
+    ViewGraphEdge& edge = graph_.edges[e];
+    if (!edge.IsAtOnePlace() || !lengths_.is_at_known_depth[e] ||
+        component_of.at(edge.image_id1) == component_of.at(edge.image_id2) ||
+        OdometryMoves(edge)) {
+      continue;
+    }
+    edge.has_translation = true;
+    edge.cam2_from_cam1.translation.setZero();
+    ++num_joins;
+  }
+  return num_joins;
+}
+
+bool CoarsePoseEstimator::OdometryMoves(const ViewGraphEdge& edge) const {
+  constexpr double kMaxSigmas = 5.0;
+  // What vision may overlook.
+  constexpr double kMinSigmaM = 0.05;
+  if (!chain_.IsConnected(edge.image_id1, edge.image_id2)) return false;
+  const ChainMotion motion = chain_.Motion(edge.image_id1, edge.image_id2);
+  if (!motion.has_position) return false;
+  const Eigen::Matrix3d covariance =
+      motion.covariance.bottomRightCorner<3, 3>() +
+      kMinSigmaM * kMinSigmaM * Eigen::Matrix3d::Identity();
+  const Eigen::Vector3d& step = motion.cam2_from_cam1.translation;
+  return step.dot(covariance.ldlt().solve(step)) > kMaxSigmas * kMaxSigmas;
+}
+
+// Of at least two images each.
+std::vector<std::vector<image_t>> CoarsePoseEstimator::FindDirectedComponents()
+    const {
+  std::vector<std::vector<image_t>> components = FindComponentsByDirection();
   while (!components.empty() && components.back().size() < 2) {
     components.pop_back();
   }
@@ -85,9 +132,10 @@ bool CoarsePoseEstimator::HasMetresEverywhere() const {
 }
 
 // Returns the number of edges removed.
-int CoarsePoseEstimator::SplitWhereSizeIsUnknown() {
+int CoarsePoseEstimator::SplitWhereSizeIsUnknown(bool has_joins_at_rest) {
   // Photos in any order have no segments to keep apart.
-  if (!result_.loop_closures.segments_were_split || lengths_.lengths.empty() ||
+  const bool has_segments = result_.loop_closures.segments_were_split;
+  if ((!has_segments && !has_joins_at_rest) || lengths_.lengths.empty() ||
       HasMetresEverywhere()) {
     return 0;
   }
@@ -103,8 +151,9 @@ int CoarsePoseEstimator::SplitWhereSizeIsUnknown() {
       centers);
   int num_removed = 0;
   for (ViewGraphEdge& edge : graph_.edges) {
-    if (!edge.IsKept() || part_of[graph_.IndexOf(edge.image_id1)] ==
-                              part_of[graph_.IndexOf(edge.image_id2)]) {
+    if (!edge.IsKept() || (!has_segments && !edge.IsJoinAtRest()) ||
+        part_of[graph_.IndexOf(edge.image_id1)] ==
+            part_of[graph_.IndexOf(edge.image_id2)]) {
       continue;
     }
     edge.removal = EdgeRemoval::kUnknownSize;

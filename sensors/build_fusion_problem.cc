@@ -16,7 +16,7 @@ ImuBias FirstBias(const std::vector<OdometryLink>& links,
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();
   double time = 0.0;
   for (const OdometryLink& link : links) {
-    if (link.standstill == StandstillKind::kNone) continue;
+    if (!link.has_imu || link.standstill == StandstillKind::kNone) continue;
     sum += LogSo3(link.imu.delta_rotation);
     time += link.dt_s;
   }

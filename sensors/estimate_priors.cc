@@ -19,6 +19,7 @@
 #include "sensors/smoother/compose_inertial_motion.h"
 #include "sensors/smoother/compose_prior.h"
 #include "sensors/smoother/compose_wheel_translation.h"
+#include "sensors/smoother/standstill.h"
 #include "sensors/time_shift_effects.h"
 #include "sensors/timed_rotations.h"
 #include "sensors/use_vision.h"
@@ -203,6 +204,7 @@ void PriorEstimator::Fuse() {
     start_ns += vision_.timeshift_ns;
     end_ns += vision_.timeshift_ns;
   }
+  logs_.parked_ns = FindParkedIntervals(logs_, calibration_.imu_noise);
   SensorSummary& summary = estimate_.summary;
   double wheel_persistence = 1.0;
   int num_seen_slips = 0;
@@ -240,10 +242,11 @@ void PriorEstimator::BuildPriors() {
   const Eigen::Vector3d down(0.0, 0.0, -1.0);
   for (size_t i = 0; i < images_.size(); ++i) {
     const size_t index = timeline_.indices[i];
-    const bool has_imu =
-        (index > 0 && problem_.links[index - 1].has_imu) ||
-        (index < problem_.links.size() && problem_.links[index].has_imu);
-    if (has_imu) {
+    const auto has_attitude = [this](size_t k) {
+      return problem_.links[k].has_imu || problem_.links[k].is_parked;
+    };
+    if ((index > 0 && has_attitude(index - 1)) ||
+        (index < problem_.links.size() && has_attitude(index))) {
       estimate_.gravity_in_cam[images_[i].image_id] =
           calibration_.cam_from_imu.rotation *
           (fused_.states[index].world_from_imu.conjugate() * down);
@@ -256,6 +259,10 @@ void PriorEstimator::BuildPriors() {
     prior.image_id2 = images_[i + 1].image_id;
     prior.dt_ns = images_[i + 1].timestamp_ns - images_[i].timestamp_ns;
     AddIntervalTimeError(estimate_.summary.unexplained_rotation, &prior);
+    if (const std::optional<double> moving_s =
+            SecondsBesideParking(problem_, index, timeline_.indices[i + 1])) {
+      prior.dt_ns = std::max<timestamp_t>(1, NsFromSeconds(*moving_s));
+    }
     if (prior.flags != 0) estimate_.priors.push_back(prior);
   }
 }

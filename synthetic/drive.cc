@@ -78,6 +78,22 @@ RotationSeries operator*(const RotationSeries& a, const RotationSeries& b) {
           a[0] * b[2] + a[1] * b[1] + a[2] * b[0]};
 }
 
+// With an interval of their own.
+int CountImagesAtRest(const SyntheticWorldOptions& options) {
+  if (options.stop_image_interval_s == 0.0) return 0;
+  const double num_images =
+      options.num_stops *
+      std::floor(options.stop_duration_s / options.stop_image_interval_s);
+  const int max_num_images = options.num_images / 2;
+  if (num_images > max_num_images) {
+    throw std::invalid_argument(
+        "SyntheticWorldOptions: " + std::to_string(std::llround(num_images)) +
+        " images would be taken at rest, but at most " +
+        std::to_string(max_num_images) + ", half of the images, may be");
+  }
+  return static_cast<int>(num_images);
+}
+
 }  // namespace
 
 Drive::Drive(const SyntheticWorldOptions& options, const Path& path,
@@ -93,9 +109,44 @@ Drive::Drive(const SyntheticWorldOptions& options, const Path& path,
       path_(path),
       slope_(RoadSlope(options)) {
   DrawWaves(options);
-  last_image_s_ = TimeAt(ArcLengthAt(FirstImageTime()) +
-                         options.spacing_m * (options.num_images - 1));
+  const int num_at_rest = CountImagesAtRest(options);
+  SetImageTimes(options, options.num_images - num_at_rest);
+  if (options.stop_image_interval_s == 0.0) {
+    AddStops(options);
+    return;
+  }
+  // The images under way keep their places.
+  std::vector<double> arc_lengths_m;
+  for (const double time_s : image_times_s_) {
+    arc_lengths_m.push_back(ArcLengthAt(time_s));
+  }
   AddStops(options);
+  for (size_t i = 0; i < image_times_s_.size(); ++i) {
+    image_times_s_[i] = TimeAt(arc_lengths_m[i]);
+  }
+  AddImagesAtRest(options);
+}
+
+void Drive::SetImageTimes(const SyntheticWorldOptions& options,
+                          int num_images) {
+  const double first_s = FirstImageTime();
+  const double last_s =
+      TimeAt(ArcLengthAt(first_s) + options.spacing_m * (num_images - 1));
+  image_period_s_ = (last_s - first_s) / (num_images - 1);
+  for (int i = 0; i < num_images; ++i) {
+    image_times_s_.push_back(first_s + i * image_period_s_);
+  }
+}
+
+void Drive::AddImagesAtRest(const SyntheticWorldOptions& options) {
+  const int num_images = CountImagesAtRest(options) / options.num_stops;
+  for (const Stop& stop : stops_) {
+    for (int i = 0; i < num_images; ++i) {
+      image_times_s_.push_back(stop.begin_s +
+                               (i + 0.5) * options.stop_image_interval_s);
+    }
+  }
+  std::sort(image_times_s_.begin(), image_times_s_.end());
 }
 
 void Drive::DrawWaves(const SyntheticWorldOptions& options) {
@@ -123,7 +174,8 @@ void Drive::AddStops(const SyntheticWorldOptions& options) {
   const int num_stops = options.num_stops + options.num_spins;
   if (num_stops == 0) return;
   const double first_s = FirstImageTime();
-  const double span_s = last_image_s_ - first_s;
+  const double span_s = image_times_s_.back() - first_s;
+  const bool has_own_time = options.stop_image_interval_s > 0.0;
   Random random = MakeRandom(options.seed, 14);
   std::vector<Stop> stops;
   double lost_s = 0.0;
@@ -134,13 +186,13 @@ void Drive::AddStops(const SyntheticWorldOptions& options) {
     const double duration_s =
         is_spin ? options.spin_duration_s : options.stop_duration_s;
     const double sign = random.Uniform(0.0, 1.0) < 0.5 ? -1.0 : 1.0;
-    const double begin_s =
-        first_s + span_s * (k + 1) / (num_stops + 1) - 0.5 * duration_s;
+    const double begin_s = first_s + span_s * (k + 1) / (num_stops + 1) +
+                           (has_own_time ? lost_s : -0.5 * duration_s);
     stops.push_back(
         {begin_s, begin_s + duration_s, is_spin ? sign * 2.0 * kPi : 0.0});
     lost_s += duration_s + kBrakeDuration;
   }
-  if (lost_s > 0.5 * span_s) {
+  if (!has_own_time && lost_s > 0.5 * span_s) {
     throw std::invalid_argument(
         "SyntheticWorldOptions: the stops and turns on the spot take " +
         std::to_string(lost_s) + " s, but at most " +

@@ -42,9 +42,10 @@ class Drive {
   // The time at which the car reaches arc_length_m; the inverse of ArcLengthAt.
   double TimeAt(double arc_length_m) const;
   double FirstImageTime() const;
-  // The time of the last image: when a drive without stops has covered the
-  // spacings of all images.
-  double LastImageTime() const { return last_image_s_; }
+  // Even under way: the last is that at which a drive without stops has covered
+  // the spacings of all images.
+  const std::vector<double>& ImageTimes() const { return image_times_s_; }
+  double ImagePeriod() const { return image_period_s_; }
   const std::vector<Stop>& stops() const { return stops_; }
 
  private:
@@ -52,7 +53,9 @@ class Drive {
     double amplitude, wave_number, phase;
   };
   void DrawWaves(const SyntheticWorldOptions& options);
+  void SetImageTimes(const SyntheticWorldOptions& options, int num_images);
   void AddStops(const SyntheticWorldOptions& options);
+  void AddImagesAtRest(const SyntheticWorldOptions& options);
   int LastBendIndex(double s) const;
   double NominalTime(double s) const;
   double ArcLengthAtNominalTime(double tau) const;
@@ -71,7 +74,8 @@ class Drive {
   Path path_;
   // Slope of the road: height per distance driven.
   double slope_;
-  double last_image_s_ = 0.0;
+  double image_period_s_ = 0.0;
+  std::vector<double> image_times_s_;
   std::vector<Stop> stops_;
   std::vector<Wave> weave_, roll_, pitch_, heave_;
 };

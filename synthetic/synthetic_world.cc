@@ -73,19 +73,16 @@ std::vector<int> DrawBlackouts(const SyntheticWorldOptions& options) {
   return max_num_keypoints;
 }
 
-// Images at even times, up to a jitter. Returns the times.
+// Images at the drive's times, up to a jitter. Returns the times.
 std::vector<double> TakeImages(const Drive& drive, SyntheticWorld* world) {
   const SyntheticWorldOptions& options = world->options;
   Random random = MakeRandom(options.seed, 13);
-  const double first_s = drive.FirstImageTime();
-  const double period_s =
-      (drive.LastImageTime() - first_s) / (options.num_images - 1);
   const timestamp_t shift_ns = NsFromSeconds(options.timeshift_cam_imu_s);
   std::vector<double> times_s;
   for (int i = 0; i < options.num_images; ++i) {
     const double jitter = random.Uniform(-kTimeJitter, kTimeJitter);
     const timestamp_t time_ns =
-        NsFromSeconds(first_s + (i + jitter) * period_s);
+        NsFromSeconds(drive.ImageTimes()[i] + jitter * drive.ImagePeriod());
     const double time_s = SecondsFromNs(time_ns);
     SyntheticImage image;
     image.image_id = static_cast<image_t>(i + 1);

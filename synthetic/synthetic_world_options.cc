@@ -30,6 +30,7 @@ bool SyntheticWorldOptions::IsValid(std::string* error) const {
            {"image_interval_s", image_interval_s},
            {"pixel_noise_px", pixel_noise_px},
            {"num_stops", num_stops},
+           {"stop_image_interval_s", stop_image_interval_s},
            {"num_spins", num_spins},
            {"num_focal_steps", num_focal_steps},
            {"blackout_num_keypoints", blackout_num_keypoints},
@@ -62,6 +63,8 @@ bool SyntheticWorldOptions::IsValid(std::string* error) const {
                num_blackouts,
                "must be at most " + std::to_string(max_num_blackouts) +
                    ": half of the images keep their texture")
+      .Require(num_spins == 0 || stop_image_interval_s == 0.0, "num_spins",
+               num_spins, "must be 0 with stop_image_interval_s")
       .Require(num_focal_steps < num_images, "num_focal_steps", num_focal_steps,
                "must be less than num_images");
   const std::pair<const char*, double> shares[] = {

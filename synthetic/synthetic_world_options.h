@@ -42,6 +42,9 @@ struct SyntheticWorldOptions {
   // at even times, so that the distance driven becomes shorter.
   int num_stops = 0;
   double stop_duration_s = 10.0;
+  // Above 0: the time between images at rest. The drive then takes longer by
+  // the stops, which may last for hours.
+  double stop_image_interval_s = 0.0;
   int num_spins = 0;
   double spin_duration_s = 8.0;
   SyntheticCameraModel camera_model = SyntheticCameraModel::kPinhole;

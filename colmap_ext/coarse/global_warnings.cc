@@ -210,9 +210,7 @@ std::vector<std::string> ListGlobalWarnings(const SceneData& scene,
     }
   }
   for (const SegmentClosure& closure : loops.closures_by_vision) {
-    if (loops.segments_were_split) {
-      warnings.push_back(DescribeClosureByVision(scene, closure));
-    }
+    warnings.push_back(DescribeClosureByVision(scene, closure));
   }
   for (const CoarseComponent& component : result.poses.components) {
     for (const SegmentClosure& closure : component.unconfirmed_closures) {

@@ -62,6 +62,9 @@ void AddDriveOptions(SynthesizerOptions* options, CommandOptions* command) {
       "trajectory lanes: length of a lane [m]");
   add("stops", &world->num_stops, "number of stops, with images at rest");
   add("stop_duration", &world->stop_duration_s, "duration of a stop [s]");
+  add("stop_image_interval", &world->stop_image_interval_s,
+      "time between images at rest, for stops of hours [s]; 0: as under way, "
+      "and at most half of the time at rest");
   add("spins", &world->num_spins,
       "number of turns by 360 deg on the spot, with images");
   add("spin_duration", &world->spin_duration_s,

@@ -3,6 +3,7 @@
 
 #include <fcntl.h>
 #include <signal.h>
+#include <sys/prctl.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -110,8 +111,12 @@ Status RunHost(const std::string& path,
     words.push_back(const_cast<char*>(argument.c_str()));
   }
   words.push_back(nullptr);
+  const pid_t parent = getpid();
   const pid_t child = fork();
   if (child == 0) {
+    // A second Ctrl-C ends this program at once, but not one that handles it.
+    prctl(PR_SET_PDEATHSIG, SIGTERM);
+    if (getppid() != parent) _exit(EXIT_FAILURE);
     dup2(log, STDOUT_FILENO);
     dup2(log, STDERR_FILENO);
     execv(path.c_str(), words.data());

@@ -16,6 +16,9 @@ constexpr int kNumSharedReliable = 20;
 // Matches used per edge, those with the largest parallax. Bounds the time and
 // the memory of an edge.
 constexpr int kMaxNumMatches = 150;
+// A pair without a baseline sees the scene that others see when it shares this
+// many points of known depth with them; fewer agree by chance.
+constexpr int kMinNumKnownDepths = 12;
 // Passes over all edges after the first.
 constexpr int kNumSweeps = 3;
 
@@ -74,6 +77,12 @@ EdgeLengths EstimateEdgeLengths(
     if (!propagation.IsKnown(e)) continue;
     result.lengths[e] = propagation.Get(e);
     result.lengths[e]->is_by_depth = is_by_depth[e];
+  }
+  result.is_at_known_depth.resize(num_edges);
+  for (size_t e = 0; e < num_edges; ++e) {
+    result.is_at_known_depth[e] =
+        graph.edges[e].IsAtOnePlace() &&
+        propagation.NumKnownDepths(e, correspondences) >= kMinNumKnownDepths;
   }
   return result;
 }

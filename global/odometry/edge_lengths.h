@@ -26,6 +26,9 @@ struct EdgeLength {
 struct EdgeLengths {
   // One per edge of the graph; empty where nothing was learned.
   std::vector<std::optional<EdgeLength>> lengths;
+  // One per edge: a pair without a baseline that sees points of known depth.
+  // Where a bonnet is all that two images share, they do not.
+  std::vector<bool> is_at_known_depth;
   bool metric = false;
 };
 

@@ -49,6 +49,7 @@ LengthPropagation::LengthPropagation(
         keypoint_begin_[i] +
         (it == correspondences.bearings.end() ? 0 : it->second.size());
   }
+  JoinKeypointsOfOnePlace(correspondences);
   const size_t num_edges = graph.edges.size();
   edge_begin_.assign(num_edges + 1, 0);
   observations_.reserve(
@@ -73,6 +74,29 @@ LengthPropagation::LengthPropagation(
   has_known_.assign(graph.images.size(), false);
 }
 
+// Where vision cannot tell two centres apart, a point has one depth in both
+// images. So depths pass through a standstill, however many images it has.
+void LengthPropagation::JoinKeypointsOfOnePlace(
+    const GlobalCorrespondences& correspondences) {
+  const int num_keypoints = keypoint_begin_.back();
+  std::optional<DisjointSets> sets;
+  for (const ViewGraphEdge& edge : graph_.edges) {
+    const auto matches = correspondences.matches.find(edge.Pair());
+    if (!edge.IsAtOnePlace() || matches == correspondences.matches.end()) {
+      continue;
+    }
+    if (!sets) sets.emplace(num_keypoints);
+    const int begin1 = keypoint_begin_[graph_.IndexOf(edge.image_id1)];
+    const int begin2 = keypoint_begin_[graph_.IndexOf(edge.image_id2)];
+    for (const FeatureMatch& match : matches->second) {
+      sets->Join(begin2 + match.point2D_idx2, begin1 + match.point2D_idx1);
+    }
+  }
+  if (!sets) return;
+  point_of_.resize(num_keypoints);
+  for (int k = 0; k < num_keypoints; ++k) point_of_[k] = sets->Find(k);
+}
+
 std::vector<LengthPropagation::Observation> LengthPropagation::ObserveEdge(
     const ViewGraphEdge& edge,
     const GlobalCorrespondences& correspondences) const {
@@ -87,8 +111,8 @@ std::vector<LengthPropagation::Observation> LengthPropagation::ObserveEdge(
   }
   const auto& bearings1 = correspondences.bearings.at(edge.image_id1);
   const auto& bearings2 = correspondences.bearings.at(edge.image_id2);
-  const int begin1 = keypoint_begin_[graph_.IndexOf(edge.image_id1)];
-  const int begin2 = keypoint_begin_[graph_.IndexOf(edge.image_id2)];
+  const int index1 = graph_.IndexOf(edge.image_id1);
+  const int index2 = graph_.IndexOf(edge.image_id2);
   const Eigen::Matrix3d rotation =
       edge.cam2_from_cam1.rotation.toRotationMatrix();
   const Eigen::Vector3d translation =
@@ -109,8 +133,9 @@ std::vector<LengthPropagation::Observation> LengthPropagation::ObserveEdge(
     const double squared = sin_parallax * sin_parallax;
     const float weight = squared / (squared + kSaturation * kSaturation);
     candidates.push_back(
-        {{begin1 + int(match.point2D_idx1), float(std::log(depth1)), weight},
-         {begin2 + int(match.point2D_idx2), float(std::log(depth2)), weight}});
+        {{PointOf(index1, match.point2D_idx1), float(std::log(depth1)), weight},
+         {PointOf(index2, match.point2D_idx2), float(std::log(depth2)),
+          weight}});
   }
   std::stable_sort(candidates.begin(), candidates.end(),
                    [](const Candidate& a, const Candidate& b) {
@@ -145,6 +170,19 @@ void LengthPropagation::LinkKeypoints(int num_keypoints) {
   num_known_at_depth_.assign(num_keypoints, 0);
   log_depths_.assign(num_keypoints, 0.0);
   predicted_.assign(observations_.size(), kInfinity);
+}
+
+int LengthPropagation::NumKnownDepths(
+    int edge, const GlobalCorrespondences& correspondences) const {
+  const ViewGraphEdge& own = graph_.edges[edge];
+  const auto matches = correspondences.matches.find(own.Pair());
+  if (matches == correspondences.matches.end()) return 0;
+  const int index1 = graph_.IndexOf(own.image_id1);
+  return static_cast<int>(std::count_if(
+      matches->second.begin(), matches->second.end(),
+      [&](const FeatureMatch& match) {
+        return num_known_[PointOf(index1, match.point2D_idx1)] > 0;
+      }));
 }
 
 void LengthPropagation::MarkKnown(int edge) {

@@ -25,6 +25,11 @@ class LengthPropagation {
                     const ViewGraph& graph,
                     const GlobalCorrespondences& correspondences);
 
+  // Of a pair without a baseline: how many of its matches see a point whose
+  // depth an edge of known length measures.
+  int NumKnownDepths(int edge,
+                     const GlobalCorrespondences& correspondences) const;
+
   // Sets a length that stays fixed.
   void Fix(int edge, double log_length, double log_sigma);
   // Sets an initial length.
@@ -71,6 +76,11 @@ class LengthPropagation {
   std::vector<Observation> ObserveEdge(
       const ViewGraphEdge& edge,
       const GlobalCorrespondences& correspondences) const;
+  void JoinKeypointsOfOnePlace(const GlobalCorrespondences& correspondences);
+  int PointOf(int image_index, point2D_t keypoint) const {
+    const int own = keypoint_begin_[image_index] + static_cast<int>(keypoint);
+    return point_of_.empty() ? own : point_of_[own];
+  }
   void LinkKeypoints(int num_keypoints);
   void MarkKnown(int edge);
   double SeedDepth();
@@ -84,6 +94,10 @@ class LengthPropagation {
   const int num_threads_;
   const ViewGraph& graph_;
   std::vector<int> keypoint_begin_;  // by image
+  // By keypoint: the one that stands for all that see the same point from the
+  // same place; empty where each stands for itself. A keypoint below is one
+  // that stands for others.
+  std::vector<int> point_of_;
   // By edge; those of one edge follow each other.
   std::vector<Observation> observations_;
   std::vector<size_t> edge_begin_;

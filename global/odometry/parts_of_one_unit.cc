@@ -18,12 +18,23 @@
 namespace adasfm {
 namespace {
 
-// For each image, the sets that contain it.
+// For each place, the sets that contain it. Images that a standstill joins are
+// one place, that of the first of them; others are one each.
 using Memberships = std::vector<std::set<int>>;
+
+DisjointSets FindPlaces(const ViewGraph& graph) {
+  DisjointSets places(graph.images.size());
+  for (const ViewGraphEdge& edge : graph.edges) {
+    if (!edge.IsJoinAtRest()) continue;
+    places.Join(graph.IndexOf(edge.image_id2), graph.IndexOf(edge.image_id1));
+  }
+  return places;
+}
 
 // One set per unit, the first one of metres. shape_sigmas: by set, the least
 // direction sigma of its edges.
 Memberships CollectUnits(const ViewGraph& graph, const std::vector<int>& units,
+                         DisjointSets* places,
                          std::vector<double>* shape_sigmas) {
   Memberships sets_of(graph.images.size());
   std::map<int, int> set_of_unit;
@@ -37,8 +48,8 @@ Memberships CollectUnits(const ViewGraph& graph, const std::vector<int>& units,
   const auto add = [&](const ViewGraphEdge& edge, int set) {
     double& sigma = (*shape_sigmas)[set];
     sigma = std::min(sigma, edge.direction_sigma_rad);
-    sets_of[graph.IndexOf(edge.image_id1)].insert(set);
-    sets_of[graph.IndexOf(edge.image_id2)].insert(set);
+    sets_of[places->Find(graph.IndexOf(edge.image_id1))].insert(set);
+    sets_of[places->Find(graph.IndexOf(edge.image_id2))].insert(set);
   };
   for (size_t e = 0; e < graph.edges.size(); ++e) {
     const ViewGraphEdge& edge = graph.edges[e];
@@ -59,7 +70,7 @@ void TakeRoots(DisjointSets* joined, Memberships* sets_of) {
   }
 }
 
-// Joins sets that share two images. Returns whether there were any.
+// Joins sets that share two places. Returns whether there were any.
 bool JoinSetsOfOneSize(Memberships* sets_of, int num_sets) {
   std::map<std::pair<int, int>, int> num_shared;
   for (const std::set<int>& sets : *sets_of) {
@@ -104,7 +115,7 @@ bool JoinSetsByClosure(
   return !pairs.empty();
 }
 
-// The largest of the sets that an image is in; -1 where there is none.
+// The largest of the sets that a place is in; -1 where there is none.
 std::vector<int> ChooseLargest(const Memberships& sets_of, int num_sets) {
   std::vector<int> sizes(num_sets, 0);
   for (const std::set<int>& sets : sets_of) {
@@ -191,12 +202,15 @@ std::vector<int> FindPartsOfOneUnit(
     if (center != centers.end()) center_of.back() = center->second;
   }
   std::vector<double> shape_sigmas;
-  Memberships sets_of = CollectUnits(graph, units, &shape_sigmas);
+  DisjointSets places = FindPlaces(graph);
+  Memberships sets_of = CollectUnits(graph, units, &places, &shape_sigmas);
   const int num_sets = static_cast<int>(shape_sigmas.size());
   while (JoinSetsOfOneSize(&sets_of, num_sets) ||
          JoinSetsByClosure(shape_sigmas, center_of, &sets_of)) {
   }
   std::vector<int> part_of = ChooseLargest(sets_of, num_sets);
+  for (size_t i = 0; i < part_of.size(); ++i)
+    part_of[i] = part_of[places.Find(i)];
   JoinTheRest(graph, &part_of);
   return NameByFirstImage(part_of);
 }

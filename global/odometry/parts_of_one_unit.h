@@ -30,8 +30,9 @@ std::vector<int> FindLengthUnits(
 // that share two images have one scale, as have those in closed rings that
 // determine it (sizes_by_closure.h). Edges with metres
 // (ViewGraphEdge::length_m) are one set. Sets that share one image only keep
-// separate scales, and the larger set gets the image. Images that no such edge
-// reaches join a part by their strongest edge.
+// separate scales, and the larger set gets the image. Images that a standstill
+// joins (ViewGraphEdge::IsJoinAtRest) are one place and count as one image.
+// Images that no such edge reaches join a part by their strongest edge.
 // Returns a part for each image of the graph, named by the smallest index of
 // its images.
 std::vector<int> FindPartsOfOneUnit(

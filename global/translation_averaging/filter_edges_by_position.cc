@@ -42,7 +42,7 @@ int FilterEdgesByPosition(
   for (size_t e = 0; e < graph->edges.size(); ++e) {
     ViewGraphEdge& edge = graph->edges[e];
     if (!edge.IsKept() || !edge.has_translation) continue;
-    if (edge.source != EdgeSource::kVisual) continue;
+    if (edge.source != EdgeSource::kVisual || edge.IsJoinAtRest()) continue;
     const Eigen::Vector3d direction_in_world =
         cams_from_world.at(edge.image_id2).conjugate() *
         -edge.cam2_from_cam1.translation;

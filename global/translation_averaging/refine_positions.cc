@@ -35,10 +35,16 @@ EdgeTerm ComputeTerm(const PositionEdge& edge,
   const Eigen::Matrix3d projection =
       edge.direction * edge.direction.transpose();
   EdgeTerm term;
-  term.target = (is_free ? length : edge.length) * edge.direction;
-  term.information = (Eigen::Matrix3d::Identity() - projection) /
-                         (across_sigma * across_sigma) +
-                     projection / (along_sigma * along_sigma);
+  if (edge.kind == PositionEdge::kAtRest) {
+    term.target.setZero();
+    term.information =
+        Eigen::Matrix3d::Identity() / (edge.length_sigma * edge.length_sigma);
+  } else {
+    term.target = (is_free ? length : edge.length) * edge.direction;
+    term.information = (Eigen::Matrix3d::Identity() - projection) /
+                           (across_sigma * across_sigma) +
+                       projection / (along_sigma * along_sigma);
+  }
   const Eigen::Vector3d residual = difference - term.target;
   const double squared = residual.dot(term.information * residual);
   term.information /= 1.0 + squared / std::pow(kLossScale, 2);
@@ -65,15 +71,21 @@ double MeanRelativeMovement(const std::vector<PositionEdge>& edges,
   return sum / edges.size();
 }
 
+double MedianDistance(const std::vector<PositionEdge>& edges,
+                      const Vectors& centers) {
+  std::vector<double> distances;
+  for (const PositionEdge& edge : edges) {
+    if (edge.kind == PositionEdge::kAtRest) continue;
+    distances.push_back((centers.row(edge.j) - centers.row(edge.i)).norm());
+  }
+  return distances.empty() ? 1.0 : UpperMedian(&distances);
+}
+
 bool RefinePositions(const std::vector<PositionEdge>& edges, Vectors* centers,
                      GlobalPositions* result) {
   const int num_nodes = centers->rows();
   if (num_nodes < 2) return true;
-  std::vector<double> lengths;
-  for (const PositionEdge& edge : edges) {
-    lengths.push_back((centers->row(edge.j) - centers->row(edge.i)).norm());
-  }
-  const double unit = UpperMedian(&lengths);
+  const double unit = MedianDistance(edges, *centers);
   if (!(unit > 0.0)) return false;
 
   constexpr int kMaxNumIterations = 100;

@@ -16,9 +16,10 @@ inline constexpr double kMinPositionSigmaRatio = 2e-3;
 // The data of translation averaging for one edge between nodes i and j.
 struct PositionEdge {
   enum Kind {
-    kFree,   // a direction
-    kSoft,   // and a length from shared points
-    kFixed,  // and a length in metres from sensors
+    kFree,    // a direction
+    kSoft,    // and a length from shared points
+    kFixed,   // and a length in metres from sensors
+    kAtRest,  // the same place, with one sigma for all axes
   };
   int i = 0;
   int j = 0;
@@ -41,13 +42,19 @@ double MeanRelativeMovement(const std::vector<PositionEdge>& edges,
                             const LaplacianSolver::Vectors& before,
                             const LaplacianSolver::Vectors& after);
 
+// The median distance of the nodes of all edges but those at rest; 1 without
+// any.
+double MedianDistance(const std::vector<PositionEdge>& edges,
+                      const LaplacianSolver::Vectors& centers);
+
 // Moves centres to the robust optimum of
 //   | across(C_j - C_i) |^2 / (length direction_sigma)^2
 //   + (along(C_j - C_i) - length)^2 / length_sigma^2
 // over all edges: across and along the edge's direction; edges without a length
-// keep the present one, loosely. Gauss-Newton with Cauchy weights, a sparse
-// system of three unknowns per node; the first node becomes the origin. False
-// when it does not converge; centres stay finite.
+// keep the present one, loosely; edges at rest have length_sigma on all axes.
+// Gauss-Newton with Cauchy weights, a sparse system of three unknowns per node;
+// the first node becomes the origin. False when it does not converge; centres
+// stay finite.
 bool RefinePositions(const std::vector<PositionEdge>& edges,
                      LaplacianSolver::Vectors* centers,
                      GlobalPositions* result);

@@ -21,6 +21,10 @@ constexpr double kMinResidual = 1e-3;
 // points, so their errors are not independent.
 constexpr double kMinSoftLengthSigma = 0.05;
 
+// 1 sigma of a camera at rest, in median edge lengths: what vision overlooks of
+// a step.
+constexpr double kRestSigmaRatio = 0.02;
+
 constexpr int kMaxNumIterations = 100;
 // The reweighted iterations end at this mean relative movement of the ends of
 // an edge, in median edge lengths; with the second number where the refinement,
@@ -44,6 +48,18 @@ void MarkRedundantLengths(int num_nodes, std::vector<PositionEdge>* edges) {
   }
 }
 
+// Of the edges with a length; 1 without any.
+double MedianLength(const std::vector<PositionEdge>& edges) {
+  std::vector<double> lengths;
+  for (const PositionEdge& edge : edges) {
+    if (edge.kind == PositionEdge::kSoft || edge.kind == PositionEdge::kFixed) {
+      lengths.push_back(edge.length);
+    }
+  }
+  const double median = lengths.empty() ? 1.0 : UpperMedian(&lengths);
+  return median > 0.0 ? median : 1.0;
+}
+
 std::vector<PositionEdge> CollectEdges(
     const ViewGraph& graph,
     const std::map<image_t, Eigen::Quaterniond>& cams_from_world,
@@ -63,7 +79,10 @@ std::vector<PositionEdge> CollectEdges(
     if (norm > 0.0) collected.direction = translation_in_world / norm;
     collected.direction_sigma =
         std::max(edge.direction_sigma_rad, kMinPositionSigmaRatio);
-    if (edge.length_m.has_value()) {
+    if (edge.IsJoinAtRest()) {
+      collected.kind = PositionEdge::kAtRest;
+      collected.length = 0.0;
+    } else if (edge.length_m.has_value()) {
       constexpr double kFallbackRatio = 0.05;
       collected.kind = PositionEdge::kFixed;
       collected.length = *edge.length_m;
@@ -80,6 +99,10 @@ std::vector<PositionEdge> CollectEdges(
     edges.push_back(collected);
   }
   MarkRedundantLengths(graph.images.size(), &edges);
+  const double rest_sigma = kRestSigmaRatio * MedianLength(edges);
+  for (PositionEdge& edge : edges) {
+    if (edge.kind == PositionEdge::kAtRest) edge.length_sigma = rest_sigma;
+  }
   return edges;
 }
 
@@ -110,14 +133,10 @@ class PositionSolver {
  public:
   PositionSolver(const TranslationAveragingOptions& options,
                  const std::vector<PositionEdge>& edges, int num_nodes)
-      : options_(options), edges_(edges), solver_(num_nodes, NodePairs(edges)) {
-    std::vector<double> lengths;
-    for (const PositionEdge& edge : edges) {
-      if (edge.kind != PositionEdge::kFree) lengths.push_back(edge.length);
-    }
-    unit_ = lengths.empty() ? 1.0 : UpperMedian(&lengths);
-    if (!(unit_ > 0.0)) unit_ = 1.0;
-  }
+      : options_(options),
+        edges_(edges),
+        solver_(num_nodes, NodePairs(edges)),
+        unit_(MedianLength(edges)) {}
 
   // IRLS until the centres converge. hold_soft: lengths of soft edges are fixed
   // too. Adds the number of iterations to the result.
@@ -152,6 +171,7 @@ class PositionSolver {
       const PositionEdge& edge = edges_[e];
       const bool is_held =
           edge.kind == PositionEdge::kFixed ||
+          edge.kind == PositionEdge::kAtRest ||
           (edge.kind == PositionEdge::kSoft && (hold_soft || !has_centers));
       Eigen::Vector3d difference = Eigen::Vector3d::Zero();
       if (has_centers) {
@@ -196,16 +216,12 @@ class PositionSolver {
   const TranslationAveragingOptions& options_;
   const std::vector<PositionEdge>& edges_;
   LaplacianSolver solver_;
-  double unit_ = 1.0;
+  const double unit_;
 };
 
 // Without metres the median length of the edges becomes 1.
 void NormalizeScale(const std::vector<PositionEdge>& edges, Vectors* centers) {
-  std::vector<double> lengths;
-  for (const PositionEdge& edge : edges) {
-    lengths.push_back((centers->row(edge.j) - centers->row(edge.i)).norm());
-  }
-  const double median = UpperMedian(&lengths);
+  const double median = MedianDistance(edges, *centers);
   if (median > 0.0) *centers /= median;
 }
 

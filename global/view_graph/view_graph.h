@@ -38,7 +38,8 @@ const char* EdgeRemovalName(EdgeRemoval removal);
 struct ViewGraphEdge {
   image_t image_id1 = kInvalidImageId;  // < image_id2
   image_t image_id2 = kInvalidImageId;
-  // The translation has length_m where that is set, else length 1.
+  // The translation has length_m where that is set, else length 1; without a
+  // baseline, zero: both centres are one place.
   Rigid3d cam2_from_cam1;
   int num_inliers = 0;
   EdgeSource source = EdgeSource::kVisual;
@@ -58,6 +59,16 @@ struct ViewGraphEdge {
   EdgeRemoval removal = EdgeRemoval::kKept;
 
   bool IsKept() const { return removal == EdgeRemoval::kKept; }
+  // Whether vision alone speaks of the pair, and cannot tell its centres apart.
+  bool IsAtOnePlace() const {
+    return IsKept() && source == EdgeSource::kVisual && has_rotation &&
+           !has_baseline;
+  }
+  // Whether the pair then joins its images at one place.
+  bool IsJoinAtRest() const {
+    return IsAtOnePlace() && has_translation &&
+           cam2_from_cam1.translation.isZero(0.0);
+  }
   ImagePair Pair() const { return ImagePair(image_id1, image_id2); }
 };
 

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 #include "core/interpolate_pose.h"
 #include "core/option_checker.h"
@@ -32,6 +33,17 @@ double RateHz(const std::vector<Sample>& samples) {
   return period > 0.0 ? 1.0 / period : 0.0;
 }
 
+// The parked interval that contains the given one, if any.
+const std::pair<timestamp_t, timestamp_t>* FindParked(const MotionLogs& logs,
+                                                      timestamp_t start_ns,
+                                                      timestamp_t end_ns) {
+  const auto parked = std::find_if(
+      logs.parked_ns.begin(), logs.parked_ns.end(), [&](const auto& interval) {
+        return interval.first <= start_ns && end_ns <= interval.second;
+      });
+  return parked == logs.parked_ns.end() ? nullptr : &*parked;
+}
+
 // Appends the end and, before it, states so that no step exceeds max_step_ns.
 void AppendFilled(timestamp_t end_ns, timestamp_t max_step_ns,
                   std::vector<timestamp_t>* times) {
@@ -45,6 +57,18 @@ void AppendFilled(timestamp_t end_ns, timestamp_t max_step_ns,
     }
   }
   times->push_back(end_ns);
+}
+
+// The same, but with no states while parked.
+void AppendFilledUnlessParked(const MotionLogs& logs, timestamp_t end_ns,
+                              timestamp_t max_step_ns,
+                              std::vector<timestamp_t>* times) {
+  for (const auto& [begin_parked_ns, end_parked_ns] : logs.parked_ns) {
+    if (end_parked_ns <= times->back() || end_ns <= begin_parked_ns) continue;
+    AppendFilled(begin_parked_ns, max_step_ns, times);
+    times->push_back(std::min(end_parked_ns, end_ns));
+  }
+  AppendFilled(end_ns, max_step_ns, times);
 }
 
 // A trajectory's motion over one link: a displacement that does not depend on
@@ -128,11 +152,11 @@ OdometryTimeline BuildTimeline(const std::vector<timestamp_t>& times_ns,
   std::vector<timestamp_t>& times = timeline.times_ns;
   times.push_back(std::max(logs.StartNs(), times_ns.front() - lead));
   for (const timestamp_t time : times_ns) {
-    AppendFilled(time, max_step, &times);
+    AppendFilledUnlessParked(logs, time, max_step, &times);
     timeline.indices.push_back(times.size() - 1);
   }
-  AppendFilled(std::min(logs.EndNs(), times_ns.back() + lead), max_step,
-               &times);
+  AppendFilledUnlessParked(logs, std::min(logs.EndNs(), times_ns.back() + lead),
+                           max_step, &times);
   return timeline;
 }
 
@@ -151,6 +175,15 @@ std::vector<OdometryLink> BuildOdometryLinks(
     const timestamp_t start = times_ns[k], end = times_ns[k + 1];
     OdometryLink& link = links[k];
     link.dt_s = SecondsFromNs(end - start);
+    const auto* parked = FindParked(logs, start, end);
+    if (parked) {
+      link.standstill = StandstillKind::kAtRest;
+      link.standstill_time_s = SecondsFromNs(parked->second - parked->first);
+      link.is_parked = true;
+      link.has_wheel = !logs.wheel.empty() || !logs.odometry.empty();
+      continue;
+    }
+    if (link.dt_s > kMaxFilledGapS) continue;
     profile.clear();
     if (CoversInterval(logs.imu, start, end, options.max_imu_gap_s)) {
       link.has_imu = true;

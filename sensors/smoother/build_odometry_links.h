@@ -32,12 +32,13 @@ struct OdometryTimeline {
 };
 
 // The times of the states: the given ones (in order, within the logs), and
-// others so that no link is longer than 0.5 s: between them (not in gaps above
-// 10 min) and up to 20 s before and after them.
+// others so that no link is longer than 0.5 s: between them (not while parked,
+// and not in gaps above 10 min) and up to 20 s before and after them.
 OdometryTimeline BuildTimeline(const std::vector<timestamp_t>& times_ns,
                                const MotionLogs& logs);
 
 // One link between each two successive times. bias is subtracted from the IMU.
+// A link across a gap above 10 min has no sensors.
 std::vector<OdometryLink> BuildOdometryLinks(
     const std::vector<timestamp_t>& times_ns, const MotionLogs& logs,
     const SensorCalibration& calibration, const ImuBias& bias,

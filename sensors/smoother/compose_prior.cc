@@ -10,12 +10,20 @@ namespace {
 
 using Matrix6 = Eigen::Matrix<double, 6, 6>;
 
-OdometryMotion ComposeMotions(const OdometryFusionResult& fused, size_t first,
+// Errors of links are correlated: n links count n times the sum of their
+// covariances. Those of a standstill are one link.
+OdometryMotion ComposeMotions(const OdometryFusionProblem& problem,
+                              const OdometryFusionResult& fused, size_t first,
                               size_t last) {
+  const auto is_at_rest = [&problem](size_t k) {
+    return problem.links[k].standstill == StandstillKind::kAtRest;
+  };
+  int num_links = 0;
   Rigid3d body2_from_body1;
   Matrix6 covariance = Matrix6::Zero();
   for (size_t k = first; k < last; ++k) {
     const OdometryMotion& motion = fused.motions[k];
+    num_links += k == first || !is_at_rest(k - 1) || !is_at_rest(k);
     // Expresses earlier errors in the frame at this link's end.
     Matrix6 carry = Matrix6::Identity();
     const Eigen::Matrix3d rotation =
@@ -29,7 +37,7 @@ OdometryMotion ComposeMotions(const OdometryFusionResult& fused, size_t first,
                  own * motion.covariance * own.transpose();
     body2_from_body1 = motion.body2_from_body1 * body2_from_body1;
   }
-  covariance *= static_cast<double>(last - first);
+  covariance *= static_cast<double>(num_links);
   OdometryMotion motion;
   motion.body2_from_body1 = body2_from_body1;
   motion.covariance = covariance;
@@ -61,18 +69,31 @@ void Forget(int begin, RelativePosePrior* prior) {
 
 }  // namespace
 
+std::optional<double> SecondsBesideParking(const OdometryFusionProblem& problem,
+                                           size_t first, size_t last) {
+  double moving_s = 0.0;
+  bool is_parked = false;
+  for (size_t k = first; k < last; ++k) {
+    const OdometryLink& link = problem.links[k];
+    is_parked |= link.is_parked;
+    if (link.standstill != StandstillKind::kAtRest) moving_s += link.dt_s;
+  }
+  if (!is_parked) return std::nullopt;
+  return moving_s;
+}
+
 RelativePosePrior ComposePrior(const OdometryFusionProblem& problem,
                                const OdometryFusionResult& fused, size_t first,
                                size_t last, const Rigid3d& cam_from_imu) {
   RelativePosePrior prior;
-  SetMotion(ComposeMotions(fused, first, last), cam_from_imu, &prior);
+  SetMotion(ComposeMotions(problem, fused, first, last), cam_from_imu, &prior);
   bool has_imu = true, has_wheel = true, has_yaw = true, is_slipping = false;
   for (size_t k = first; k < last; ++k) {
     const OdometryLink& link = problem.links[k];
-    has_imu &= link.has_imu;
+    has_imu &= link.has_imu || link.is_parked;
     has_wheel &= link.has_wheel;
     has_yaw &=
-        link.has_vision ||
+        link.has_vision || link.is_parked ||
         (link.has_wheel && (link.has_wheel_yaw || link.wheel.has_rotation));
     is_slipping |= fused.motions[k].wheel_weight < kSlipWeight;
   }

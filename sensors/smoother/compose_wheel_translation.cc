@@ -56,7 +56,7 @@ Step StepByWheels(const OdometryFusionProblem& problem,
 }
 
 Step StepAtRest(const OdometryLink& link) {
-  const double sigma = kStandstillSpeedSigma * link.dt_s;
+  const double sigma = RestStepSigma(link);
   Step step;
   step.covariance = sigma * sigma * Eigen::Matrix3d::Identity();
   return step;

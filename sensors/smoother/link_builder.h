@@ -97,6 +97,8 @@ class LinkBuilder {
     num_rows_ += N;
   }
 
+  // No step, and no velocity at either end.
+  void AddRest();
   void AddWheelDelay(int forward_row);
   void AddWheelYaw(double weight);
   void AddPlanarRotation();

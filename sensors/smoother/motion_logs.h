@@ -16,6 +16,9 @@ struct MotionLogs {
   std::vector<OdometryPose> odometry;
   // Intervals in which cameras saw the machine move, in order of time.
   std::vector<std::pair<timestamp_t, timestamp_t>> seen_moving_ns;
+  // Long standstills without their ends (FindParkedIntervals), in order of
+  // time.
+  std::vector<std::pair<timestamp_t, timestamp_t>> parked_ns;
 
   bool IsEmpty() const {
     return imu.empty() && wheel.empty() && odometry.empty();

@@ -22,7 +22,18 @@ constexpr double kUnaidedSpeedSigma = 15.0;  // m/s
 // standstill, so its sigma does not shrink with the duration.
 constexpr double kStandstillRateSigma = 1e-4;  // rad/s
 
+// What a machine at rest moves and turns in hours, 1 sigma.
+constexpr double kParkedSigma = 0.01;      // m
+constexpr double kParkedSigmaRad = 0.002;  // rad
+
 }  // namespace
+
+double RestStepSigma(const OdometryLink& link) {
+  const double dt = std::max(link.dt_s, 1e-3);
+  const double time = std::max(link.standstill_time_s, dt);
+  return std::min(kStandstillSpeedSigma * time, kParkedSigma) *
+         std::sqrt(dt / time);
+}
 
 void LinkBuilder::AddImu() {
   const ImuPreintegration& imu = link_.imu;
@@ -98,6 +109,14 @@ void LinkBuilder::AddVision() {
 }
 
 void LinkBuilder::AddStandstill() {
+  if (link_.is_parked) {
+    const double variance = kParkedSigmaRad * kParkedSigmaRad * link_.dt_s /
+                            link_.standstill_time_s;
+    AddRotationResidual(Eigen::Quaterniond::Identity(),
+                        variance * Eigen::Matrix3d::Identity());
+    AddRest();
+    return;
+  }
   const double dt = std::max(link_.dt_s, 1e-3);
   // The mean rate over all links of the standstill has the variance density^2 /
   // time + sigma^2. The second part is made a density, too.
@@ -108,8 +127,12 @@ void LinkBuilder::AddStandstill() {
   AddRotationResidual(Eigen::Quaterniond::Identity(),
                       (dt * density).matrix().asDiagonal());
   if (link_.standstill != StandstillKind::kAtRest) return;
+  AddRest();
+}
+
+void LinkBuilder::AddRest() {
   AddVector(kSecond + ChainState::kStep, second_.step_in_previous,
-            kStandstillSpeedSigma * dt);
+            RestStepSigma(link_));
   AddVector(kFirst + ChainState::kVelocity, first_.state.velocity_in_imu,
             kStandstillSpeedSigma);
   AddVector(kSecond + ChainState::kVelocity, second_.state.velocity_in_imu,
@@ -149,7 +172,9 @@ LinkResiduals ComputeLinkResiduals(const LinkContext& context,
   LinkBuilder builder(context, link, first, second, globals);
   if (link.has_imu) builder.AddImu();
   builder.AddBiasWalk();
-  if (link.has_wheel) builder.AddWheel(wheel_weight);
+  if (link.has_wheel && !link.is_parked) {
+    builder.AddWheel(wheel_weight);
+  }
   if (link.has_vision) builder.AddVision();
   if (link.standstill != StandstillKind::kNone) builder.AddStandstill();
   builder.AddWeakPriors();

@@ -15,6 +15,12 @@ inline constexpr int kLinkSize = 2 * ChainState::kSize + ChainGlobals::kSize;
 // Speed of a machine at rest, 1 sigma.
 inline constexpr double kStandstillSpeedSigma = 0.005;  // m/s
 
+// 1 sigma of the step over a link at rest, m, per axis: such that all links of
+// the standstill together reach that speed over its time, or what a machine at
+// rest moves in hours (tyres that lose air, people who get in), if that is
+// less.
+double RestStepSigma(const OdometryLink& link);
+
 // Residuals of one link, each divided by its sigma, and their derivatives by
 // the link's tangent coordinates. With A = R_k^T R_k+1, G gravity in the world:
 //   IMU       Log(dR^T A), A v_k+1 - v_k - R_k^T G dt - dv,

@@ -44,6 +44,9 @@ struct OdometryLink {
   // standstill, s (sensors/smoother/standstill.h).
   Eigen::Vector3d standstill_rate_density = Eigen::Vector3d::Zero();
   double standstill_time_s = 0.0;
+  // Within a parked interval (FindParkedIntervals): a standstill whose samples
+  // are not used. has_wheel then says that the wheels' log covers it.
+  bool is_parked = false;
   // The body's rotation over the link (first_from_second) from the cameras, for
   // links without IMU and wheels (slipping wheels included).
   bool has_vision = false;

@@ -20,6 +20,8 @@ constexpr double kIdleRateDrift = 0.002;  // rad/s
 constexpr double kIdleForceDrift = 0.03;  // m/s^2
 constexpr double kMaxBias = 0.03;         // rad/s
 constexpr double kIdleSpeed = 0.02;       // m/s
+// What a parked machine leaves of either end of its standstill to the links.
+constexpr double kStandstillEndS = 20.0;
 // Largest difference between a link's mean rate and that of the others, in
 // sigmas of an axis: one of 5,000 links exceeds it by chance.
 constexpr double kMaxDeviation = 4.0;
@@ -113,6 +115,15 @@ StandstillKind FindCandidate(const MotionLogs& logs, timestamp_t time_ns,
   if (!moves) return StandstillKind::kAtRest;
   // Wheels that do not turn keep the heading even when the machine rocks.
   return has_wheel ? StandstillKind::kNoTurn : StandstillKind::kNone;
+}
+
+// The IMU's rate; 0 for a log that is too short.
+double ImuRateHz(const MotionLogs& logs) {
+  std::vector<timestamp_t> times;
+  times.reserve(logs.imu.size());
+  for (const ImuSample& sample : logs.imu) times.push_back(sample.timestamp_ns);
+  const double period_s = ComputeMedianPeriod(times);
+  return period_s > 0.0 ? 1.0 / period_s : 0.0;
 }
 
 // Rotation and duration of links, whose ratio is the mean rate.
@@ -261,17 +272,45 @@ void Run::EstimateDensity(double density, double imu_rate_hz) {
 
 }  // namespace
 
+std::vector<std::pair<timestamp_t, timestamp_t>> FindParkedIntervals(
+    const MotionLogs& logs, const ImuNoise& noise) {
+  const timestamp_t step = NsFromSeconds(2.0 * kHalfWindowS);
+  const timestamp_t margin = NsFromSeconds(kStandstillEndS);
+  std::vector<std::pair<timestamp_t, timestamp_t>> intervals;
+  const double imu_rate_hz = ImuRateHz(logs);
+  if (imu_rate_hz <= 0.0) return intervals;
+  const auto is_at_rest = [&](timestamp_t time_ns) {
+    return (!logs.wheel.empty() ||
+            !IsSeenMoving(logs, time_ns - step / 2, time_ns + step / 2)) &&
+           FindCandidate(logs, time_ns, noise, imu_rate_hz) ==
+               StandstillKind::kAtRest;
+  };
+  for (timestamp_t time = logs.StartNs(); time <= logs.EndNs(); time += step) {
+    if (!is_at_rest(time)) continue;
+    // Noise makes one second in a hundred look like motion.
+    if (intervals.empty() || time - intervals.back().second > 2 * step) {
+      intervals.emplace_back(time, time);
+    }
+    intervals.back().second = time;
+  }
+  intervals.erase(std::remove_if(intervals.begin(), intervals.end(),
+                                 [margin](const auto& interval) {
+                                   return interval.second - interval.first <
+                                          3 * margin;
+                                 }),
+                  intervals.end());
+  for (auto& [start_ns, end_ns] : intervals) {
+    start_ns += margin;
+    end_ns -= margin;
+  }
+  return intervals;
+}
+
 void MarkStandstills(const std::vector<timestamp_t>& times_ns,
                      const MotionLogs& logs, const ImuNoise& noise,
                      std::vector<OdometryLink>* links) {
-  std::vector<timestamp_t> imu_times;
-  imu_times.reserve(logs.imu.size());
-  for (const ImuSample& sample : logs.imu) {
-    imu_times.push_back(sample.timestamp_ns);
-  }
-  const double period_s = ComputeMedianPeriod(imu_times);
-  if (period_s <= 0.0) return;
-  const double imu_rate_hz = 1.0 / period_s;
+  const double imu_rate_hz = ImuRateHz(logs);
+  if (imu_rate_hz <= 0.0) return;
   std::vector<size_t> indices;
   const auto finish = [&] {
     if (indices.empty()) return;
@@ -282,6 +321,10 @@ void MarkStandstills(const std::vector<timestamp_t>& times_ns,
   };
   for (size_t k = 0; k < links->size(); ++k) {
     OdometryLink& link = (*links)[k];
+    if (link.is_parked) {
+      finish();
+      continue;
+    }
     const bool may_stand = !logs.wheel.empty() ||
                            !IsSeenMoving(logs, times_ns[k], times_ns[k + 1]);
     if (link.has_imu && link.dt_s > 0.0 && may_stand) {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <utility>
 #include <vector>
 
 #include "core/sensor_log.h"
@@ -8,6 +9,13 @@
 #include "sensors/smoother/odometry_fusion.h"
 
 namespace adasfm {
+
+// The intervals in which the machine is parked: all of a standstill of more
+// than a minute but its first and last 20 s, whose samples the biases need. In
+// between they would add nothing: a gyroscope integrated for hours only drifts.
+// The machine is at rest in each second, or in both seconds around it.
+std::vector<std::pair<timestamp_t, timestamp_t>> FindParkedIntervals(
+    const MotionLogs& logs, const ImuNoise& noise);
 
 // Marks the links over which the machine is stationary, with the density of its
 // residual rotation. times_ns: the states' times (IMU clock, one more than
@@ -27,8 +35,8 @@ namespace adasfm {
 // link. So the information of a long standstill grows as the log shows, not as
 // for white noise.
 //
-// Links without IMU are left as they are. A log that is too short marks
-// nothing.
+// Links without IMU are left as they are, and so are parked ones. A log that is
+// too short marks nothing.
 void MarkStandstills(const std::vector<timestamp_t>& times_ns,
                      const MotionLogs& logs, const ImuNoise& noise,
                      std::vector<OdometryLink>* links);

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
 #include "global/estimate_coarse_poses.h"
 #include "tests/testing/global/coarse_problem.h"
 #include "tests/testing/matchers.h"
@@ -71,6 +73,89 @@ TEST(EstimateCoarsePosesWithoutSensors, LookAlikesDoNotFoldSequences) {
                   .rmse_m,
               3.6)
         << "seed " << seed;
+  }
+}
+
+// At rest no pair has a direction, and none joins images before the stop to
+// images behind it: the same points from one place do.
+TEST(EstimateCoarsePosesWithoutSensors, StopsDoNotSplitSequences) {
+  for (uint64_t seed = 1; seed <= 5; ++seed) {
+    SyntheticWorldOptions options;
+    options.num_images = 120;
+    options.seed = seed;
+    options.num_stops = 1;
+    options.stop_duration_s = 20.0;
+    options.stop_image_interval_s = 0.5;
+    CoarseProblem problem = BuildCoarseProblem(options);
+    for (const bool is_ordered : {true, false}) {
+      if (!is_ordered) {
+        problem = Shuffle(problem, seed);
+        problem.graph.capture_ranks.clear();
+      }
+      const CoarsePoses result = EstimateCoarsePoses(
+          CoarsePoseOptions(), problem.graph, problem.correspondences, {});
+      ASSERT_EQ(result.components.size(), 1)
+          << "seed " << seed << ", ordered " << is_ordered;
+      EXPECT_EQ(result.components[0].cams_from_world.size(), 120);
+      EXPECT_TRUE(result.components[0].positions_converged);
+      // 120 m of road before any bundle adjustment: 2 %.
+      EXPECT_LT(ComputeAlignedErrors(result.components[0].cams_from_world,
+                                     problem.truth, AlignmentOptions())
+                    .rmse_m,
+                2.4)
+          << "seed " << seed << ", ordered " << is_ordered;
+    }
+  }
+}
+
+// Two halves of a scene without common landmarks, and one pair between them
+// that agrees on an identical picture: of their own bonnet, or of the scene
+// from one place.
+TEST(EstimateCoarsePosesWithoutSensors, ABonnetJoinsNothing) {
+  for (uint64_t seed = 1; seed <= 5; ++seed) {
+    for (const bool is_bonnet : {true, false}) {
+      TestSceneOptions options;
+      options.num_images = 12;
+      options.noise_px = 0.5;
+      TestScene scene = BuildTestScene(options, seed);
+      auto& edges = scene.graph.edges;
+      edges.erase(std::remove_if(edges.begin(), edges.end(),
+                                 [](const ViewGraphEdge& edge) {
+                                   return edge.image_id1 <= 6 &&
+                                          edge.image_id2 > 6;
+                                 }),
+                  edges.end());
+      const std::vector<Bearing> picture = scene.correspondences.bearings.at(6);
+      std::vector<FeatureMatch>& matches =
+          scene.correspondences.matches[ImagePair(6, 13)];
+      matches.clear();
+      // Image 13 is image 6 again. Its bonnet is keypoints that no other image
+      // has.
+      const point2D_t num_landmarks = picture.size();
+      for (const image_t image_id : {6, 13}) {
+        auto& bearings = scene.correspondences.bearings[image_id];
+        bearings = picture;
+        bearings.insert(bearings.end(), picture.begin(), picture.end());
+      }
+      for (point2D_t k = 0; k < num_landmarks; ++k) {
+        const point2D_t index = is_bonnet ? num_landmarks + k : k;
+        matches.push_back({index, index});
+      }
+      scene.graph.images.push_back(13);
+      scene.cams_from_world[13] = scene.cams_from_world.at(6);
+      edges.push_back(BuildEdge(ImagePair(6, 13), Rigid3d()));
+      edges.back().cam2_from_cam1.translation = Eigen::Vector3d::UnitX();
+      std::sort(edges.begin(), edges.end(), [](const auto& a, const auto& b) {
+        return a.Pair() < b.Pair();
+      });
+      const CoarsePoses result = EstimateCoarsePoses(
+          CoarsePoseOptions(), scene.graph, scene.correspondences, {});
+      size_t num_images = 0;
+      for (const CoarseComponent& component : result.components) {
+        num_images += component.cams_from_world.count(13);
+      }
+      EXPECT_EQ(num_images, is_bonnet ? 0 : 1) << "seed " << seed;
+    }
   }
 }
 

@@ -123,6 +123,7 @@ TEST(NoiseFigures, FarTooSmallOnesAreSaid) {
       data.logs.imu,
       ComputeWheelSpeeds(data.logs.wheel, data.calibration),
       {},
+      {},
       {}};
   std::vector<std::string> warnings;
   RaiseNoiseFigures(logs, &data.calibration, &warnings);
@@ -223,6 +224,7 @@ TEST(NoiseFigures, RightOnesOfRealLogsAreNotAccused) {
     const MotionLogs logs = {
         data.logs.imu,
         ComputeWheelSpeeds(data.logs.wheel, data.calibration),
+        {},
         {},
         {}};
     std::vector<std::string> warnings;

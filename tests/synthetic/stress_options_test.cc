@@ -225,6 +225,49 @@ TEST(StressOptions, StopsAndSpinsStandInLogsAndPoses) {
   EXPECT_NE(BuildError(options).find("at most"), std::string::npos);
 }
 
+// An hour at rest with an image every six minutes, in the middle of a drive
+// whose other images are those of a shorter drive without a stop.
+TEST(StressOptions, AStopMayLastForHours) {
+  SyntheticWorldOptions options = NoiseFreeOptions();
+  options.num_images = 30;
+  const SyntheticWorld without = BuildSyntheticWorld(options);
+  options.num_images = 40;
+  options.imu_rate_hz = 20.0;
+  options.num_stops = 1;
+  options.stop_duration_s = 3600.0;
+  options.stop_image_interval_s = 360.0;
+  const SyntheticWorld world = BuildSyntheticWorld(options);
+  EXPECT_NEAR(SummarizeWorld(world).standing_s, 3600.0, 1e-6);
+  ASSERT_EQ(world.images.size(), 40);
+  ASSERT_EQ(world.stops.size(), 1);
+  std::vector<Eigen::Vector3d> at_rest, under_way;
+  for (const SyntheticImage& image : world.images) {
+    const bool is_at_rest = image.timestamp_ns >= world.stops[0].first &&
+                            image.timestamp_ns <= world.stops[0].second;
+    (is_at_rest ? at_rest : under_way).push_back(Center(image));
+  }
+  ASSERT_EQ(at_rest.size(), 10);
+  for (const Eigen::Vector3d& center : at_rest) {
+    EXPECT_LT((center - at_rest.front()).norm(), 1e-9);
+  }
+  // The jitter of the times moves an image by 1 % of a spacing.
+  for (size_t i = 0; i < under_way.size(); ++i) {
+    EXPECT_LT((under_way[i] - Center(without.images[i])).norm(),
+              0.05 * options.spacing_m);
+  }
+  double turned = 0.0;
+  for (const ImuSample& sample : world.imu_samples) {
+    if (sample.timestamp_ns < world.stops[0].first ||
+        sample.timestamp_ns > world.stops[0].second) {
+      continue;
+    }
+    turned += sample.angular_velocity.norm();
+  }
+  EXPECT_LT(turned, 1e-6);
+  options.stop_image_interval_s = 60.0;
+  EXPECT_NE(BuildError(options).find("at most 20"), std::string::npos);
+}
+
 TEST(StressOptions, CarsCarryTheShareOfKeypointsAskedFor) {
   SyntheticWorldOptions options;
   options.num_images = 40;

@@ -70,6 +70,12 @@ DIALS = {
         spurious_ratio=0.5),
     'turns on the spot': dial(('standing_s',), 200, spins=1, spin_duration=4),
     'long standstill': dial(('standing_s',), 200, stops=1, stop_duration=12),
+    'two hours at rest, a photo every two minutes': dial(
+        ('standing_s',), 200, stops=1, stop_duration=7200,
+        stop_image_interval=120),
+    'two hours at rest without a photo': dial(
+        ('standing_s',), 200, stops=1, stop_duration=7200,
+        stop_image_interval=10000),
     'wheels on gravel': dial((), wheel_slip_noise=0.03, wheel_slips=4),
     'cars carry most matches': dial(
         ('moving_keypoint_ratio', 'moving_match_ratio'), moving_ratio=0.45),

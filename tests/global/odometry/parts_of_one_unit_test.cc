@@ -131,6 +131,22 @@ TEST(FindPartsOfOneUnit, TwoImagesTieSizesAndOneDoesNot) {
   EXPECT_EQ(world.Parts(), std::vector<int>(5, 0));
 }
 
+// Image 4 is at rest where 3 is. A pair of it whose direction is noise has a
+// unit of its own, and takes it away unless both images are one place.
+TEST(FindPartsOfOneUnit, ImagesAtRestAreOnePlace) {
+  for (const bool is_at_rest : {false, true}) {
+    Units world;
+    world.Add(1, 2, 0);
+    world.Add(2, 3, 0);
+    world.Add(3, 4, -1);
+    world.graph.edges.back().has_baseline = !is_at_rest;
+    world.Add(4, 5, 1);
+    world.Add(5, 6, 0);
+    EXPECT_EQ(world.Parts(), is_at_rest ? std::vector<int>(6, 0)
+                                        : std::vector<int>({0, 0, 0, 3, 0, 0}));
+  }
+}
+
 // Units {1, 2, 3} and {4, 5, 6}; each bar (edge) between them is one more.
 Units BuildUnitsWithBars(const std::vector<std::pair<image_t, image_t>>& bars,
                          const std::map<image_t, Eigen::Vector3d>& centers) {

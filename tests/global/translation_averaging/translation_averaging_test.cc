@@ -5,6 +5,7 @@
 
 #include <Eigen/Cholesky>
 
+#include "core/median.h"
 #include "core/so3.h"
 #include "tests/testing/global/test_scene.h"
 #include "tests/testing/matchers.h"
@@ -139,6 +140,56 @@ TEST(TranslationAveraging, KeepsMetresOfSensorEdges) {
   const AlignedErrors errors = Errors(problem, result.centers);
   EXPECT_LT(errors.rmse_m, 1e-2);
   EXPECT_NEAR(errors.scale, 1.0, 1e-2);
+}
+
+// Two halves whose only link is a camera at rest: image 15 of the one, image 16
+// of the other, and many between them, without a direction to any other.
+TEST(TranslationAveraging, ACameraAtRestJoinsBothSides) {
+  for (uint64_t seed = 1; seed <= 5; ++seed) {
+    PositionProblem problem = BuildProblem(30, 60, 0, 0, false, seed);
+    const Eigen::Vector3d step = problem.truth.at(16).TargetOriginInSource() -
+                                 problem.truth.at(15).TargetOriginInSource();
+    for (image_t k = 1; k <= 15; ++k) {
+      problem.truth[k] = CamFromWorldWithCenter(
+          problem.rotations[k], problem.truth[k].TargetOriginInSource() + step);
+    }
+    auto& edges = problem.graph.edges;
+    for (size_t e = edges.size(); e-- > 0;) {
+      if ((edges[e].image_id1 <= 15) == (edges[e].image_id2 <= 15)) continue;
+      edges.erase(edges.begin() + e);
+      problem.lengths.erase(problem.lengths.begin() + e);
+    }
+    const auto add_rest = [&problem](image_t id1, image_t id2) {
+      ViewGraphEdge edge = BuildEdge(
+          ImagePair(id1, id2),
+          ComputeCam2FromCam1(problem.truth.at(id1), problem.truth.at(id2)));
+      edge.has_baseline = false;
+      edge.cam2_from_cam1.translation.setZero();
+      problem.graph.edges.push_back(edge);
+      problem.lengths.push_back(std::nullopt);
+    };
+    for (image_t k = 31; k <= 130; ++k) {
+      problem.graph.images.push_back(k);
+      problem.rotations[k] = problem.rotations.at(15);
+      problem.truth[k] = problem.truth.at(15);
+      add_rest(k == 31 ? 15 : k - 1, k);
+      if (k > 32) add_rest(k - 2, k);
+    }
+    add_rest(16, 130);
+    const GlobalPositions result =
+        EstimateGlobalPositions(TranslationAveragingOptions(), problem.graph,
+                                problem.rotations, problem.lengths, {});
+    ASSERT_TRUE(result.success) << "seed " << seed;
+    EXPECT_TRUE(result.converged) << "seed " << seed;
+    const AlignedErrors errors = Errors(problem, result.centers);
+    EXPECT_LT(errors.rmse_m, 1e-3) << "seed " << seed;
+    // The unit is the median length of edges that move.
+    std::vector<double> lengths;
+    for (const std::optional<EdgeLength>& length : problem.lengths) {
+      if (length) lengths.push_back(length->length);
+    }
+    EXPECT_NEAR(errors.scale, UpperMedian(&lengths), 1e-2 * errors.scale);
+  }
 }
 
 TEST(TranslationAveraging, SolvesCollinearMotionThroughLengths) {

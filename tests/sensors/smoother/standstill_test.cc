@@ -155,6 +155,43 @@ TEST(Standstill, CamerasThatSeeMotionOutvoteAQuietImu) {
   }
 }
 
+std::vector<std::pair<double, double>> ParkedSeconds(const Rest& rest) {
+  std::vector<std::pair<double, double>> seconds;
+  for (const auto& [start_ns, end_ns] :
+       FindParkedIntervals(rest.logs, rest.noise)) {
+    seconds.emplace_back(SecondsFromNs(start_ns), SecondsFromNs(end_ns));
+  }
+  return seconds;
+}
+
+TEST(FindParkedIntervals, AreStandstillsWithoutTheirEnds) {
+  const auto still = [](double) { return 0.0; };
+  for (uint64_t seed = 1; seed <= 10; ++seed) {
+    const auto parked = ParkedSeconds(Rest(150.0, seed, still));
+    ASSERT_EQ(parked.size(), 1) << "seed " << seed;
+    EXPECT_NEAR(parked[0].first, 20.0, 1.0);
+    EXPECT_NEAR(parked[0].second, 130.0, 1.0);
+    // Too short.
+    EXPECT_TRUE(ParkedSeconds(Rest(55.0, seed, still)).empty());
+  }
+}
+
+TEST(FindParkedIntervals, EndWhereTheMachineMoves) {
+  for (uint64_t seed = 1; seed <= 10; ++seed) {
+    const auto parked = ParkedSeconds(Rest(150.0, seed, [](double time_s) {
+      return time_s > 50.0 && time_s < 54.0 ? 0.1 : 0.0;
+    }));
+    ASSERT_EQ(parked.size(), 1) << "seed " << seed;
+    EXPECT_NEAR(parked[0].first, 74.0, 2.0);
+    EXPECT_NEAR(parked[0].second, 130.0, 1.0);
+  }
+  MotionLogs logs;
+  logs.seen_moving_ns = {{40'000'000'000, 100'000'000'000}};
+  EXPECT_TRUE(ParkedSeconds(Rest(
+                                150.0, 1, [](double) { return 0.0; }, logs))
+                  .empty());
+}
+
 TEST(FindSeenMotion, IsThatOfImagesInARow) {
   const std::map<image_t, timestamp_t> times_ns = {
       {7, 100}, {3, 200}, {5, 300}, {4, 400}};
