@@ -5,10 +5,10 @@
 #include "global/estimate_coarse_poses.h"
 #include "global/rotation_averaging/rotation_averaging.h"
 #include "global/structure/match_refinement.h"
-#include "global/structure/tracks.h"
 #include "global/structure/triangulate_tracks.h"
 #include "global/translation_averaging/translation_averaging.h"
 #include "global/two_view/refine_relative_poses.h"
+#include "global/view_graph/tracks.h"
 #include "synthetic/synthetic_world.h"
 
 namespace adasfm {

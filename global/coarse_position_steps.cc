@@ -5,6 +5,7 @@
 
 #include "global/coarse_pose_estimator.h"
 #include "global/odometry/parts_of_one_unit.h"
+#include "global/view_graph/directions_at_rest.h"
 
 namespace adasfm {
 
@@ -13,6 +14,7 @@ void CoarsePoseEstimator::EstimateTranslations() {
   if (options_.translations.enabled) {
     report = EstimateRelativeTranslations(options_.translations, rotations_,
                                           correspondences_, &graph_);
+    report.num_without_direction += DropDirectionsAtRest(&graph_);
   }
   const int num_augmented =
       AugmentTranslations(options_.augmentation, AllPriors(), &graph_);

@@ -67,6 +67,7 @@ PriorBundleAdjustmentProblem CreateProblem(
   for (const auto& [image_id, pose] : input.cams_from_world) {
     problem.images.insert(image_id);
   }
+  problem.priors = input.rest_pairs;
   if (!options.use_priors) return problem;
   std::vector<RelativePosePrior> priors = input.priors;
   priors.insert(priors.end(), scene.frame_priors.begin(),

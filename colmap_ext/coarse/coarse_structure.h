@@ -17,8 +17,8 @@
 #include "core/bearing.h"
 #include "core/rigid3d.h"
 #include "global/structure/select_keyframes.h"
-#include "global/structure/tracks.h"
 #include "global/structure/triangulate_tracks.h"
+#include "global/view_graph/tracks.h"
 
 namespace adasfm {
 
@@ -57,6 +57,10 @@ struct CoarseModelInput {
   std::map<ImagePair, std::vector<FeatureMatch>> matches;
   // Priors on images of other components are ignored.
   std::vector<RelativePosePrior> priors;
+  // Pairs of a camera at rest (ViewGraphEdge::IsJoinAtRest), in the unit of the
+  // poses. Among hundreds of images of one place, some see hardly any of the
+  // points.
+  std::vector<PosePriorEdge> rest_pairs;
   // Whether pairs determined focal lengths and distortions of unknown lenses
   // (CalibrateFocalLengths). The adjustment then refines them, since points in
   // many images determine them better, and so do the sensors' rotations. Known

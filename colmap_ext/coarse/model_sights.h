@@ -9,7 +9,7 @@
 #include "core/rigid3d.h"
 #include "core/types.h"
 #include "global/structure/join_parts.h"
-#include "global/structure/tracks.h"
+#include "global/view_graph/tracks.h"
 
 namespace adasfm {
 

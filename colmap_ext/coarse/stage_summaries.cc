@@ -3,7 +3,7 @@
 
 #include <sstream>
 
-#include "global/structure/tracks.h"
+#include "global/view_graph/tracks.h"
 
 namespace adasfm {
 

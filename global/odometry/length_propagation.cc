@@ -4,12 +4,15 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <map>
+#include <numeric>
 #include <utility>
 
 #include "core/median.h"
 #include "core/parallel.h"
 #include "core/so3.h"
 #include "global/view_graph/epipolar.h"
+#include "global/view_graph/tracks.h"
 
 namespace adasfm {
 namespace {
@@ -76,25 +79,29 @@ LengthPropagation::LengthPropagation(
 
 // Where vision cannot tell two centres apart, a point has one depth in both
 // images. So depths pass through a standstill, however many images it has.
+// Wrong matches of so many images would join all points if they were not tested
+// (BuildTracks).
 void LengthPropagation::JoinKeypointsOfOnePlace(
     const GlobalCorrespondences& correspondences) {
-  const int num_keypoints = keypoint_begin_.back();
-  std::optional<DisjointSets> sets;
+  std::map<ImagePair, std::vector<FeatureMatch>> matches;
   for (const ViewGraphEdge& edge : graph_.edges) {
-    const auto matches = correspondences.matches.find(edge.Pair());
-    if (!edge.IsAtOnePlace() || matches == correspondences.matches.end()) {
-      continue;
-    }
-    if (!sets) sets.emplace(num_keypoints);
-    const int begin1 = keypoint_begin_[graph_.IndexOf(edge.image_id1)];
-    const int begin2 = keypoint_begin_[graph_.IndexOf(edge.image_id2)];
-    for (const FeatureMatch& match : matches->second) {
-      sets->Join(begin2 + match.point2D_idx2, begin1 + match.point2D_idx1);
+    const auto found = correspondences.matches.find(edge.Pair());
+    if (edge.IsAtOnePlace() && found != correspondences.matches.end()) {
+      matches.insert(*found);
     }
   }
-  if (!sets) return;
-  point_of_.resize(num_keypoints);
-  for (int k = 0; k < num_keypoints; ++k) point_of_[k] = sets->Find(k);
+  if (matches.empty()) return;
+  point_of_.resize(keypoint_begin_.back());
+  std::iota(point_of_.begin(), point_of_.end(), 0);
+  const auto number = [this](const TrackElement& element) {
+    return keypoint_begin_[graph_.IndexOf(element.image_id)] +
+           static_cast<int>(element.point2D_idx);
+  };
+  for (const Track& track : BuildTracks(matches)) {
+    for (const TrackElement& element : track) {
+      point_of_[number(element)] = number(track.front());
+    }
+  }
 }
 
 std::vector<LengthPropagation::Observation> LengthPropagation::ObserveEdge(

@@ -7,7 +7,7 @@
 
 #include "core/relative_pose_prior.h"
 #include "core/types.h"
-#include "global/structure/tracks.h"
+#include "global/view_graph/tracks.h"
 
 namespace adasfm {
 

@@ -8,7 +8,7 @@
 
 #include "core/bearing.h"
 #include "core/rigid3d.h"
-#include "global/structure/tracks.h"
+#include "global/view_graph/tracks.h"
 
 namespace adasfm {
 

@@ -21,10 +21,6 @@ constexpr double kMinResidual = 1e-3;
 // points, so their errors are not independent.
 constexpr double kMinSoftLengthSigma = 0.05;
 
-// 1 sigma of a camera at rest, in median edge lengths: what vision overlooks of
-// a step.
-constexpr double kRestSigmaRatio = 0.02;
-
 constexpr int kMaxNumIterations = 100;
 // The reweighted iterations end at this mean relative movement of the ends of
 // an edge, in median edge lengths; with the second number where the refinement,

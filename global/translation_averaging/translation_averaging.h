@@ -13,6 +13,10 @@
 
 namespace adasfm {
 
+// 1 sigma of the distance of two images of a camera at rest, in median lengths
+// of edges: what vision overlooks of a step.
+inline constexpr double kRestSigmaRatio = 0.02;
+
 struct TranslationAveragingOptions {
   // Second stage: directions across and lengths along the edge weigh by their
   // own sigmas, with a Cauchy loss.

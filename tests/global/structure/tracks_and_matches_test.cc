@@ -6,8 +6,8 @@
 
 #include "core/so3.h"
 #include "global/structure/match_refinement.h"
-#include "global/structure/tracks.h"
 #include "global/structure/triangulate_tracks.h"
+#include "global/view_graph/tracks.h"
 #include "tests/testing/global/test_scene.h"
 
 namespace adasfm {

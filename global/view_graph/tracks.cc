@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "global/structure/tracks.h"
+#include "global/view_graph/tracks.h"
 
 #include <algorithm>
 #include <utility>
