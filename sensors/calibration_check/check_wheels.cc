@@ -55,7 +55,7 @@ class WheelChecker {
   WheelCheck Run();
 
  private:
-  double LogLikelihood(const WheelFit& fit) const;
+  double LogLikelihood(const WheelFit& as_logged, const WheelFit& fit) const;
   bool ObservesForce(const WheelFit& fit) const {
     return fit.acceleration_rms > kMinAcceleration &&
            fit.force_correlation > kMinCorrelation;
@@ -87,16 +87,20 @@ class WheelChecker {
   const SensorCalibration& calibration_;
 };
 
-double WheelChecker::LogLikelihood(const WheelFit& fit) const {
+// Which motions count depends on the logs as they are: at another clock the rms
+// is a little different, and a motion that counted only there would make that
+// clock the likelier one.
+double WheelChecker::LogLikelihood(const WheelFit& as_logged,
+                                   const WheelFit& fit) const {
   const auto gain = [&](double correlation) {
     return -0.5 * fit.sum_of_weights / kBinsPerObservation *
            std::log(1.0 - 0.999 * correlation * correlation);
   };
   // Correlations are squared: wheels may count backwards or be exchanged.
-  double sum = fit.acceleration_rms > kMinAcceleration
+  double sum = as_logged.acceleration_rms > kMinAcceleration
                    ? gain(fit.forward_correlation)
                    : 0.0;
-  if (has_yaw_ && fit.yaw_rate_rms > kMinYawRate) {
+  if (has_yaw_ && as_logged.yaw_rate_rms > kMinYawRate) {
     sum += gain(fit.yaw_correlation);
   }
   return sum;
@@ -162,12 +166,12 @@ WheelChecker::ClockScan WheelChecker::ScanClocks(const WheelFit& fit) const {
   const int max_shift =
       static_cast<int>(std::lround(kMaxLogShiftS / MotionBins::kBinS));
   ClockScan scan;
-  scan.as_logged = scan.best = LogLikelihood(fit);
+  scan.as_logged = scan.best = LogLikelihood(fit, fit);
   for (int bins = -max_shift; bins <= max_shift; ++bins) {
     const WheelFit shifted =
         FitWheels(bins_, Eigen::Matrix3d::Identity(), bins);
     if (shifted.num_windows < kMinNumBins) continue;
-    const double likelihood = LogLikelihood(shifted);
+    const double likelihood = LogLikelihood(fit, shifted);
     if (std::abs(bins) * MotionBins::kBinS > kFarShiftS) {
       scan.best_far = std::max(scan.best_far, likelihood);
     }
