@@ -63,6 +63,9 @@ bool SyntheticWorldOptions::IsValid(std::string* error) const {
                num_blackouts,
                "must be at most " + std::to_string(max_num_blackouts) +
                    ": half of the images keep their texture")
+      .Require(num_stops > 0 || stop_image_interval_s == 0.0,
+               "stop_image_interval_s", stop_image_interval_s,
+               "must be 0 without stops")
       .Require(num_spins == 0 || stop_image_interval_s == 0.0, "num_spins",
                num_spins, "must be 0 with stop_image_interval_s")
       .Require(num_focal_steps < num_images, "num_focal_steps", num_focal_steps,

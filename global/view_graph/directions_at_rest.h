@@ -7,9 +7,9 @@ namespace adasfm {
 
 // Takes the direction of pairs whose images are at one place by what others
 // see: with both, most images that have no baseline with either have none
-// (ViewGraphEdge::has_baseline). One pair in some hundred of a standing camera
-// passes the test of its baseline by chance, and an image would hang on its
-// direction alone, anywhere. Returns the number of pairs.
+// (ViewGraphEdge::has_baseline). A pair of a standing camera may pass the test
+// of its baseline by chance, and an image would hang on its direction alone,
+// anywhere. Returns the number of pairs.
 int DropDirectionsAtRest(ViewGraph* graph);
 
 }  // namespace adasfm

@@ -10,8 +10,6 @@ namespace {
 
 using Matrix6 = Eigen::Matrix<double, 6, 6>;
 
-// Errors of links are correlated: n links count n times the sum of their
-// covariances. Those of a standstill are one link.
 OdometryMotion ComposeMotions(const OdometryFusionProblem& problem,
                               const OdometryFusionResult& fused, size_t first,
                               size_t last) {

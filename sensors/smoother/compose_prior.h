@@ -11,7 +11,7 @@ namespace adasfm {
 // The camera's motion over links first, ..., last - 1, with its covariance and
 // the flags of what the links' sensors observe; images and dt are not set. The
 // errors of successive links are correlated (one speed, one bias), so the sum
-// of n covariances is multiplied by n.
+// of n covariances is multiplied by n; links of one standstill count as one.
 RelativePosePrior ComposePrior(const OdometryFusionProblem& problem,
                                const OdometryFusionResult& fused, size_t first,
                                size_t last, const Rigid3d& cam_from_imu);

@@ -287,7 +287,7 @@ std::vector<std::pair<timestamp_t, timestamp_t>> FindParkedIntervals(
   };
   for (timestamp_t time = logs.StartNs(); time <= logs.EndNs(); time += step) {
     if (!is_at_rest(time)) continue;
-    // Noise makes one second in a hundred look like motion.
+    // Noise may make a single second look like motion.
     if (intervals.empty() || time - intervals.back().second > 2 * step) {
       intervals.emplace_back(time, time);
     }

@@ -266,6 +266,8 @@ TEST(StressOptions, AStopMayLastForHours) {
   EXPECT_LT(turned, 1e-6);
   options.stop_image_interval_s = 60.0;
   EXPECT_NE(BuildError(options).find("at most 20"), std::string::npos);
+  options.num_stops = 0;
+  EXPECT_NE(BuildError(options).find("without stops"), std::string::npos);
 }
 
 TEST(StressOptions, CarsCarryTheShareOfKeypointsAskedFor) {
