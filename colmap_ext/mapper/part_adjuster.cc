@@ -8,6 +8,7 @@
 #include "colmap_ext/bundle_adjustment/estimate_keypoint_sigma.h"
 #include "colmap_ext/bundle_adjustment/variance_components.h"
 #include "colmap_ext/host/pose_conversion.h"
+#include "core/so3.h"
 
 namespace adasfm {
 namespace {
@@ -117,7 +118,49 @@ std::set<image_t> PartAdjuster::FindConstantImages(
     if (constant_images.size() == kMaxNumConstantImages) break;
     constant_images.insert(image_id);
   }
+  AddBaselines(batch, &constant_images);
   return constant_images;
+}
+
+// Points that these images see from one place would move freely in depth: each
+// of them gets the registered image that sees it from farthest aside.
+void PartAdjuster::AddBaselines(const std::set<image_t>& batch,
+                                std::set<image_t>* constant_images) const {
+  const double min_angle = DegToRad(options_.min_triangulation_angle_deg);
+  std::set<colmap::point3D_t> point_ids;
+  for (const image_t image_id : batch) {
+    for (const auto& point2D : reconstruction_.Image(image_id).Points2D()) {
+      if (!point2D.HasPoint3D() ||
+          !point_ids.insert(PointIdOf(point2D)).second) {
+        continue;
+      }
+      const colmap::Point3D& point =
+          reconstruction_.Point3D(PointIdOf(point2D));
+      const auto direction_of = [&](image_t other) -> Eigen::Vector3d {
+        return CamFromWorld(reconstruction_.Image(other))
+                   .TargetOriginInSource() -
+               XyzOf(point);
+      };
+      const Eigen::Vector3d direction = direction_of(image_id);
+      double max_angle = 0.0;
+      double max_angle_here = 0.0;
+      image_t farthest = kInvalidImageId;
+      for (const auto& element : TrackOf(point).Elements()) {
+        const double angle =
+            AngleBetweenRad(direction, direction_of(element.image_id));
+        if (batch.count(element.image_id) ||
+            constant_images->count(element.image_id)) {
+          max_angle_here = std::max(max_angle_here, angle);
+        } else if (angle > max_angle) {
+          max_angle = angle;
+          farthest = element.image_id;
+        }
+      }
+      if (max_angle_here < min_angle && max_angle > max_angle_here) {
+        constant_images->insert(farthest);
+      }
+    }
+  }
 }
 
 void PartAdjuster::AdjustImages(const std::set<image_t>& images,

@@ -49,6 +49,8 @@ class PartAdjuster {
 
  private:
   std::set<image_t> FindConstantImages(const std::set<image_t>& batch) const;
+  void AddBaselines(const std::set<image_t>& batch,
+                    std::set<image_t>* constant_images) const;
   void AdjustImages(const std::set<image_t>& images,
                     const std::set<image_t>& constant_images,
                     int max_num_iterations);

@@ -1,10 +1,13 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "colmap_ext/mapper_stage/partition_plan.h"
 
+#include <algorithm>
+#include <map>
 #include <nlohmann/json.hpp>
 
 #include "core/option_checker.h"
 #include "partition/flood_fill.h"
+#include "partition/places.h"
 
 namespace adasfm {
 namespace {
@@ -12,6 +15,25 @@ namespace {
 // A prior connects two images about as well as a weak pair; parts are cut
 // through vision rather than through the priors of a tunnel.
 constexpr double kPriorWeight = 30.0;
+
+std::vector<std::vector<image_t>> ImagesOfPlaces(
+    const std::map<image_t, image_t>& place_of_image,
+    const std::vector<std::vector<image_t>>& parts_of_places) {
+  std::map<image_t, std::vector<image_t>> images_of_place;
+  for (const auto& [image_id, place] : place_of_image) {
+    images_of_place[place].push_back(image_id);
+  }
+  std::vector<std::vector<image_t>> parts;
+  for (const std::vector<image_t>& places : parts_of_places) {
+    std::vector<image_t>& part = parts.emplace_back();
+    for (const image_t place : places) {
+      const std::vector<image_t>& images = images_of_place.at(place);
+      part.insert(part.end(), images.begin(), images.end());
+    }
+    std::sort(part.begin(), part.end());
+  }
+  return parts;
+}
 
 }  // namespace
 
@@ -54,13 +76,21 @@ PartitionPlan BuildPartitionPlan(const PartitionPlanOptions& options,
                                  const SceneData& data,
                                  const CoarsePoseMap& coarse) {
   const ImageGraph graph = BuildImageGraph(data, coarse);
+  std::map<image_t, Eigen::Vector3d> positions;
+  for (const auto& [image_id, pose] : coarse) {
+    positions[image_id] = pose.TargetOriginInSource();
+  }
+  const auto place_of_image = FindPlaces(graph, positions);
+  const ImageGraph places = MergePlaces(graph, place_of_image);
   PartitionPlan plan;
-  const int num_images = static_cast<int>(graph.images.size());
-  if (num_images <= options.max_num_images_undivided) {
+  const int num_places = static_cast<int>(places.images.size());
+  if (num_places <= options.max_num_images_undivided) {
     plan.parts.emplace_back(graph.images.begin(), graph.images.end());
   } else {
-    plan.parts = ExpandByFloodFill(options.min_overlap_ratio, graph,
-                                   ComputeNormalizedCut(options.cut, graph));
+    plan.parts = ImagesOfPlaces(
+        place_of_image,
+        ExpandByFloodFill(options.min_overlap_ratio, places,
+                          ComputeNormalizedCut(options.cut, places)));
   }
   plan.overlap_ratios = ComputeOverlapRatios(plan.parts);
   return plan;

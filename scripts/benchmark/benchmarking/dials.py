@@ -76,6 +76,9 @@ DIALS = {
     'two hours at rest without a photo': dial(
         ('standing_s',), 200, stops=1, stop_duration=7200,
         stop_image_interval=10000),
+    'a minute at rest, five photos a second': dial(
+        ('standing_s',), 700, stops=1, stop_duration=60,
+        stop_image_interval=0.2),
     'wheels on gravel': dial((), wheel_slip_noise=0.03, wheel_slips=4),
     'cars carry most matches': dial(
         ('moving_keypoint_ratio', 'moving_match_ratio'), moving_ratio=0.45),

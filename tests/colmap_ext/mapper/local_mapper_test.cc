@@ -171,6 +171,30 @@ TEST(LocalMapper, FewGlobalAdjustments) {
   EXPECT_LE(result.num_global_adjustments, 7);
 }
 
+// Deep in a stop all matches are with images of the same place. What a batch
+// sees must keep its depth from the images that saw it on the way there.
+TEST(LocalMapper, ImagesAtRestAreRegistered) {
+  for (uint64_t seed = 1; seed <= 3; ++seed) {
+    MapperWorldOptions options;
+    options.world.num_images = 240;
+    options.world.num_stops = 1;
+    options.world.stop_duration_s = 60.0;
+    options.world.stop_image_interval_s = 0.5;
+    options.world.seed = seed;
+    options.priors.enabled = false;
+    options.center_sigma_m = 0.005;
+    const MapperWorld world = BuildMapperWorld(options);
+    // The way to the stop and most of its images.
+    std::set<image_t> images;
+    for (image_t image_id = 1; image_id <= 170; ++image_id) {
+      images.insert(image_id);
+    }
+    const LocalMapResult result =
+        ReconstructLocally({}, world.data, world.coarse_poses, images);
+    EXPECT_EQ(result.reconstruction.NumRegImages(), 170) << "seed " << seed;
+  }
+}
+
 TEST(LocalMapper, ThrowsWithoutAnInitialPair) {
   MapperWorld world = BuildMapperWorld(SmallWorld(1));
   world.data.pairs.clear();

@@ -83,6 +83,27 @@ TEST_F(MapperStageTest, FilterFollowsTheNoise) {
   }
 }
 
+// A part that has images of a single place has no initial pair.
+TEST_F(MapperStageTest, NoPartIsAStandstill) {
+  for (uint64_t seed = 1; seed <= 3; ++seed) {
+    MapperWorldOptions options;
+    options.world.num_images = 160;
+    options.world.num_stops = 1;
+    options.world.stop_duration_s = 40.0;
+    options.world.stop_image_interval_s = 0.5;
+    options.world.seed = seed;
+    options.priors.enabled = false;
+    options.center_sigma_m = 0.005;
+    const MapperWorld world = BuildMapperWorld(options);
+    Run(world);
+    EXPECT_GT(summary_.plan.parts.size(), 1);
+    for (const auto& part : summary_.parts) {
+      EXPECT_TRUE(part.failure.empty())
+          << "seed " << seed << ": " << part.failure;
+    }
+  }
+}
+
 TEST_F(MapperStageTest, StraightRoadIsReconstructed) {
   for (uint64_t seed = 1; seed <= 2; ++seed) {
     MapperWorldOptions options;
