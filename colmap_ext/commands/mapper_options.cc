@@ -10,16 +10,18 @@ void AddPartitionOptions(MapperStageOptions* options, CommandOptions* command) {
   PartitionPlanOptions& partition = options->partition;
   command->AddDefault(
       "AdaSfmPartition.max_part_size", &partition.cut.max_part_size,
-      "largest number of images of a part, without the overlap");
+      "largest number of images of a part, without the overlap; images of one "
+      "place count as one");
   command->AddDefault("AdaSfmPartition.min_part_size",
                       &partition.cut.min_part_size,
                       "parts with fewer images are joined to a neighbour");
   command->AddDefault(
       "AdaSfmPartition.min_overlap_ratio", &partition.min_overlap_ratio,
       "tau_ot: smallest share of a part that other parts contain too");
-  command->AddDefault("AdaSfmPartition.max_num_images_undivided",
-                      &partition.max_num_images_undivided,
-                      "a scene with at most this many images is one part");
+  command->AddDefault(
+      "AdaSfmPartition.max_num_images_undivided",
+      &partition.max_num_images_undivided,
+      "a scene with at most this many images, counted alike, is one part");
 }
 
 void AddAlignOptions(AlignSimilarityOptions* align, CommandOptions* command) {
