@@ -18,8 +18,14 @@ namespace adasfm {
 namespace {
 
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
-// Matches whose rays enclose a smaller angle do not constrain depth.
-constexpr double kMinParallaxRad = DegToRad(1.0);
+// Matches whose rays enclose a smaller angle hardly constrain depth, and are
+// used only as far as a pair has fewer good ones than kMinMatchRatio of all.
+// The few matches of a short step with wide parallax are wrong ones; so matches
+// weigh no more than that share of them does.
+constexpr double kGoodParallaxRad = DegToRad(1.0);
+constexpr double kMinMatchRatio = 0.25;
+// Below this it is noise.
+constexpr double kMinParallaxRad = DegToRad(0.25);
 // Lengths less certain than this (1 sigma of their logarithm) are rejected.
 constexpr double kMaxLogSigma = 0.2;
 // Their observations are in memory twice.
@@ -125,6 +131,8 @@ std::vector<LengthPropagation::Observation> LengthPropagation::ObserveEdge(
   const Eigen::Vector3d translation =
       edge.cam2_from_cam1.translation.normalized();
   const double min_sin_parallax = std::sin(kMinParallaxRad);
+  const double good_sin_parallax = std::sin(kGoodParallaxRad);
+  int num_good = 0;
   using Candidate = std::pair<Observation, Observation>;
   std::vector<Candidate> candidates;
   for (const FeatureMatch& match : matches->second) {
@@ -137,6 +145,7 @@ std::vector<LengthPropagation::Observation> LengthPropagation::ObserveEdge(
     if (depth1 <= 0.0 || depth2 <= 0.0 || sin_parallax < min_sin_parallax) {
       continue;
     }
+    num_good += sin_parallax >= good_sin_parallax;
     const double squared = sin_parallax * sin_parallax;
     const float weight = squared / (squared + kSaturation * kSaturation);
     candidates.push_back(
@@ -148,14 +157,21 @@ std::vector<LengthPropagation::Observation> LengthPropagation::ObserveEdge(
                    [](const Candidate& a, const Candidate& b) {
                      return a.first.weight > b.first.weight;
                    });
-  if (static_cast<int>(candidates.size()) > max_num_matches_) {
-    candidates.resize(max_num_matches_);
+  const int num_required =
+      static_cast<int>(std::ceil(kMinMatchRatio * matches->second.size()));
+  if (static_cast<int>(candidates.size()) < std::max(1, num_required)) {
+    return {};
   }
+  const float max_weight = candidates[num_required - 1].first.weight;
+  candidates.resize(
+      std::min(std::max(num_good, num_required), max_num_matches_));
   std::vector<Observation> observations;
   observations.reserve(2 * candidates.size());
-  for (const Candidate& candidate : candidates) {
-    observations.push_back(candidate.first);
-    observations.push_back(candidate.second);
+  for (Candidate& candidate : candidates) {
+    for (Observation* observation : {&candidate.first, &candidate.second}) {
+      observation->weight = std::min(observation->weight, max_weight);
+      observations.push_back(*observation);
+    }
   }
   return observations;
 }
