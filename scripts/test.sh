@@ -58,7 +58,7 @@ if [ "${1:-}" != --no-sanitizers ]; then
   # they take ten times as long, and shorter tests run the same code.
   statistics='JitterOfTheImages|OnAStraightRoad|ShiftsAreExact|Honesty'
   statistics+='|RealRoad|IsNotFoundWhereThereIsNone|OverTwentySeeds|ALongDrive'
-  statistics+='|AreNamed/(SwappedAxes|OneSecond)|HoursAtRest'
+  statistics+='|AreNamed/(SwappedAxes|OneSecond)|HoursAtRest|TheFirstSteps'
   run_tests build-sanitize --exclude-regex "$statistics" \
     --label-regex "^($(IFS='|'; echo "${layers[*]}"))$"
 fi
