@@ -7,11 +7,10 @@
 namespace adasfm {
 namespace {
 
-// Even a wide baseline seldom shows points at more than half a radian; from 2 %
-// of it they are seen at less than the angle that a point needs.
+// Where a wide baseline shows points at half a radian, 2 % of it shows them at
+// 0.6 deg, less than a point needs.
 constexpr double kPlaceRatio = 0.02;
-// False pairs are seldom a tenth of all, nor is a moving camera's share of them
-// so small.
+// Neither a tenth of false pairs decides this nor nine tenths at rest.
 constexpr double kWideQuantile = 0.9;
 
 double WideBaseline(const ImageGraph& graph,

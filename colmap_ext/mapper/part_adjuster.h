@@ -37,8 +37,8 @@ class PartAdjuster {
 
   // The first two images.
   void AdjustPair(image_t image_id1, image_t image_id2);
-  // The batch, with the registered images that share most matches with it held
-  // fixed.
+  // The batch. Held fixed are the registered images that share most matches
+  // with it, and those that its points need for their depth.
   void AdjustBatch(const std::set<image_t>& batch);
   // All registered images, after joining tracks.
   void AdjustAll(int max_num_iterations);

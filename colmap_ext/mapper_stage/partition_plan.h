@@ -18,7 +18,7 @@ struct PartitionPlanOptions {
   NormalizedCutOptions cut;
   // tau_ot of the flood fill; the paper's value.
   double min_overlap_ratio = 0.3;
-  // Up to this many images the scene stays one part.
+  // Up to this many places (partition/places.h) the scene stays one part.
   int max_num_images_undivided = 200;
 
   bool IsValid(std::string* error) const;

@@ -175,15 +175,7 @@ TEST(LocalMapper, FewGlobalAdjustments) {
 // sees must keep its depth from the images that saw it on the way there.
 TEST(LocalMapper, ImagesAtRestAreRegistered) {
   for (uint64_t seed = 1; seed <= 3; ++seed) {
-    MapperWorldOptions options;
-    options.world.num_images = 240;
-    options.world.num_stops = 1;
-    options.world.stop_duration_s = 60.0;
-    options.world.stop_image_interval_s = 0.5;
-    options.world.seed = seed;
-    options.priors.enabled = false;
-    options.center_sigma_m = 0.005;
-    const MapperWorld world = BuildMapperWorld(options);
+    const MapperWorld world = BuildMapperWorld(WorldWithStop(240, 60.0, seed));
     // The way to the stop and most of its images.
     std::set<image_t> images;
     for (image_t image_id = 1; image_id <= 170; ++image_id) {

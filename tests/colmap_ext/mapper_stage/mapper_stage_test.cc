@@ -86,15 +86,7 @@ TEST_F(MapperStageTest, FilterFollowsTheNoise) {
 // A part that has images of a single place has no initial pair.
 TEST_F(MapperStageTest, NoPartIsAStandstill) {
   for (uint64_t seed = 1; seed <= 3; ++seed) {
-    MapperWorldOptions options;
-    options.world.num_images = 160;
-    options.world.num_stops = 1;
-    options.world.stop_duration_s = 40.0;
-    options.world.stop_image_interval_s = 0.5;
-    options.world.seed = seed;
-    options.priors.enabled = false;
-    options.center_sigma_m = 0.005;
-    const MapperWorld world = BuildMapperWorld(options);
+    const MapperWorld world = BuildMapperWorld(WorldWithStop(160, 40.0, seed));
     Run(world);
     EXPECT_GT(summary_.plan.parts.size(), 1);
     for (const auto& part : summary_.parts) {

@@ -29,6 +29,20 @@ struct MapperWorldOptions {
   double rotation_sigma_rad = 0.005;
 };
 
+// A drive without logs that is filmed while it stands.
+inline MapperWorldOptions WorldWithStop(int num_images, double stop_s,
+                                        uint64_t seed) {
+  MapperWorldOptions options;
+  options.world.num_images = num_images;
+  options.world.num_stops = 1;
+  options.world.stop_duration_s = stop_s;
+  options.world.stop_image_interval_s = 0.5;
+  options.world.seed = seed;
+  options.priors.enabled = false;
+  options.center_sigma_m = 0.005;
+  return options;
+}
+
 inline MapperWorld BuildMapperWorld(const MapperWorldOptions& options) {
   const SyntheticWorld world = BuildSyntheticWorld(options.world);
   MapperWorld result;
