@@ -273,7 +273,7 @@ def parse_arguments(words=None):
                       help='any of: %s; all when none is named' %
                       ', '.join(STEPS))
   parser.add_argument('--quick', action='store_true',
-                      help="only README's table: 20 to 40 minutes on two cores")
+                      help="only README's table: 20 to 45 minutes on two cores")
   parser.add_argument('--draw', dest='run', action='store_const', const=0,
                       default=1, help='run nothing: only write the tables')
   parser.add_argument('--output_path',

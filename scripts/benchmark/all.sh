@@ -7,7 +7,7 @@
 # COLMAP are missing are left out with one line.
 #
 #   scripts/benchmark/all.sh --quick    README's table and COLMAP 4 beside it: 20 to
-#                                       40 minutes on two idle cores
+#                                       45 minutes on two idle cores
 #   scripts/benchmark/all.sh            everything: several hours
 #   scripts/benchmark/all.sh -h         all options
 set -euo pipefail
