@@ -8,18 +8,10 @@
 #include <map>
 
 #include "synthetic/world_summary.h"
+#include "tests/testing/synthetic/world_properties.h"
 
 namespace adasfm {
 namespace {
-
-std::string BuildError(const SyntheticWorldOptions& options) {
-  try {
-    BuildSyntheticWorld(options);
-  } catch (const std::invalid_argument& error) {
-    return error.what();
-  }
-  return "";
-}
 
 TEST(SetFocalFactors, PixelsMoveByTheirShareFromThePrincipalPoint) {
   for (const auto model :
